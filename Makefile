@@ -1,0 +1,68 @@
+# `make demo` and `make test` each set up everything from nothing and then do their job.
+PYTHON ?= python3
+VENV ?= .venv
+BIN = $(VENV)/bin
+PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
+PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
+# Numba's cache does not see every change of a source; each run of the tests has its own.
+FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
+
+.PHONY: demo test test-slow test-bounds check format bench docs messages clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make demo       install into $(VENV) and run strapdown on built-in data"
+	@echo "make test       install into $(VENV) and run the tests"
+	@echo "make test-slow  the tests that take more than 20 s each"
+	@echo "make check      ruff, format, mypy, import-linter"
+	@echo "make bench      speed and memory as ratios against named alternatives"
+	@echo "make docs       the manual, into docs/_build"
+
+$(VENV)/bin/python:
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) -e .
+	@touch $@
+
+$(VENV)/.test: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) -e '.[test]'
+	@touch $@ $(VENV)/.run
+
+$(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) -e '.[dev]'
+	@touch $@ $(VENV)/.test $(VENV)/.run
+
+demo: $(VENV)/.run
+	$(BIN)/strapdown demo --out demo --force
+
+test: $(VENV)/.test
+	@$(FRESH) $(PYTEST)
+
+test-slow: $(VENV)/.test
+	@$(FRESH) $(PYTEST) -m slow
+
+test-bounds: $(VENV)/.test
+	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
+
+check: $(VENV)/.dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+format: $(VENV)/.dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+bench: $(VENV)/.dev
+	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m benchmarks
+
+messages: $(VENV)/.test
+	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) tests/cli/test_messages.py
+
+docs: $(VENV)/.dev
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+
+clean:
+	rm -rf $(VENV) demo docs/_build

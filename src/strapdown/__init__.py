@@ -1,0 +1,55 @@
+"""strapdown: from an inertial sensor log to an answer that can be trusted.
+
+Conventions, everywhere:
+
+* body axes ``b``: x forward, y right, z down; local level ``n``: north, east, down;
+* ``C_nb`` and ``q_nb`` turn a vector from body axes into local level, ``v_n = C_nb @ v_b``;
+  quaternions are Hamilton's, scalar first;
+* 3-2-1 Euler angles: heading 0-360 deg clockwise from north, pitch up to ±90 deg nose up,
+  roll up to ±180 deg right side down;
+* specific force ``f_b`` in m/s², about (0, 0, -9.8) at rest and level; rates in rad/s, of the
+  body relative to inertial space; angles in degrees and everything else in SI at this surface,
+  radians inside the kernels; time in seconds.
+
+Three lines that answer a question::
+
+    import strapdown
+    bench = strapdown.bench_attitude("alexiev-fig4", rate=100)
+    print(bench.summary)
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from strapdown.formats import read_log
+    from strapdown.report.attitude import write_attitude
+    from strapdown.report.simulation import simulate
+    from strapdown.report.verify import verify
+    from strapdown.systems.attitude_bench import bench_attitude
+
+__version__ = "0.1.0"
+
+__all__ = ["__version__", "bench_attitude", "read_log", "simulate", "verify", "write_attitude"]
+
+# Loaded on first use: numba alone takes longer to import than most commands take to run.
+_HOMES = {
+    "bench_attitude": "strapdown.systems.attitude_bench",
+    "read_log": "strapdown.formats",
+    "simulate": "strapdown.report.simulation",
+    "verify": "strapdown.report.verify",
+    "write_attitude": "strapdown.report.attitude",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        from importlib import import_module
+
+        return getattr(import_module(_HOMES[name]), name)
+    raise AttributeError(f"module 'strapdown' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

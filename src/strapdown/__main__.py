@@ -1,0 +1,6 @@
+"""``python -m strapdown``."""
+
+from strapdown.cli.main import run
+
+if __name__ == "__main__":
+    run()

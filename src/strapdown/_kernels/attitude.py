@@ -1,0 +1,249 @@
+"""Alexiev's four attitude algorithms: one step each, and its two loops.
+
+For every algorithm there is ``*_step`` (the formula), ``*_advance`` (over many steps,
+writing the state after each into `history`) and ``*_update`` (one sample; returns the
+length of the step as `increments.take_sample` does). Both loops run the same formula on
+the same numbers, so a run that is cut anywhere and continued ends on the same bits.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from strapdown._kernels.increments import HEAD, OPTIONS, take_sample
+from strapdown._kernels.rotation import (
+    dcm_coefficients_truncated,
+    dcm_from_coefficients,
+    half_angle,
+    half_angle_truncated,
+    quat_multiply,
+    wrap_pi,
+)
+
+# Smallest |cos(pitch)| by which Alexiev (8) and (10) divide. It keeps the angles finite on
+# the pole itself, where no value is right; the state records how near a run came.
+COS_FLOOR = 1e-12
+
+
+# --- naive (2): state (roll, pitch, heading), unwrapped ---------------------------------
+
+
+@njit(cache=True)
+def naive_step(state, tx, ty, tz):
+    state[0] += tx
+    state[1] += ty
+    state[2] += tz
+
+
+@njit(cache=True)
+def naive_advance(state, theta, dtheta, history):
+    for k in range(theta.shape[0]):
+        naive_step(state, theta[k, 0], theta[k, 1], theta[k, 2])
+        history[k, 0], history[k, 1], history[k, 2] = state[0], state[1], state[2]
+
+
+@njit(cache=True)
+def naive_update(record, time, rate):
+    dt, tx, ty, tz, _, _, _ = take_sample(record, time, rate)
+    state = record[HEAD:]
+    if dt > 0.0:
+        naive_step(state, tx, ty, tz)
+    return dt
+
+
+# --- Euler-Krylov (8)-(10): state (roll, pitch, heading, least |cos pitch|, its step, steps)
+
+
+@njit(cache=True)
+def euler_rates(roll, pitch, x, y, z):
+    """Alexiev (8)-(10) for the body rate (x, y, z); also cos(pitch) before its floor."""
+    cos_pitch = math.cos(pitch)
+    safe = cos_pitch
+    if abs(safe) < COS_FLOOR:
+        safe = math.copysign(COS_FLOOR, cos_pitch)
+    sin_roll, cos_roll = math.sin(roll), math.cos(roll)
+    about_z = (sin_roll * y + cos_roll * z) / safe
+    return x + math.sin(pitch) * about_z, cos_roll * y - sin_roll * z, about_z, cos_pitch
+
+
+@njit(cache=True)
+def euler_note(state, cos_pitch):
+    if abs(cos_pitch) < state[3]:
+        state[3] = abs(cos_pitch)
+        state[4] = state[5]
+
+
+@njit(cache=True)
+def euler_finish(state, roll, pitch, heading):
+    state[0] = wrap_pi(state[0] + roll)
+    state[1] += pitch
+    state[2] = wrap_pi(state[2] + heading)
+    state[5] += 1.0
+    euler_note(state, math.cos(state[1]))
+
+
+@njit(cache=True)
+def euler_forward_step(state, tx, ty, tz):
+    r, p, h, cos_pitch = euler_rates(state[0], state[1], tx, ty, tz)
+    euler_note(state, cos_pitch)
+    euler_finish(state, r, p, h)
+
+
+@njit(cache=True)
+def euler_rk4_step(state, tx, ty, tz, dx, dy, dz):
+    roll, pitch = state[0], state[1]
+    ax, ay, az = tx - 0.5 * dx, ty - 0.5 * dy, tz - 0.5 * dz
+    bx, by, bz = tx + 0.5 * dx, ty + 0.5 * dy, tz + 0.5 * dz
+    r1, p1, h1, c1 = euler_rates(roll, pitch, ax, ay, az)
+    r2, p2, h2, c2 = euler_rates(roll + 0.5 * r1, pitch + 0.5 * p1, tx, ty, tz)
+    r3, p3, h3, c3 = euler_rates(roll + 0.5 * r2, pitch + 0.5 * p2, tx, ty, tz)
+    r4, p4, h4, c4 = euler_rates(roll + r3, pitch + p3, bx, by, bz)
+    for c in (c1, c2, c3, c4):
+        euler_note(state, c)
+    euler_finish(
+        state,
+        (r1 + 2.0 * (r2 + r3) + r4) / 6.0,
+        (p1 + 2.0 * (p2 + p3) + p4) / 6.0,
+        (h1 + 2.0 * (h2 + h3) + h4) / 6.0,
+    )
+
+
+@njit(cache=True)
+def euler_advance(state, theta, dtheta, history, rk4):
+    for k in range(theta.shape[0]):
+        tx, ty, tz = theta[k, 0], theta[k, 1], theta[k, 2]
+        if rk4:
+            euler_rk4_step(state, tx, ty, tz, dtheta[k, 0], dtheta[k, 1], dtheta[k, 2])
+        else:
+            euler_forward_step(state, tx, ty, tz)
+        history[k, 0], history[k, 1], history[k, 2] = state[0], state[1], state[2]
+
+
+@njit(cache=True)
+def euler_update(record, time, rate):
+    dt, tx, ty, tz, dx, dy, dz = take_sample(record, time, rate)
+    state = record[HEAD:]
+    if dt > 0.0:
+        if record[OPTIONS] != 0.0:
+            euler_rk4_step(state, tx, ty, tz, dx, dy, dz)
+        else:
+            euler_forward_step(state, tx, ty, tz)
+    return dt
+
+
+# --- direction cosines (11)-(13): state (C row by row, steps since re-orthogonalisation) --
+
+
+@njit(cache=True)
+def dcm_step(state, x, y, z, order, orthogonalise_every):
+    n2 = x * x + y * y + z * z
+    if order == 0:
+        c, s = half_angle(0.25 * n2)
+        a, b = 2.0 * c * s, 2.0 * s * s
+    else:
+        a, b = dcm_coefficients_truncated(n2, order)
+    m = dcm_from_coefficients(x, y, z, a, b)
+    for i in range(0, 9, 3):
+        p, q, r = state[i], state[i + 1], state[i + 2]
+        state[i] = p * m[0] + q * m[3] + r * m[6]
+        state[i + 1] = p * m[1] + q * m[4] + r * m[7]
+        state[i + 2] = p * m[2] + q * m[5] + r * m[8]
+    state[9] += 1.0
+    if orthogonalise_every > 0 and state[9] >= orthogonalise_every:
+        state[9] = 0.0
+        orthogonalise(state)
+
+
+@njit(cache=True)
+def orthogonalise(state):
+    """One Newton step towards the nearest rotation: C <- C (3 I - C^T C) / 2.
+
+    Quadratic: it squares the loss of orthogonality, and turns the matrix by nothing in
+    first order, unlike Gram-Schmidt, which favours one axis.
+    """
+    a, b, c, d, e, f, g, h, i = (
+        state[0],
+        state[1],
+        state[2],
+        state[3],
+        state[4],
+        state[5],
+        state[6],
+        state[7],
+        state[8],
+    )
+    xx = 1.5 - 0.5 * (a * a + d * d + g * g)
+    yy = 1.5 - 0.5 * (b * b + e * e + h * h)
+    zz = 1.5 - 0.5 * (c * c + f * f + i * i)
+    xy = -0.5 * (a * b + d * e + g * h)
+    xz = -0.5 * (a * c + d * f + g * i)
+    yz = -0.5 * (b * c + e * f + h * i)
+    for k in range(0, 9, 3):
+        p, q, r = state[k], state[k + 1], state[k + 2]
+        state[k] = p * xx + q * xy + r * xz
+        state[k + 1] = p * xy + q * yy + r * yz
+        state[k + 2] = p * xz + q * yz + r * zz
+
+
+@njit(cache=True)
+def dcm_advance(state, theta, dtheta, history, order, orthogonalise_every):
+    for k in range(theta.shape[0]):
+        dcm_step(state, theta[k, 0], theta[k, 1], theta[k, 2], order, orthogonalise_every)
+        for j in range(9):
+            history[k, j] = state[j]
+
+
+@njit(cache=True)
+def dcm_update(record, time, rate):
+    dt, tx, ty, tz, _, _, _ = take_sample(record, time, rate)
+    state = record[HEAD:]
+    if dt > 0.0:
+        dcm_step(state, tx, ty, tz, int(record[OPTIONS]), record[OPTIONS + 1])
+    return dt
+
+
+# --- quaternion (20)-(22): state (w, x, y, z) -------------------------------------------
+
+
+@njit(cache=True)
+def quaternion_increment(x, y, z, order):
+    """A (x) sigma_q of Alexiev (20); order 0 is the limit of the series."""
+    u = 0.25 * (x * x + y * y + z * z)
+    if order == 0:
+        c, s = half_angle(u)
+    else:
+        c, s = half_angle_truncated(u, order)
+    return c, s * x, s * y, s * z
+
+
+@njit(cache=True)
+def quaternion_compose(w, x, y, z, dw, dx, dy, dz, normalise):
+    w, x, y, z = quat_multiply(w, x, y, z, dw, dx, dy, dz)
+    if normalise:
+        k = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+        w, x, y, z = w * k, x * k, y * k, z * k
+    return w, x, y, z
+
+
+@njit(cache=True)
+def quaternion_advance(state, theta, dtheta, history, order, normalise):
+    w, x, y, z = state[0], state[1], state[2], state[3]
+    for k in range(theta.shape[0]):
+        dw, dx, dy, dz = quaternion_increment(theta[k, 0], theta[k, 1], theta[k, 2], order)
+        w, x, y, z = quaternion_compose(w, x, y, z, dw, dx, dy, dz, normalise)
+        history[k, 0], history[k, 1], history[k, 2], history[k, 3] = w, x, y, z
+    state[0], state[1], state[2], state[3] = w, x, y, z
+
+
+@njit(cache=True)
+def quaternion_update(record, time, rate):
+    dt, tx, ty, tz, _, _, _ = take_sample(record, time, rate)
+    state = record[HEAD:]
+    if dt > 0.0:
+        dw, dx, dy, dz = quaternion_increment(tx, ty, tz, int(record[OPTIONS]))
+        state[0], state[1], state[2], state[3] = quaternion_compose(
+            state[0], state[1], state[2], state[3], dw, dx, dy, dz, record[OPTIONS + 1] != 0.0
+        )
+    return dt

@@ -1,0 +1,64 @@
+"""Angular increments of the steps between samples.
+
+A step carries ``theta``, the integral of the rate over it, and ``dtheta``, the change of
+the rate over it times its length (zero for a mean rate): ``theta -+ dtheta/2`` are the
+rates at its two ends times its length.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit(cache=True)
+def increment(w0, w1, dt, mean):
+    """Theta and dtheta of one axis: trapezoid of instantaneous rates, or a mean rate."""
+    if mean:
+        return w1 * dt, 0.0
+    return 0.5 * (w0 + w1) * dt, (w1 - w0) * dt
+
+
+@njit(cache=True)
+def increments(time, rate, mean, theta, dtheta):
+    """Fill theta and dtheta, both (n-1, 3), from n samples of time and rate."""
+    for k in range(time.shape[0] - 1):
+        dt = time[k + 1] - time[k]
+        for j in range(3):
+            theta[k, j], dtheta[k, j] = increment(rate[k, j], rate[k + 1, j], dt, mean)
+
+
+# What a sample-by-sample run remembers between calls: the head of one float64 array whose tail
+# is the algorithm's state. One array, because every further argument of a compiled function
+# costs several times what the attitude update itself does.
+TIME, RATE, SAMPLES, MEAN, OPTIONS = 0, 1, 4, 5, 6
+HEAD = 8
+
+
+@njit(cache=True)
+def take_sample(record, time, rate):
+    """Step from the remembered sample to this one; remember this one.
+
+    Returns the length of the step, theta and dtheta of the three axes. The length is 0 for
+    the first sample; negative, or NaN, for a sample that must be refused (time does not
+    advance; not three finite rates), and then nothing has been remembered.
+    """
+    refused = float("nan")
+    if rate.shape[0] != 3:
+        return refused, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    x, y, z = rate[0], rate[1], rate[2]
+    # Infinity and NaN are the numbers whose difference with themselves is not zero.
+    if not (x - x == 0.0 and y - y == 0.0 and z - z == 0.0 and time - time == 0.0):
+        return refused, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if record[SAMPLES] == 0.0:
+        dt, tx, ty, tz, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    else:
+        dt = time - record[TIME]
+        if dt <= 0.0:
+            return -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        mean = record[MEAN] != 0.0
+        tx, dx = increment(record[RATE], x, dt, mean)
+        ty, dy = increment(record[RATE + 1], y, dt, mean)
+        tz, dz = increment(record[RATE + 2], z, dt, mean)
+    record[TIME], record[RATE], record[RATE + 1], record[RATE + 2] = time, x, y, z
+    record[SAMPLES] += 1.0
+    return dt, tx, ty, tz, dx, dy, dz

@@ -1,0 +1,45 @@
+"""Roll and pitch from the specific force at rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from strapdown.exceptions import DataError
+
+__all__ = ["level"]
+
+
+def level(accel_mean: ArrayLike) -> tuple[float, float]:
+    """Roll and pitch of a body at rest, from its mean specific force.
+
+    Parameters
+    ----------
+    accel_mean : array_like, (3,), m/s²
+        Mean specific force in body axes, forward-right-down; at rest it points up, so that a
+        level body reads (0, 0, -g).
+
+    Returns
+    -------
+    roll, pitch : float, deg
+        Roll in (-180, 180], pitch in [-90, 90]. A tilt error of 0.1° for each 17 mm/s² of
+        accelerometer bias.
+
+    Raises
+    ------
+    DataError
+        The length is not within 20 % of 9.81 m/s²: another unit, no gravity in it, or not at
+        rest.
+    """
+    f = np.asarray(accel_mean, dtype=np.float64)
+    size = float(np.sqrt(f @ f))
+    if not 0.8 * 9.81 <= size <= 1.2 * 9.81:
+        raise DataError(
+            f"the mean specific force is {size:.3g} m/s² long, and at rest it is 9.8",
+            quantity="accel",
+            remedy="state the unit with --accel-unit, use a log whose acceleration still has "
+            "gravity in it, or give the initial attitude",
+        )
+    roll = float(np.degrees(np.arctan2(-f[1], -f[2])))
+    pitch = float(np.degrees(np.arctan2(f[0], np.hypot(f[1], f[2]))))
+    return roll, pitch

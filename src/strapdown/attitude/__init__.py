@@ -1,0 +1,141 @@
+"""Attitude algorithms: one file each, and the one table of them."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown import rotation
+from strapdown.attitude.algorithm import AttitudeAlgorithm
+from strapdown.attitude.direction_cosine import DirectionCosine
+from strapdown.attitude.euler_krylov import EulerKrylov
+from strapdown.attitude.naive import Naive
+from strapdown.attitude.quaternion import Quaternion
+from strapdown.attitude.tracker import AttitudeTracker
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.results import AttitudeRun
+from strapdown.tables import attitude_table
+
+__all__ = [
+    "ALGORITHMS",
+    "AttitudeAlgorithm",
+    "AttitudeTracker",
+    "DirectionCosine",
+    "EulerKrylov",
+    "Naive",
+    "Quaternion",
+    "make_algorithm",
+    "run_attitude",
+]
+
+ALGORITHMS: dict[str, type[AttitudeAlgorithm]] = {
+    "naive": Naive,
+    "euler": EulerKrylov,
+    "dcm": DirectionCosine,
+    "quaternion": Quaternion,
+}
+
+_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+
+
+def make_algorithm(text: str) -> AttitudeAlgorithm:
+    """Make an algorithm from its name and options.
+
+    Parameters
+    ----------
+    text : str
+        ``name`` or ``name:option=value,option=value``, as in ``quaternion:order=3`` or
+        ``euler:step=rk4``.
+
+    Returns
+    -------
+    AttitudeAlgorithm
+
+    Raises
+    ------
+    ConfigError
+        The name, an option or a value is not known; the message names the nearest.
+    """
+    name, _, rest = text.strip().partition(":")
+    if name not in ALGORITHMS:
+        raise ConfigError(
+            f"'{name}' is no attitude algorithm",
+            quantity="algorithms",
+            remedy=nearest(name, ALGORITHMS),
+        )
+    cls = ALGORITHMS[name]
+    known = {f.name: f.default for f in fields(cls)}
+    options: dict[str, object] = {}
+    for item in filter(None, (part.strip() for part in rest.split(","))):
+        key, _, value = item.partition("=")
+        if key not in known:
+            raise ConfigError(
+                f"'{key}' is no option of {name}",
+                quantity="algorithms",
+                remedy=nearest(key, known) if known else f"{name} has no options",
+            )
+        options[key] = _option(name, key, value.strip().lower(), known[key])
+    return cls(**options)
+
+
+def _option(name: str, key: str, value: str, default: object) -> object:
+    if isinstance(default, bool):
+        if value in _BOOLEANS:
+            return _BOOLEANS[value]
+        wanted = "true or false"
+    elif isinstance(default, int):
+        try:
+            return int(value)
+        except ValueError:
+            wanted = "a whole number"
+    else:
+        return value
+    raise ConfigError(
+        f"'{value}' is not {wanted}", quantity=f"{name}:{key}", remedy=f"use {wanted}"
+    )
+
+
+def run_attitude(
+    algorithm: AttitudeAlgorithm,
+    increments: pd.DataFrame,
+    q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+) -> AttitudeRun:
+    """Run an attitude algorithm over a whole record.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+    increments : DataFrame
+        An Increments table; the run starts where its first step begins.
+    q_nb : array_like, (4,)
+        Attitude at the start, body to local level.
+
+    Returns
+    -------
+    AttitudeRun
+        Attitude at the start and at the end of each step, and what the algorithm says of
+        its own condition.
+
+    Raises
+    ------
+    DataError
+        `q_nb` is no rotation.
+    DivergenceError
+        The algorithm left the range of floating point.
+    """
+    unit = rotation.conjugate(rotation.conjugate(q_nb))
+    state = algorithm.begin(unit)
+    first = algorithm.quaternions(state[None, : algorithm.width].copy())
+    state, history = algorithm.advance(state, increments)
+    ends = increments.index.to_numpy(dtype=np.float64)
+    time = np.concatenate([[ends[0] - increments["dt"].iloc[0]], ends])
+    return AttitudeRun(
+        algorithm=algorithm.label,
+        title=algorithm.title,
+        equations=algorithm.equations,
+        attitude=attitude_table(time, np.vstack([first, algorithm.quaternions(history)])),
+        diagnostics=algorithm.diagnostics(state, time),
+    )

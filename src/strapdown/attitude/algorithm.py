@@ -1,0 +1,101 @@
+"""What every attitude algorithm is: a state, a way to advance it, and an attitude read from it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.tables import DTHETA, THETA
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AttitudeAlgorithm(ABC):
+    """One attitude algorithm with its options; it holds no state of its own.
+
+    Class attributes
+    ----------------
+    name : str
+        The word for it on the command line.
+    title : str
+        The words for it in a report.
+    equations : str
+        Where it stands in its source.
+    width : int
+        Numbers of the state that are the attitude, the first of it.
+    advance_kernel, update_kernel : callable
+        The compiled loops over many steps and for one sample.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    equations: ClassVar[str]
+    summary: ClassVar[str]
+    width: ClassVar[int]
+    advance_kernel: ClassVar[Callable[..., Any]]
+    update_kernel: ClassVar[Callable[..., Any]]
+
+    @abstractmethod
+    def begin(self, q_nb: Array) -> Array:
+        """Return the state of an attitude given as a unit quaternion, shape (4,)."""
+
+    @abstractmethod
+    def quaternions(self, history: Array) -> Array:
+        """Return unit quaternions ``q_nb``, (n, 4), of `width` numbers a row."""
+
+    @abstractmethod
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return the options as numbers, at most two, as the kernels take them."""
+
+    def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
+        """Return what the algorithm knows of its own condition after a run.
+
+        Parameters
+        ----------
+        state : ndarray
+            As left by `advance`.
+        time : ndarray, (n+1,), s
+            The start, and the end of every step since.
+        """
+        return {}
+
+    def advance(self, state: Array, increments: pd.DataFrame) -> tuple[Array, Array]:
+        """Advance over a segment of increments.
+
+        Parameters
+        ----------
+        state : ndarray
+            From `begin`, or from an earlier segment; it is not changed.
+        increments : DataFrame
+            An Increments table of any length, one row included.
+
+        Returns
+        -------
+        state : ndarray
+            After the last step.
+        history : ndarray, (n, width)
+            The attitude part of the state after each step.
+        """
+        theta = np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64))
+        dtheta = np.ascontiguousarray(increments[DTHETA].to_numpy(dtype=np.float64))
+        history = np.empty((len(theta), self.width))
+        after = state.copy()
+        type(self).advance_kernel(after, theta, dtheta, history, *self.kernel_options())
+        return after, history
+
+    @property
+    def label(self) -> str:
+        """The name with every option that is not at its default."""
+        changed = [
+            f"{f.name}={getattr(self, f.name)}".lower()
+            for f in fields(self)
+            if getattr(self, f.name) != f.default
+        ]
+        return f"{self.name}:{','.join(changed)}" if changed else self.name

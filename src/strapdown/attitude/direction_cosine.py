@@ -1,0 +1,79 @@
+"""Poisson's equation for the direction cosine matrix, Alexiev (2021), Eqs. (11)-(13)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown import rotation
+from strapdown._kernels import attitude as kernel
+from strapdown._kernels import rotation as kernel_rotation
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.exceptions import ConfigError
+
+
+@dataclass(frozen=True)
+class DirectionCosine(AttitudeAlgorithm):
+    """The matrix, multiplied at each step by the exponential of the increment.
+
+    Exact wherever the direction of the rate is constant within each step; on general motion
+    of order 2, because the increment alone says nothing of how the direction turned.
+
+    Parameters
+    ----------
+    order : int
+        Highest power of the increment that is kept of the exponential, 1 to 20; 0 keeps all
+        of them, which is the closed form (12).
+    orthogonalise_every : int
+        Steps between re-orthogonalisations, 0 for never. A truncated exponential is no
+        rotation, and the loss accumulates; the closed form loses only rounding.
+    """
+
+    name = "dcm"
+    title = "Direction cosines"
+    equations = "(11)-(13)"
+    summary = "the 3x3 matrix times the exponential of each increment"
+    width = 9
+    advance_kernel = staticmethod(kernel.dcm_advance)
+    update_kernel = staticmethod(kernel.dcm_update)
+
+    order: int = 0
+    orthogonalise_every: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.order <= 20:
+            raise ConfigError(
+                f"{self.order} is out of range",
+                quantity="dcm:order",
+                remedy="use 1 to 20, or 0 for the closed form",
+            )
+        if self.orthogonalise_every < 0:
+            raise ConfigError(
+                f"{self.orthogonalise_every} is negative",
+                quantity="dcm:orthogonalise_every",
+                remedy="use a number of steps, or 0 for never",
+            )
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return the matrix row by row and the steps since it was orthogonalised."""
+        return np.append(rotation.dcm_from_quaternion(q_nb).ravel(), 0.0)
+
+    def quaternions(self, history: Array) -> Array:
+        """Read the matrices as rotations; those that have lost orthogonality, as the nearest."""
+        if self.order:
+            from scipy.spatial.transform import Rotation
+
+            return rotation.from_scipy(Rotation.from_matrix(history.reshape(-1, 3, 3)))
+        q = np.empty((len(history), 4))
+        kernel_rotation.quats_from_dcms(np.ascontiguousarray(history), q)
+        return q
+
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return the order and the steps between re-orthogonalisations."""
+        return (int(self.order), float(self.orthogonalise_every))
+
+    def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
+        """Return the largest element of C^T C - I at the end."""
+        matrix = state[:9].reshape(3, 3)
+        return {"orthogonality_loss": float(np.abs(matrix.T @ matrix - np.eye(3)).max())}

@@ -1,0 +1,68 @@
+"""Euler-Krylov kinematics, Alexiev (2021), Eqs. (8)-(10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from strapdown import rotation
+from strapdown._kernels import attitude as kernel
+from strapdown._kernels import rotation as kernel_rotation
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.exceptions import ConfigError
+
+
+@dataclass(frozen=True)
+class EulerKrylov(AttitudeAlgorithm):
+    """Rates of roll, pitch and heading, integrated step by step.
+
+    Singular at a pitch of ±90°: (8) and (10) divide by cos(pitch). The angles stay finite
+    there, and the run records how near it came and when; an error made near the pole stays.
+
+    Parameters
+    ----------
+    step : {'forward', 'rk4'}
+        Forward Euler with the mean rate of the step (order 1), or the classical fourth-order
+        Runge-Kutta step with the rate taken as linear over the step (order 4 in the
+        kinematics; the linear rate itself limits general motion to order 2).
+    """
+
+    name = "euler"
+    title = "Euler-Krylov"
+    equations = "(8)-(10)"
+    summary = "rates of roll, pitch and heading; singular at ±90° pitch"
+    width = 3
+    advance_kernel = staticmethod(kernel.euler_advance)
+    update_kernel = staticmethod(kernel.euler_update)
+
+    step: Literal["forward", "rk4"] = "forward"
+
+    def __post_init__(self) -> None:
+        if self.step not in ("forward", "rk4"):
+            raise ConfigError(
+                f"'{self.step}' is no step", quantity="euler:step", remedy="use forward or rk4"
+            )
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return roll, pitch, heading in rad, least |cos(pitch)|, its step, steps so far."""
+        roll, pitch, heading = np.radians(rotation.euler_from_quaternion(q_nb))
+        return np.array([roll, pitch, heading, abs(np.cos(pitch)), 0.0, 0.0])
+
+    def quaternions(self, history: Array) -> Array:
+        """Turn the angles into quaternions; pitch beyond ±90° is a legal angle here."""
+        q = np.empty((len(history), 4))
+        kernel_rotation.quats_from_eulers(np.ascontiguousarray(history), q)
+        return q
+
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return whether the step is Runge-Kutta's."""
+        return (float(self.step == "rk4"),)
+
+    def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
+        """Return the least distance of the pitch from ±90° (deg), and when it was (s)."""
+        return {
+            "closest_to_pole_deg": float(np.degrees(np.arcsin(min(1.0, state[3])))),
+            "closest_to_pole_time_s": float(time[min(int(state[4]), len(time) - 1)]),
+        }

@@ -1,0 +1,44 @@
+"""The naive algorithm: each gyro integrated on its own, Alexiev (2021), Eq. (2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown import rotation
+from strapdown._kernels import attitude as kernel
+from strapdown._kernels import rotation as kernel_rotation
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+
+
+@dataclass(frozen=True)
+class Naive(AttitudeAlgorithm):
+    """Sum of the increments about each axis, read as roll, pitch and heading.
+
+    Exact for turns about one axis from a level start. Rotations do not commute, and this sum
+    does as if they did: an error of the order of the product of the angles, which no sampling
+    rate removes. Order of accuracy on general motion: 0.
+    """
+
+    name = "naive"
+    title = "Naive sum"
+    equations = "(2)"
+    summary = "integrates each gyro on its own; ignores that rotations do not commute"
+    width = 3
+    advance_kernel = staticmethod(kernel.naive_advance)
+    update_kernel = staticmethod(kernel.naive_update)
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return roll, pitch, heading in rad."""
+        return np.radians(rotation.euler_from_quaternion(q_nb))
+
+    def quaternions(self, history: Array) -> Array:
+        """Read the sums as 3-2-1 angles, whatever their size."""
+        q = np.empty((len(history), 4))
+        kernel_rotation.quats_from_eulers(np.ascontiguousarray(history), q)
+        return q
+
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return nothing: there are no options."""
+        return ()

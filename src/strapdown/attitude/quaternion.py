@@ -1,0 +1,72 @@
+"""The quaternion algorithm, Alexiev (2021), Eqs. (20)-(22)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown._kernels import attitude as kernel
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.exceptions import ConfigError, DivergenceError
+
+
+@dataclass(frozen=True)
+class Quaternion(AttitudeAlgorithm):
+    """The quaternion, multiplied at each step by that of the increment.
+
+    Exact wherever the direction of the rate is constant within each step; on general motion
+    of order 2, as the direction cosines are.
+
+    Parameters
+    ----------
+    order : int
+        Highest power of the increment that is kept of the series (21) and (22), 1 to 20;
+        0 keeps all of them, which is the limit: exact sine and cosine.
+    normalise : bool
+        Scale back to norm 1 after each step.
+    """
+
+    name = "quaternion"
+    title = "Quaternion"
+    equations = "(20)-(22)"
+    summary = "four numbers, multiplied by the quaternion of each increment"
+    width = 4
+    advance_kernel = staticmethod(kernel.quaternion_advance)
+    update_kernel = staticmethod(kernel.quaternion_update)
+
+    order: int = 0
+    normalise: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.order <= 20:
+            raise ConfigError(
+                f"{self.order} is out of range",
+                quantity="quaternion:order",
+                remedy="use 1 to 20, or 0 for the exact limit",
+            )
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return the quaternion itself."""
+        return np.array(q_nb, dtype=np.float64)
+
+    def quaternions(self, history: Array) -> Array:
+        """Scale each to norm 1: a truncated series without `normalise` grows or shrinks."""
+        norm = np.sqrt((history * history).sum(axis=1, keepdims=True))
+        bad = ~((norm > 0.0) & np.isfinite(norm))
+        if bad.any():
+            raise DivergenceError(
+                "the norm of the quaternion left the range of floating point",
+                row=int(np.argmax(bad)) + 1,
+                quantity=self.label,
+                remedy="use normalise=true, a higher order or a higher rate",
+            )
+        return np.asarray(history / norm)
+
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return the order and whether to normalise."""
+        return (int(self.order), bool(self.normalise))
+
+    def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
+        """Return how far the norm is from 1 at the end."""
+        return {"norm_error": float(np.sqrt(state @ state) - 1.0)}

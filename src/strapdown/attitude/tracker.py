@@ -1,0 +1,107 @@
+"""Attitude sample by sample, as it runs on a device or live."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from strapdown import rotation
+from strapdown._kernels.increments import HEAD, MEAN, OPTIONS, SAMPLES, TIME
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.tables import SAMPLINGS
+
+
+class AttitudeTracker:
+    """Follow an attitude from gyro samples, one call a sample.
+
+    It gives the same numbers, to the last bit, as a batch over the same samples.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+    q_nb : array_like, (4,), optional
+        Initial attitude, body to local level; identity where none is given.
+    sampling : {'instantaneous', 'mean'}
+        What a sample is: the rate at its stamp, or its mean over the interval that ends there.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is unknown.
+    DataError
+        `q_nb` is no rotation.
+    """
+
+    __slots__ = ("_algorithm", "_record", "_start", "_update")
+
+    def __init__(
+        self,
+        algorithm: AttitudeAlgorithm,
+        q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+        sampling: str = "instantaneous",
+    ) -> None:
+        if sampling not in SAMPLINGS:
+            raise ConfigError(
+                f"'{sampling}' is no kind of sampling",
+                quantity="sampling",
+                remedy=f"use {' or '.join(SAMPLINGS)}",
+            )
+        unit = rotation.conjugate(rotation.conjugate(q_nb))
+        head = np.zeros(HEAD)
+        head[MEAN] = float(sampling == "mean")
+        options = algorithm.kernel_options()
+        head[OPTIONS : OPTIONS + len(options)] = options
+        self._algorithm = algorithm
+        self._record = np.concatenate([head, algorithm.begin(unit)])
+        self._update = type(algorithm).update_kernel
+
+    def update(self, time: float, gyro: Array | Sequence[float]) -> None:
+        """Take one sample.
+
+        Parameters
+        ----------
+        time : float, s
+            Later than that of the sample before.
+        gyro : ndarray or sequence of float, (3,), rad/s
+            Body rate, forward-right-down.
+
+        Raises
+        ------
+        DataError
+            Time does not advance, or the rate is not three finite numbers. The sample is
+            then not taken, and the state is as before.
+        """
+        if gyro.__class__ is not np.ndarray:
+            gyro = np.asarray(gyro, dtype=np.float64)
+        if not self._update(self._record, time, gyro) >= 0.0:
+            self._refuse(time, gyro)
+
+    def _refuse(self, time: float, gyro: Array | Sequence[float]) -> None:
+        if self._record[SAMPLES] > 0 and time <= self._record[TIME]:
+            raise DataError(
+                f"time does not advance: {self._record[TIME]:.9g} s is followed by {time:.9g} s",
+                row=int(self._record[SAMPLES]) + 1,
+                quantity="time",
+                remedy="leave the sample out; the attitude is as before it",
+            )
+        raise DataError(
+            f"time {time}, rate {np.asarray(gyro).tolist()}: three finite rates are needed",
+            row=int(self._record[SAMPLES]) + 1,
+            quantity="gyro",
+            remedy="leave the sample out; the attitude is as before it",
+        )
+
+    @property
+    def quaternion(self) -> Array:
+        """The attitude ``q_nb``, (4,), unit norm."""
+        native = self._record[HEAD : HEAD + self._algorithm.width]
+        q: Array = self._algorithm.quaternions(native[None, :].copy())[0]
+        return q
+
+    @property
+    def roll_pitch_heading(self) -> Array:
+        """The attitude as 3-2-1 angles, (3,), deg."""
+        return rotation.euler_from_quaternion(self.quaternion)

@@ -1,0 +1,318 @@
+"""Sealed bundles: what a run wrote, what it read, and how to run it again.
+
+A bundle is a folder. ``manifest.json`` in it names the command, the resolved configuration,
+the seed, the versions, the platform, and the SHA-256 of every input and output; its own
+SHA-256 is the seal. A bundle is written beside its place and moved there whole, so that a run
+that fails leaves nothing. ``timing.json`` stands outside the seal, because clocks differ.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.results import InputFiles
+
+__all__ = ["Seal", "read_manifest", "sha256", "unsealed_changes", "write_bundle"]
+
+MANIFEST = "manifest.json"
+TIMING = "timing.json"
+SCHEMA = "strapdown bundle 1"
+# Inputs up to this size together are copied into the bundle, which then stands on its own.
+COPY_LIMIT = 64 * 1024 * 1024  # bytes
+PACKAGES = (
+    "strapdown",
+    "numpy",
+    "scipy",
+    "numba",
+    "pandas",
+    "pyarrow",
+    "h5py",
+    "matplotlib",
+    "plotly",
+)
+
+
+@dataclass(frozen=True)
+class Seal:
+    """What a bundle's writer returns.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    digest : str
+        SHA-256 of its manifest.
+    """
+
+    path: Path
+    digest: str
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def to_json(content: Any) -> str:
+    """JSON as bundles hold it: readable, in the order given, the same bytes every time."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def versions() -> dict[str, str]:
+    """Versions of the packages that numbers depend on."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def machine() -> dict[str, str]:
+    """What of the platform can change the last bit of a number."""
+    from llvmlite.binding import get_host_cpu_name
+
+    return {
+        "system": platform.system(),
+        "machine": platform.machine(),
+        "cpu": get_host_cpu_name(),
+        "libc": " ".join(platform.libc_ver()).strip(),
+    }
+
+
+@contextmanager
+def write_bundle(
+    out: Path,
+    *,
+    command: str,
+    configuration: dict[str, Any],
+    inputs: Sequence[InputFiles] = (),
+    force: bool = False,
+    seals: list[Seal],
+) -> Iterator[Path]:
+    """Write a bundle, whole or not at all.
+
+    Parameters
+    ----------
+    out : Path
+        The folder to make. An existing one is replaced only if `force` is set and it is empty
+        or a bundle itself.
+    command : str
+        Which command can run it again.
+    configuration : dict
+        The resolved configuration; paths of inputs in it are replaced by where the bundle
+        keeps or finds them.
+    inputs : sequence of InputFiles
+        Copied, if all of them together have at most 64 MiB, or else referred to by path.
+    force : bool
+    seals : list of Seal
+        The seal is appended when the bundle stands.
+
+    Yields
+    ------
+    Path
+        An empty folder; what is in it when the block ends becomes the bundle.
+
+    Raises
+    ------
+    ConfigError
+        `out` exists and may not be replaced.
+    """
+    out = out.absolute()
+    check_destination(out, force)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
+    try:
+        yield staging
+        manifest = _manifest(staging, command, configuration, inputs)
+        (staging / MANIFEST).write_text(to_json(manifest), encoding="utf-8")
+        digest = sha256(staging / MANIFEST)
+        staging.chmod(0o755)
+        _move(staging, out)
+    except BaseException:
+        shutil.rmtree(staging, ignore_errors=True)
+        raise
+    seals.append(Seal(out, digest))
+
+
+def check_destination(out: Path, force: bool) -> None:
+    """Refuse a folder that may not be written.
+
+    Parameters
+    ----------
+    out : Path
+    force : bool
+        Allow a bundle, or an empty folder, to be replaced.
+
+    Raises
+    ------
+    ConfigError
+    """
+    if not out.exists():
+        return
+    if out.is_dir() and not any(out.iterdir()):
+        return
+    if not force:
+        raise ConfigError(
+            "it exists already",
+            file=str(out),
+            quantity="--out",
+            remedy="name another folder with --out, or replace this one with --force",
+        )
+    if not (out.is_dir() and (out / MANIFEST).is_file()):
+        raise ConfigError(
+            "it exists and is no bundle; --force replaces bundles alone",
+            file=str(out),
+            quantity="--out",
+            remedy="name another folder",
+        )
+
+
+def _manifest(
+    staging: Path, command: str, configuration: dict[str, Any], inputs: Sequence[InputFiles]
+) -> dict[str, Any]:
+    outputs = [
+        {"name": name, "sha256": sha256(staging / name), "bytes": (staging / name).stat().st_size}
+        for name in _files(staging)
+        if name != TIMING
+    ]
+    copy = sum(f.stat().st_size for i in inputs for f in i.files) <= COPY_LIMIT
+    kept, moved = [], {}
+    for item in inputs:
+        root = Path("inputs") / item.role
+        place = root / item.path.resolve().name
+        for file in item.files:
+            name = place / file.name if item.path.is_dir() else place
+            if copy:
+                (staging / name).parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(file, staging / name)
+            kept.append(
+                {
+                    "role": item.role,
+                    "name": name.as_posix() if copy else str(file.resolve()),
+                    "kept": "copy" if copy else "reference",
+                    "sha256": sha256(file),
+                    "bytes": file.stat().st_size,
+                }
+            )
+        moved[str(item.path)] = place.as_posix() if copy else str(item.path.resolve())
+    return {
+        "schema": SCHEMA,
+        "command": command,
+        "configuration": _replace_paths(configuration, moved),
+        "inputs": kept,
+        "outputs": outputs,
+        "versions": versions(),
+        "platform": machine(),
+    }
+
+
+def _replace_paths(value: Any, moved: dict[str, str]) -> Any:
+    if isinstance(value, dict):
+        return {
+            k: moved.get(v, v)
+            if k.endswith("path") and isinstance(v, str)
+            else _replace_paths(v, moved)
+            for k, v in value.items()
+        }
+    return value
+
+
+def _files(root: Path) -> list[str]:
+    return sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file())
+
+
+def _move(staging: Path, out: Path) -> None:
+    """Put the finished bundle in its place; an old one goes only once the new one stands."""
+    if not out.exists():
+        staging.rename(out)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".old", dir=out.parent))
+    out.replace(old / out.name)
+    try:
+        staging.rename(out)
+    except OSError:
+        (old / out.name).replace(out)
+        raise
+    shutil.rmtree(old)
+
+
+def read_manifest(bundle: Path) -> dict[str, Any]:
+    """Read the manifest of a bundle.
+
+    Parameters
+    ----------
+    bundle : Path
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    DataError
+        There is none, or it is damaged.
+    """
+    path = bundle / MANIFEST
+    if not path.is_file():
+        raise DataError(
+            "no manifest.json in it: this is no bundle of strapdown",
+            file=str(bundle),
+            remedy="name the folder that a run wrote",
+        )
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise DataError(
+            f"no JSON any more: {error}",
+            file=MANIFEST,
+            remedy="the bundle was changed after it was sealed; get it again",
+        ) from None
+    wanted = {"schema", "command", "configuration", "inputs", "outputs", "versions", "platform"}
+    if not isinstance(manifest, dict) or wanted - set(manifest) or manifest["schema"] != SCHEMA:
+        raise DataError(
+            f"not a manifest of the form '{SCHEMA}'",
+            file=MANIFEST,
+            remedy="use the version of strapdown that wrote it",
+        )
+    return manifest
+
+
+def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
+    """Say which files of a bundle are not as they were sealed.
+
+    Parameters
+    ----------
+    bundle : Path
+    manifest : dict
+        From `read_manifest`.
+
+    Returns
+    -------
+    list of str
+        One sentence a file: changed, missing, or not in the manifest.
+    """
+    changes = []
+    expected: set[str] = {MANIFEST, TIMING}
+    for item in [*manifest["inputs"], *manifest["outputs"]]:
+        path = bundle / item["name"]  # an absolute path stays what it is
+        expected.add(item["name"])
+        if not path.is_file():
+            changes.append(f"{item['name']}: missing")
+        elif sha256(path) != item["sha256"]:
+            changes.append(f"{item['name']}: changed after it was sealed")
+    changes += [f"{name}: not in the manifest" for name in _files(bundle) if name not in expected]
+    return changes

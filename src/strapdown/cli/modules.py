@@ -1,0 +1,40 @@
+"""``strapdown modules``."""
+
+from __future__ import annotations
+
+
+def modules() -> None:
+    """List what can stand in each slot: algorithms, scenarios, formats."""
+    from dataclasses import fields
+
+    from strapdown.attitude import ALGORITHMS
+    from strapdown.cli.console import console, print_table
+    from strapdown.formats import READERS
+    from strapdown.formats.log_writers import LOG_WRITERS
+    from strapdown.simulation import SCENARIOS
+
+    out = console()
+    out.print("Attitude algorithms", style="bold")
+    print_table(
+        ["name", "Alexiev (2021)", "options", "what it does"],
+        [
+            [
+                name,
+                f"Eq. {cls.equations}",
+                ", ".join(f"{f.name}={f.default}".lower() for f in fields(cls)) or "–",
+                cls.summary,
+            ]
+            for name, cls in ALGORITHMS.items()
+        ],
+    )
+    out.print("Scenarios with exact attitude", style="bold")
+    print_table(
+        ["name", "s", "what it is"],
+        [
+            [name, f"{s.motion.duration:g}", f"{s.title} ({s.origin})"]
+            for name, s in SCENARIOS.items()
+        ],
+    )
+    out.print("Formats that are read", style="bold")
+    print_table(["name", "what it is"], [[name, r.title] for name, r in READERS.items()])
+    out.print(f"Formats that logs are written in: {', '.join(LOG_WRITERS)}")

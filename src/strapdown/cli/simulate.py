@@ -1,0 +1,57 @@
+"""``strapdown simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out fig4"
+
+
+def simulate(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="A scenario (see: strapdown modules).")
+    ],
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Samples a second.")] = 100.0,
+    sampling: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND",
+            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
+            "there).",
+        ),
+    ] = "instantaneous",
+    formats: Annotated[
+        str,
+        typer.Option("--format", metavar="F", help="csv, npz, h5, mat (joined by commas), or all."),
+    ] = "csv",
+    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder to make (NAME-simulated)."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
+    json: Annotated[bool, typer.Option("--json", help="Print the scenario as JSON alone.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Write the gyro log of a scenario together with its exact attitude."""
+    from strapdown.cli.console import console, print_seal
+    from strapdown.report.simulation import simulate as write
+
+    seal = write(
+        name,
+        out or Path(f"{name}-simulated"),
+        rate=rate,
+        sampling=sampling,
+        seed=seed,
+        formats=formats.replace(",", " ").split(),
+        force=force,
+    )
+    if json:
+        typer.echo((seal.path / "scenario.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        files = sorted(p.name for p in seal.path.iterdir())
+        console().print(f"{name}: {', '.join(files)}")
+        print_seal(seal, "scenario.json")

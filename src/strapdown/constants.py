@@ -1,0 +1,45 @@
+"""Physical constants and unit factors, each with its source.
+
+Units are turned into SI by multiplication: ``value_si = value * factor``.
+"""
+
+from __future__ import annotations
+
+import math
+
+__all__ = [
+    "ACCEL_UNITS",
+    "GYRO_UNITS",
+    "STANDARD_GRAVITY",
+    "TIME_UNITS",
+]
+
+#: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
+STANDARD_GRAVITY = 9.80665
+
+_DEGREE = math.pi / 180.0
+
+#: Factors to rad/s.
+GYRO_UNITS: dict[str, float] = {
+    "rad/s": 1.0,
+    "mrad/s": 1e-3,
+    "deg/s": _DEGREE,
+    "mdeg/s": 1e-3 * _DEGREE,
+    "deg/h": _DEGREE / 3600.0,
+}
+
+#: Factors to m/s².
+ACCEL_UNITS: dict[str, float] = {
+    "m/s2": 1.0,
+    "g": STANDARD_GRAVITY,
+    "mg": 1e-3 * STANDARD_GRAVITY,
+}
+
+#: Factors to s.
+TIME_UNITS: dict[str, float] = {
+    "s": 1.0,
+    "ms": 1e-3,
+    "us": 1e-6,
+    "ns": 1e-9,
+    "min": 60.0,
+}

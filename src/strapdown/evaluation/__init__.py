@@ -1,0 +1,1 @@
+"""How good a result is: against truth, against reference points, against each other."""

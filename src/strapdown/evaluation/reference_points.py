@@ -1,0 +1,241 @@
+"""Reference points: instants at which something about the attitude is known.
+
+In words, on the command line or one to a line in a file::
+
+    end same as start
+    9.0 same as 5.0 sd 0.5
+    end 2 turns about z since start
+    12.5 roll 0 pitch 0 heading 90
+
+Instants are seconds of the log's own time, or ``start`` and ``end``. Angles are degrees. Axes
+are the body's, x forward, y right, z down, or their names: ``about up`` is ``about -z``;
+a turn is positive right-handed about the axis named.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown.evaluation.differences import attitude_at
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.results import AttitudeRun, Score
+from strapdown.tables import EULER, GYRO, references_table
+
+__all__ = ["in_words", "parse_reference", "score_references"]
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+_INSTANT = rf"(?:{_NUMBER}|start|end)"
+_AXIS_NAMES = {
+    "x": ("x", 1.0),
+    "y": ("y", 1.0),
+    "z": ("z", 1.0),
+    "forward": ("x", 1.0),
+    "right": ("y", 1.0),
+    "down": ("z", 1.0),
+    "back": ("x", -1.0),
+    "left": ("y", -1.0),
+    "up": ("z", -1.0),
+}
+_SD = rf"(?:\s+sd\s+(?P<sd>{_NUMBER}))?"
+_FORMS = (
+    re.compile(rf"(?P<at>{_INSTANT})\s+same\s+as\s+(?P<since>{_INSTANT}){_SD}", re.I),
+    re.compile(
+        rf"(?P<at>{_INSTANT})\s+(?P<turns>{_NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
+        rf"since\s+(?P<since>{_INSTANT}){_SD}",
+        re.I,
+    ),
+    re.compile(
+        rf"(?P<at>{_INSTANT})\s+roll\s+(?P<roll>{_NUMBER})\s+pitch\s+(?P<pitch>{_NUMBER})\s+"
+        rf"heading\s+(?P<heading>{_NUMBER}){_SD}",
+        re.I,
+    ),
+)
+_HOW = (
+    "write one of: 'end same as start', '9.0 same as 5.0 sd 0.5', 'end 2 turns about z since "
+    "start', '12.5 roll 0 pitch 0 heading 90'"
+)
+
+
+def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
+    """Read one reference point.
+
+    Parameters
+    ----------
+    text : str
+        As in the module's text; colons, equals signs and hyphens between words are allowed.
+    start, end : float, s
+        What these words stand for, and the span in which instants must lie.
+
+    Returns
+    -------
+    dict
+        A row for `tables.references_table`.
+
+    Raises
+    ------
+    ConfigError
+        It is not understood.
+    DataError
+        An instant lies outside the log.
+    """
+    plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text)).strip()
+    match = next((m for form in _FORMS if (m := form.fullmatch(plain))), None)
+    if match is None:
+        raise ConfigError(f"'{text}' is not understood", quantity="reference", remedy=_HOW)
+    said = match.groupdict()
+    row: dict[str, object] = {"time": _instant(said["at"], start, end, text)}
+    if said.get("sd"):
+        row["sd"] = float(said["sd"])
+    if "since" in said:
+        row["since"] = _instant(said["since"], start, end, text)
+    if "turns" in said:
+        axis, sign = _axis(said["axis"], text)
+        row |= {"kind": "turns", "axis": axis, "turns": sign * float(said["turns"])}
+    elif "roll" in said:
+        row |= {"kind": "known"} | {e: float(said[e]) for e in EULER}
+    else:
+        row["kind"] = "same"
+    return row
+
+
+def _instant(word: str, start: float, end: float, text: str) -> float:
+    if word.lower() in ("start", "end"):
+        return start if word.lower() == "start" else end
+    value = float(word)
+    # Printed stamps are rounded; an instant that is meant as the last sample counts as it.
+    slack = 1e-6 * (end - start)
+    if not start - slack <= value <= end + slack:
+        raise DataError(
+            f"'{text}' names {value:g} s, and the log runs from {start:.9g} to {end:.9g} s",
+            quantity="reference",
+            remedy="name an instant within it, or the words start and end",
+        )
+    return min(max(value, start), end)
+
+
+def _axis(word: str, text: str) -> tuple[str, float]:
+    name = word.lower().lstrip("+-")
+    if name not in _AXIS_NAMES:
+        raise ConfigError(
+            f"'{text}' names the axis '{word}'",
+            quantity="reference",
+            remedy=f"use one of {', '.join(_AXIS_NAMES)}, with a sign if need be",
+        )
+    axis, sign = _AXIS_NAMES[name]
+    return axis, -sign if word.startswith("-") else sign
+
+
+def in_words(row: pd.Series) -> str:
+    """Say a row of a References table as a sentence.
+
+    Parameters
+    ----------
+    row : Series
+
+    Returns
+    -------
+    str
+    """
+    at = f"{row['time']:.6g} s"
+    if row["kind"] == "same":
+        return f"{at}: same attitude as at {row['since']:.6g} s"
+    if row["kind"] == "turns":
+        return f"{at}: {row['turns']:g} turns about body {row['axis']} since {row['since']:.6g} s"
+    angles = ", ".join(f"{e} {row[e]:g}°" for e in EULER)
+    return f"{at}: {angles}"
+
+
+def score_references(
+    run: AttitudeRun, references: pd.DataFrame, imu: pd.DataFrame
+) -> tuple[Score, ...]:
+    """Compare a run with reference points.
+
+    Parameters
+    ----------
+    run : AttitudeRun
+    references : DataFrame
+        A References table.
+    imu : DataFrame
+        The Imu table that the run used, for the angle turned about an axis.
+
+    Returns
+    -------
+    tuple of Score
+        One a reference point: the rotation angle between computed and known attitude
+        (``|log(C_est^T C_ref)|``).
+
+    Raises
+    ------
+    DataError
+        A reference lies before the run begins.
+    """
+    begin = float(run.attitude.index[0])
+    scores = []
+    for number, (_, row) in enumerate(references.iterrows(), start=1):
+        instants = [float(row["time"])] + ([] if row["kind"] == "known" else [float(row["since"])])
+        if min(instants) < begin:
+            raise DataError(
+                f"{in_words(row)}, and the computed attitude begins at {begin:.9g} s",
+                row=number,
+                quantity="reference",
+                remedy="name a later instant, or another --initial",
+            )
+        q_at = attitude_at(run.attitude, instants)
+        turned = expected = None
+        if row["kind"] == "known":
+            known = rotation.quaternion_from_euler([float(row[e]) for e in EULER])
+        elif row["kind"] == "same":
+            known = q_at[1]
+        else:
+            about = np.eye(3)["xyz".index(row["axis"])] * 2.0 * np.pi * float(row["turns"])
+            known = rotation.compose(q_at[1], rotation.quaternion_from_rotation_vector(about))
+            expected = 360.0 * float(row["turns"])
+            turned = _turned(imu, "xyz".index(row["axis"]), instants[1], instants[0])
+        sd = float(row["sd"])
+        scores.append(
+            Score(
+                algorithm=run.algorithm,
+                against=in_words(row),
+                time=instants[0],
+                error_deg=float(rotation.rotation_angle(q_at[0], known)),
+                turned_deg=turned,
+                expected_deg=expected,
+                sd_deg=sd if np.isfinite(sd) else None,
+            )
+        )
+    return tuple(scores)
+
+
+def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:
+    """Integral of one gyro between two instants, deg."""
+    time = imu.index.to_numpy(dtype=np.float64)
+    rate = imu[GYRO[axis]].to_numpy(dtype=np.float64)
+    steps = np.diff(time)
+    mean = rate[1:] if imu.attrs["sampling"] == "mean" else 0.5 * (rate[1:] + rate[:-1])
+    angle = np.concatenate([[0.0], np.cumsum(mean * steps)])
+    return float(np.degrees(np.interp(until, time, angle) - np.interp(since, time, angle)))
+
+
+def references_from_words(words: list[str], start: float, end: float) -> pd.DataFrame:
+    """Make a References table of sentences.
+
+    Parameters
+    ----------
+    words : list of str
+    start, end : float, s
+        Span of the log.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    ConfigError, DataError
+        As `parse_reference`.
+    """
+    return references_table([parse_reference(text, start, end) for text in words])

@@ -1,0 +1,108 @@
+"""Readers and writers: one file a format, and the one table of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats import broad, csv, hdf5, matlab, mpu6050, npz
+from strapdown.formats.assemble import assemble
+from strapdown.formats.recording import RawLog, ReadOptions, Recording
+
+__all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_log", "read_raw"]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """How one format is recognised and read."""
+
+    title: str
+    detect: Callable[[Path], bool]
+    read: Callable[[Path], RawLog]
+
+
+#: In the order in which they are tried: known recordings first, general formats after.
+READERS: dict[str, Reader] = {
+    "mpu6050": Reader("folder of an MPU-6050 in MATLAB files", mpu6050.detect, mpu6050.read),
+    "broad": Reader("BROAD trial, HDF5 with optical truth", broad.detect, broad.read),
+    "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, csv.read),
+    "npz": Reader("NumPy archive (.npz)", npz.detect, npz.read),
+    "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, hdf5.read),
+    "matlab": Reader("MATLAB up to v7 (.mat)", matlab.detect, matlab.read),
+}
+
+
+def read_raw(path: Path) -> RawLog:
+    """Read a log's columns as they stand in it.
+
+    Parameters
+    ----------
+    path : Path
+        A file, or the folder of a known recording.
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    ConfigError
+        There is no such file.
+    DataError
+        It is of no known format, or it is damaged.
+    """
+    if not path.exists():
+        raise ConfigError(
+            "there is no such file or folder",
+            file=str(path),
+            remedy="check the path; `strapdown modules` lists the built-in scenarios",
+        )
+    if path.is_file() and path.stat().st_size == 0:
+        raise DataError(
+            "the file is empty",
+            file=path.name,
+            remedy="check that the recording was saved and copied whole",
+        )
+    for reader in READERS.values():
+        if reader.detect(path):
+            return reader.read(path)
+    kinds = "; ".join(r.title for r in READERS.values())
+    if path.is_dir():
+        inside = sorted(p.name for p in path.iterdir())
+        shown = ", ".join(inside[:6]) + (" …" if len(inside) > 6 else "")
+        raise DataError(
+            f"the folder is no known recording; it holds: {shown or 'nothing'}",
+            file=path.resolve().name,
+            remedy="give one file of it",
+        )
+    raise DataError(
+        f"the ending '{path.suffix}' is of no known format",
+        file=path.name,
+        remedy=f"give one of: {kinds}",
+    )
+
+
+def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
+    """Read a log into body axes and SI.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or the folder of a known recording.
+    options : ReadOptions, optional
+        What the user says about it.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, or an option names what is not in it.
+    DataError
+        The log cannot be used; the message names file, row, quantity and remedy.
+    """
+    return assemble(read_raw(Path(path)), options or ReadOptions())

@@ -1,0 +1,261 @@
+"""What a column's name says: its quantity and its unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
+from strapdown.exceptions import ConfigError, nearest
+
+__all__ = [
+    "QUANTITIES",
+    "ColumnName",
+    "parse_axes",
+    "parse_column_option",
+    "parse_unit",
+    "read_name",
+]
+
+_AXES = "xyz"
+TRIADS = {
+    "gyro": [
+        "gyro",
+        "gyr",
+        "gyroscope",
+        "gyroscopes",
+        "imugyr",
+        "imugyro",
+        "angularvelocity",
+        "angularrate",
+        "rotationrate",
+        "omega",
+        "rate",
+        "w",
+        "g",
+    ],
+    "accel": [
+        "accel",
+        "acc",
+        "accelerometer",
+        "accelerometers",
+        "acceleration",
+        "imuacc",
+        "imuaccel",
+        "specificforce",
+        "a",
+        "f",
+    ],
+}
+TIMES = [
+    "time",
+    "t",
+    "timestamp",
+    "timestamps",
+    "timesec",
+    "elapsed",
+    "secondselapsed",
+    "seconds",
+    "sec",
+    "tow",
+]
+QUATERNIONS = {
+    "q_w": ["qw", "quatw", "quaternionw", "q0"],
+    "q_x": ["qx", "quatx", "quaternionx", "q1"],
+    "q_y": ["qy", "quaty", "quaterniony", "q2"],
+    "q_z": ["qz", "quatz", "quaternionz", "q3"],
+}
+EULERS = {
+    "roll": ["roll", "phi"],
+    "pitch": ["pitch", "theta"],
+    "heading": ["heading", "yaw", "psi"],
+}
+QUANTITIES = [
+    "time",
+    *(f"{triad}_{axis}" for triad in TRIADS for axis in _AXES),
+    *QUATERNIONS,
+    *EULERS,
+]
+
+# Units as people write them, each to the word that stands for it here.
+_SPELLINGS = {
+    "rad/s": "rad/s rad_s rads rad_per_s rad/sec radps rad·s-1 rad*s^-1 rad.s-1",
+    "mrad/s": "mrad/s mrad_s",
+    "deg/s": "deg/s deg_s degs dps °/s °_s º/s deg_per_s deg/sec degps",
+    "mdeg/s": "mdeg/s mdps mdeg_s",
+    "deg/h": "deg/h deg/hr deg_h deg_per_h °/h",
+    "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
+    "g": "g g0 gs",
+    "mg": "mg",
+    "s": "s sec secs second seconds",
+    "ms": "ms msec millis milliseconds",
+    "us": "us µs μs usec micros microseconds",
+    "ns": "ns nsec nanos nanoseconds",
+    "min": "min minutes",
+    "deg": "deg ° degree degrees",
+    "rad": "rad radian radians",
+}
+UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
+_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """What a name says.
+
+    Attributes
+    ----------
+    quantity : str or None
+        One of `QUANTITIES`, or a triad's name where the column holds three numbers.
+    unit : str or None
+        In this package's spelling.
+    """
+
+    quantity: str | None
+    unit: str | None
+
+
+def read_name(name: str) -> ColumnName:
+    """Read quantity and unit from a column's name.
+
+    Parameters
+    ----------
+    name : str
+        As ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``.
+
+    Returns
+    -------
+    ColumnName
+        With None for what the name does not say.
+    """
+    text = name.strip()
+    bracket = _BRACKETS.search(text)
+    unit = UNIT_OF.get(bracket.group(1).lower().replace(" ", "")) if bracket else None
+    if bracket:
+        text = text[: bracket.start()]
+    words = [w for w in re.split(r"[\s_\-./:]+", text.lower()) if w]
+    if unit is None:
+        words, unit = _split_unit(words)
+    return ColumnName(_quantity("".join(words)), unit)
+
+
+def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
+    """Take a unit off the end, the longest first: ``m s2``, ``rad s``, ``s``."""
+    for take in (3, 2, 1):
+        if len(words) > take:
+            spelled = "_".join(words[-take:])
+            if spelled in UNIT_OF:
+                return words[:-take], UNIT_OF[spelled]
+    return words, None
+
+
+def _quantity(word: str) -> str | None:
+    if word in TIMES:
+        return "time"
+    for table in (QUATERNIONS, EULERS):
+        for quantity, names in table.items():
+            if word in names:
+                return quantity
+    for triad, names in TRIADS.items():
+        if word[-1:] in _AXES and word[:-1] in names:
+            return f"{triad}_{word[-1]}"
+        if word in names and len(word) > 1:
+            return triad
+    return None
+
+
+def parse_unit(text: str, kind: str) -> str:
+    """Check a unit that the user stated.
+
+    Parameters
+    ----------
+    text : str
+    kind : {'gyro', 'accel', 'time'}
+
+    Returns
+    -------
+    str
+        In this package's spelling.
+
+    Raises
+    ------
+    ConfigError
+        It is no unit of that kind.
+    """
+    known = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "time": TIME_UNITS}[kind]
+    unit = UNIT_OF.get(text.strip().lower(), text)
+    if unit not in known:
+        raise ConfigError(
+            f"'{text}' is no unit of it", quantity=f"--{kind}-unit", remedy=nearest(text, known)
+        )
+    return unit
+
+
+def parse_column_option(items: list[str]) -> dict[str, str]:
+    """Read ``--columns`` as quantity to column.
+
+    Parameters
+    ----------
+    items : list of str
+        Each ``quantity=column``, several joined by commas.
+
+    Returns
+    -------
+    dict of str to str
+
+    Raises
+    ------
+    ConfigError
+        The form is wrong or the quantity is unknown.
+    """
+    known = [*QUANTITIES, *TRIADS]
+    out: dict[str, str] = {}
+    for item in (part for text in items for part in text.split(",") if part.strip()):
+        quantity, equals, column = (piece.strip() for piece in item.partition("="))
+        if not equals or not column:
+            raise ConfigError(
+                f"'{item}' has no form that is understood",
+                quantity="--columns",
+                remedy="write quantity=column, as in time=t,gyro_x=wx",
+            )
+        if quantity not in known:
+            raise ConfigError(
+                f"'{quantity}' is no quantity",
+                quantity="--columns",
+                remedy=nearest(quantity, known),
+            )
+        out[quantity] = column
+    return out
+
+
+def parse_axes(text: str) -> tuple[list[int], list[float]]:
+    """Read which sensor axis points forward, right and down.
+
+    Parameters
+    ----------
+    text : str
+        Three of ``x y z`` with an optional sign, as in ``x,-y,-z``.
+
+    Returns
+    -------
+    axis : list of int
+        Sensor axis of each body axis, 0 to 2.
+    sign : list of float
+
+    Raises
+    ------
+    ConfigError
+        It is not a permutation of three axes with signs.
+    """
+    parts = [p.strip().lower() for p in text.split(",")]
+    names = [p.lstrip("+-") for p in parts]
+    if sorted(names) != ["x", "y", "z"] or any(
+        len(p) - len(n) > 1 for p, n in zip(parts, names, strict=True)
+    ):
+        raise ConfigError(
+            f"'{text}' does not name three axes",
+            quantity="--axes",
+            remedy="name the sensor axis that points forward, right and down, as in x,-y,-z for "
+            "a sensor whose own axes point forward, left and up",
+        )
+    return [_AXES.index(n) for n in names], [-1.0 if p.startswith("-") else 1.0 for p in parts]

@@ -1,0 +1,110 @@
+"""Folders of an MPU-6050 recorded buffer by buffer into MATLAB files.
+
+The layout of https://github.com/sunsided/sensor-fusion: ``mpu6050_gyroscope.mat`` with
+``gyroBuffer`` (time in s, then deg/s) and ``mpu6050_accelerometer.mat`` with ``accelBuffer``
+(time in s, then g).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import hdf5, matlab
+from strapdown.formats.recording import RawLog
+
+GYRO_FILE = "mpu6050_gyroscope.mat"
+ACCEL_FILE = "mpu6050_accelerometer.mat"
+# Lying with z up the board reads +1 g on z, and with its x mark up it reads -1 g on x: forward
+# is -x. The triads as read are right-handed: of the eight choices of sign for the gyro, (+, +, +)
+# alone predicts the direction of gravity that the accelerometer measures through all three
+# recorded turns (a test holds this). Right is therefore +y.
+AXES = "-x,y,-z"
+
+
+def detect(path: Path) -> bool:
+    """Tell whether this is such a folder."""
+    return path.is_dir() and (path / GYRO_FILE).is_file()
+
+
+def read(path: Path) -> RawLog:
+    """Read gyro, and accelerometer where there is one.
+
+    Parameters
+    ----------
+    path : Path
+        The folder.
+
+    Returns
+    -------
+    RawLog
+        Where the accelerometer has stamps of its own, its values are interpolated to those of
+        the gyro. The unused tail of a buffer is left out.
+
+    Raises
+    ------
+    DataError
+        A file is damaged or has another layout.
+    """
+    findings: list[Finding] = []
+    gyro = _buffer(path / GYRO_FILE, "gyroBuffer", findings)
+    columns = {"time": gyro[:, 0]} | {f"gyro[{k}]": gyro[:, k + 1] for k in range(3)}
+    stated = {"time": ("time", "s")} | {
+        f"gyro[{k}]": (f"gyro_{'xyz'[k]}", "deg/s") for k in range(3)
+    }
+    files = [path / GYRO_FILE]
+    if (path / ACCEL_FILE).is_file():
+        files.append(path / ACCEL_FILE)
+        accel = _buffer(path / ACCEL_FILE, "accelBuffer", findings)
+        if not np.array_equal(accel[:, 0], gyro[:, 0]):
+            order = np.argsort(accel[:, 0], kind="stable")
+            accel = np.column_stack(
+                [gyro[:, 0]]
+                + [np.interp(gyro[:, 0], accel[order, 0], accel[order, k]) for k in (1, 2, 3)]
+            )
+            findings.append(
+                Finding(
+                    "interpolated to the stamps of the gyro, which are not its own",
+                    file=ACCEL_FILE,
+                    quantity="accel",
+                )
+            )
+        columns |= {f"accel[{k}]": accel[:, k + 1] for k in range(3)}
+        stated |= {f"accel[{k}]": (f"accel_{'xyz'[k]}", "g") for k in range(3)}
+    return RawLog(
+        name=path.resolve().name,
+        files=tuple(files),
+        columns=columns,
+        stated=stated,
+        sampling="instantaneous",
+        axes=AXES,
+        findings=findings,
+    )
+
+
+def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
+    arrays = (hdf5.read_arrays(path) if hdf5.detect(path) else matlab.read_arrays(path))[0]
+    if name not in arrays or 4 not in arrays[name].shape or arrays[name].ndim != 2:
+        raise DataError(
+            f"no {name} of four rows in it; it holds: {', '.join(arrays) or 'nothing'}",
+            file=path.name,
+            remedy="name its columns with --columns and give the file instead of the folder",
+        )
+    buffer = arrays[name]
+    rows = buffer.T if buffer.shape[0] == 4 else buffer
+    used = np.flatnonzero((rows != 0).any(axis=1))
+    end = int(used[-1]) + 1 if used.size else 0
+    if end < len(rows):
+        findings.append(
+            Finding(
+                f"the last {len(rows) - end} of {len(rows)} rows are all zero, the tail of a "
+                "buffer that was not filled; left out",
+                file=path.name,
+                row=end + 1,
+            )
+        )
+    return np.asarray(rows[:end], dtype=np.float64)

@@ -1,0 +1,103 @@
+"""NumPy archives."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.formats.arrays import raw_log, refuse_lie
+from strapdown.formats.recording import RawLog
+
+
+def detect(path: Path) -> bool:
+    """Tell whether the name is that of a NumPy archive."""
+    return path.is_file() and path.suffix.lower() == ".npz"
+
+
+def read(path: Path) -> RawLog:
+    """Read the arrays of a NumPy archive; nothing in it is ever executed.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        It is no archive, is damaged, claims more than it holds, or holds Python objects.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    meta: dict[str, Any] = {}
+    try:
+        with zipfile.ZipFile(path) as archive:
+            for info in archive.infolist():
+                if info.filename.endswith(".npy"):
+                    array = _member(archive, info, path.name)
+                    (meta if array.ndim == 0 else arrays)[info.filename[:-4]] = array
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        ValueError,
+        NotImplementedError,
+    ) as error:
+        raise DataError(
+            f"the archive cannot be read: {error}",
+            file=path.name,
+            remedy="copy it again; it must come from numpy.savez, with numbers alone",
+        ) from None
+    return raw_log(path, arrays, {}, meta)
+
+
+def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> NDArray[Any]:
+    name = info.filename[:-4]
+    refuse_lie(info.file_size, info.compress_size, name, file)
+    with archive.open(info) as stream:
+        version = np.lib.format.read_magic(stream)
+        header = (
+            np.lib.format.read_array_header_1_0
+            if version == (1, 0)
+            else np.lib.format.read_array_header_2_0
+        )
+        shape, fortran, dtype = header(stream)
+        if dtype.hasobject:
+            raise DataError(
+                "it holds Python objects, which are not loaded: they could run code",
+                file=file,
+                quantity=name,
+                remedy="save numbers alone",
+            )
+        count = int(np.prod([int(n) for n in shape], dtype=object))
+        stored = info.file_size - stream.tell()
+        if count * dtype.itemsize != stored:
+            raise DataError(
+                f"it claims {count} values of {dtype.itemsize} bytes, and {stored} bytes are "
+                "stored",
+                file=file,
+                quantity=name,
+                remedy="the archive is damaged or made to mislead; get it again from its source",
+            )
+        data = np.frombuffer(stream.read(), dtype=dtype)
+    return data.reshape(shape, order="F" if fortran else "C")
+
+
+def write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
+    """Write arrays; the same arrays give the same bytes.
+
+    Parameters
+    ----------
+    path : Path
+    arrays : dict of str to ndarray
+    """
+    np.savez(path, allow_pickle=False, **arrays)

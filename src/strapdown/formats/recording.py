@@ -1,0 +1,131 @@
+"""What comes out of a reader: raw columns first, then a recording in body axes and SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import Finding
+from strapdown.results import Reading
+
+Array = NDArray[np.float64]
+
+__all__ = ["RawLog", "ReadOptions", "Recording", "TruthInSensorAxes"]
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What the user says about a log; whatever is None is taken from the log itself.
+
+    Attributes
+    ----------
+    columns : dict of str to str
+        Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for a group of three) to the
+        name of the column in the file, or its number counted from 1.
+    gyro_unit, accel_unit, time_unit : str, optional
+        Keys of `constants.GYRO_UNITS`, `ACCEL_UNITS`, `TIME_UNITS`.
+    axes : str, optional
+        Which sensor axis points forward, right, down: ``x,-y,-z`` for a sensor whose axes
+        point forward, left, up.
+    sampling : str, optional
+        ``instantaneous`` or ``mean``.
+    rate : float, optional, Hz
+        For a log without a time column.
+    repair : bool
+        Leave out rows that cannot be used, and say how many, instead of refusing the log.
+    """
+
+    columns: dict[str, str] = field(default_factory=dict)
+    gyro_unit: str | None = None
+    accel_unit: str | None = None
+    time_unit: str | None = None
+    axes: str | None = None
+    sampling: str | None = None
+    rate: float | None = None
+    repair: bool = False
+
+
+@dataclass(frozen=True)
+class TruthInSensorAxes:
+    """Attitude truth that came with a log, before its axes are turned to body axes.
+
+    Attributes
+    ----------
+    q_ns : ndarray, (n, 4)
+        Sensor axes to local level north-east-down at each sample, NaN where unknown.
+    scored : ndarray of bool, (n,)
+        The samples that count for errors.
+    """
+
+    q_ns: Array
+    scored: NDArray[np.bool_]
+
+
+@dataclass
+class RawLog:
+    """The columns of a file as they stand in it.
+
+    Attributes
+    ----------
+    name : str
+        Of the file or folder, for messages.
+    files : tuple of Path
+        Every file that was read.
+    columns : dict of str to ndarray
+        One-dimensional; not numbers where the file holds text.
+    first_row : int
+        Row of the file in which the first sample stands, counted from 1.
+    stated : dict of str to (str, str)
+        For a known recording or a file of our own: column to (quantity, unit).
+    rate : float or None
+        Sampling rate in Hz, where the file states it apart from stamps.
+    sampling, axes : str or None
+        Where the file states them.
+    truth : TruthInSensorAxes or None
+    findings : list of Finding
+    """
+
+    name: str
+    files: tuple[Path, ...]
+    columns: dict[str, NDArray[Any]]
+    first_row: int = 1
+    stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+    rate: float | None = None
+    sampling: str | None = None
+    axes: str | None = None
+    truth: TruthInSensorAxes | None = None
+    findings: list[Finding] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A log that is ready for use.
+
+    Attributes
+    ----------
+    name : str
+    files : tuple of Path
+    imu : DataFrame
+        Imu table: body axes forward-right-down, SI.
+    truth : DataFrame or None
+        Attitude table, at those stamps of `imu` at which it is known.
+    scored : ndarray of bool or None
+        Which rows of `truth` count for errors.
+    readings : tuple of Reading
+        What every column was taken for.
+    findings : tuple of Finding
+        What a person should know about it.
+    """
+
+    name: str
+    files: tuple[Path, ...]
+    imu: pd.DataFrame
+    truth: pd.DataFrame | None
+    scored: NDArray[np.bool_] | None
+    readings: tuple[Reading, ...]
+    findings: tuple[Finding, ...]

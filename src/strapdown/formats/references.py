@@ -1,0 +1,142 @@
+"""Reference points and attitude truth from files."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from strapdown.exceptions import DataError
+from strapdown.formats import read_raw
+from strapdown.formats.assemble import assemble_attitude
+from strapdown.formats.csv import SUFFIXES
+from strapdown.formats.recording import ReadOptions
+
+__all__ = ["read_reference_words", "read_truth"]
+
+
+def read_reference_words(path: Path) -> list[str] | None:
+    """Read reference points as sentences.
+
+    Parameters
+    ----------
+    path : Path
+        ``.toml`` with ``references = ["end same as start", ...]``; a text file of one sentence
+        to a line (``#`` for comments); or a CSV with the columns ``time_s, kind, since_s,
+        roll_deg, pitch_deg, heading_deg, turns, axis, sd_deg``, those that a kind needs.
+
+    Returns
+    -------
+    list of str or None
+        None where the file is no list of reference points; it may be an attitude truth.
+
+    Raises
+    ------
+    DataError
+        It is a list, and something in it is missing or malformed.
+    """
+    if path.suffix.lower() == ".toml":
+        return _from_toml(path)
+    if path.suffix.lower() not in SUFFIXES:
+        return None
+    lines = [
+        line.strip()
+        for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if lines and "kind" in [f.strip() for f in lines[0].split(",")]:
+        return _from_csv(path)
+    if lines and any(f" {word} " in f" {lines[0]} " for word in ("same", "roll", "turns", "turn")):
+        return [line for line in lines if "," not in line or "same" in line]
+    return None
+
+
+def _from_toml(path: Path) -> list[str]:
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DataError(f"no TOML: {error}", file=path.name, remedy="correct it there") from None
+    words = content.get("references")
+    if not isinstance(words, list) or not all(isinstance(w, str) for w in words):
+        raise DataError(
+            "no list of sentences named references",
+            file=path.name,
+            remedy='write references = ["end same as start"]',
+        )
+    return words
+
+
+def _from_csv(path: Path) -> list[str]:
+    table = pd.read_csv(path, comment="#", skipinitialspace=True)
+    words = []
+    for number, row in table.iterrows():
+        kind, file_row = str(row["kind"]).strip(), int(str(number)) + 2
+
+        def value(name: str, row: pd.Series = row, file_row: int = file_row) -> str:
+            if name not in row or pd.isna(row[name]) or not str(row[name]).strip():
+                raise DataError(
+                    f"a reference of kind '{row['kind']}' needs it, and it is missing",
+                    file=path.name,
+                    row=file_row,
+                    quantity=name,
+                    remedy="fill in the column",
+                )
+            return str(row[name]).strip()
+
+        if kind == "same":
+            text = f"{value('time_s')} same as {value('since_s')}"
+        elif kind == "turns":
+            text = (
+                f"{value('time_s')} {value('turns')} turns about {value('axis')} since "
+                f"{value('since_s')}"
+            )
+        elif kind == "known":
+            text = (
+                f"{value('time_s')} roll {value('roll_deg')} pitch {value('pitch_deg')} heading "
+                f"{value('heading_deg')}"
+            )
+        else:
+            raise DataError(
+                f"unknown kind '{kind}'",
+                file=path.name,
+                row=file_row,
+                quantity="kind",
+                remedy="use known, same or turns",
+            )
+        sd = row.get("sd_deg")
+        words.append(text if sd is None or pd.isna(sd) else f"{text} sd {sd}")
+    return words
+
+
+def read_truth(path: Path, options: ReadOptions | None = None) -> pd.DataFrame:
+    """Read an attitude truth.
+
+    Parameters
+    ----------
+    path : Path
+        Any readable format with a time and either ``q_w q_x q_y q_z`` (body to
+        north-east-down) or ``roll pitch heading``.
+    options : ReadOptions, optional
+        For columns and the unit of time.
+
+    Returns
+    -------
+    DataFrame
+        An Attitude table of the rows in which it is known.
+
+    Raises
+    ------
+    DataError
+        There is no attitude in it, or it cannot be read.
+    """
+    truth = assemble_attitude(read_raw(path), options or ReadOptions())
+    if truth is None or not np.isfinite(truth.to_numpy()).all():
+        raise DataError(
+            "no attitude in it",
+            file=path.name,
+            remedy="give columns time_s, q_w, q_x, q_y, q_z (body to north-east-down), or time_s, "
+            "roll_deg, pitch_deg, heading_deg; or a list of reference points",
+        )
+    return truth

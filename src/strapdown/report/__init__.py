@@ -1,0 +1,1 @@
+"""Pages, figures and files that a person reads, and the bundles that hold them."""

@@ -1,0 +1,167 @@
+"""The charts of the attitude bench."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from strapdown.evaluation.differences import error_angles
+from strapdown.report.chart import (
+    AXIS_COLOURS,
+    BLACK,
+    DASHES,
+    SERIES_COLOURS,
+    Band,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    break_jumps,
+)
+from strapdown.results import AttitudeBench
+from strapdown.tables import EULER, GYRO
+
+# A logarithmic axis has no zero; what is less is drawn here.
+LEAST_ERROR = 1e-6  # deg
+_TIME = "time, s"
+
+
+def charts(bench: AttitudeBench) -> list[Chart]:
+    """Return the charts that this bench has something to show in.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    list of Chart
+    """
+    found = [_gyro(bench), _attitude(bench)]
+    if bench.truth is not None:
+        found.append(_error(bench))
+    if len(bench.runs) > 1:
+        found.append(_difference(bench))
+    return found
+
+
+def _marks(bench: AttitudeBench) -> tuple[Mark, ...]:
+    instants: dict[float, str] = {}
+    for number, (_, row) in enumerate(bench.references.iterrows(), start=1):
+        for key in ("since", "time"):
+            if np.isfinite(row[key]):
+                label = f"R{number}" + (" from" if key == "since" else "")
+                at = float(row[key])
+                instants[at] = f"{instants[at]}, {label}" if at in instants else label
+    return tuple(Mark(at, label) for at, label in sorted(instants.items()))
+
+
+def _bands(bench: AttitudeBench) -> tuple[Band, ...]:
+    first = float(bench.imu.index[0])
+    return tuple(Band(max(r.start, first), r.end, "at rest") for r in bench.rests if r.end > first)
+
+
+def _gyro(bench: AttitudeBench) -> Chart:
+    time = bench.imu.index.to_numpy(dtype=np.float64)
+    names = ("x, forward", "y, right", "z, down")
+    lines = tuple(
+        Line(name, time, np.degrees(bench.imu[column].to_numpy()), colour, width=1.1)
+        for name, column, colour in zip(names, GYRO, AXIS_COLOURS, strict=True)
+    )
+    removed = bench.gyro_bias["rad_per_s"] is not None
+    return Chart(
+        "gyro",
+        "Gyro signals and reference points",
+        "Rates about the body's axes, "
+        + ("bias removed. " if removed else "as recorded, bias included. ")
+        + ("Red: reference points. " if len(bench.references) else "")
+        + ("Shaded: at rest." if bench.rests else ""),
+        _TIME,
+        (Panel("rate, deg/s", lines),),
+        _marks(bench),
+        _bands(bench),
+    )
+
+
+def _attitude(bench: AttitudeBench) -> Chart:
+    panels = []
+    for angle in EULER:
+        lines = [
+            Line(
+                run.algorithm,
+                run.attitude.index.to_numpy(dtype=np.float64),
+                break_jumps(run.attitude[angle].to_numpy()),
+                SERIES_COLOURS[k % len(SERIES_COLOURS)],
+                DASHES[k % len(DASHES)],
+            )
+            for k, run in enumerate(bench.runs)
+        ]
+        if bench.truth is not None:
+            lines.append(
+                Line(
+                    "truth",
+                    bench.truth.index.to_numpy(dtype=np.float64),
+                    break_jumps(bench.truth[angle].to_numpy()),
+                    BLACK,
+                    "dot",
+                    1.0,
+                )
+            )
+        panels.append(Panel(f"{angle}, deg", tuple(lines)))
+    return Chart(
+        "attitude",
+        "Attitude",
+        "Body forward-right-down relative to north-east-down, 3-2-1 angles. Heading 0–360°, "
+        "clockwise from north; where nothing tells north, from the initial heading.",
+        _TIME,
+        tuple(panels),
+        _marks(bench),
+    )
+
+
+def _error(bench: AttitudeBench) -> Chart:
+    assert bench.truth is not None
+    scored = bench.truth[np.asarray(bench.scored)]
+    lines = []
+    for k, run in enumerate(bench.runs):
+        errors = error_angles(run.attitude, scored)
+        lines.append(
+            Line(
+                run.algorithm,
+                errors.index.to_numpy(dtype=np.float64),
+                np.maximum(errors.to_numpy(), LEAST_ERROR),
+                SERIES_COLOURS[k % len(SERIES_COLOURS)],
+                DASHES[k % len(DASHES)],
+            )
+        )
+    return Chart(
+        "error",
+        "Error against the truth",
+        "Rotation angle between the computed and the true attitude, where the truth counts. "
+        f"Drawn at {LEAST_ERROR:g}° where it is less.",
+        _TIME,
+        (Panel("error, deg", tuple(lines), log=True),),
+        _marks(bench),
+    )
+
+
+def _difference(bench: AttitudeBench) -> Chart:
+    base = next((r for r in bench.runs if r.algorithm == "quaternion"), bench.runs[-1])
+    lines = [
+        Line(
+            run.algorithm,
+            run.attitude.index.to_numpy(dtype=np.float64),
+            np.maximum(error_angles(run.attitude, base.attitude).to_numpy(), LEAST_ERROR),
+            SERIES_COLOURS[k % len(SERIES_COLOURS)],
+            DASHES[k % len(DASHES)],
+        )
+        for k, run in enumerate(bench.runs)
+        if run is not base
+    ]
+    return Chart(
+        "difference",
+        f"Difference from {base.algorithm}",
+        "Rotation angle between the algorithms on the same samples: what the choice of the "
+        f"algorithm makes, whatever the sensor did. Drawn at {LEAST_ERROR:g}° where it is less.",
+        _TIME,
+        (Panel("difference, deg", tuple(lines), log=True),),
+    )

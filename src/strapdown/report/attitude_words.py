@@ -1,0 +1,179 @@
+"""What the attitude bench found, in words and rows; terminal and page say the same."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from strapdown.evaluation.reference_points import in_words
+from strapdown.results import AttitudeBench, Score
+
+CONVENTIONS = (
+    ("Body axes", "x forward, y right, z down"),
+    ("Local level", "north, east, down; where nothing tells north, the initial heading"),
+    ("Attitude", "q_nb and C_nb turn a vector from body axes to local level; scalar first"),
+    (
+        "Angles",
+        "3-2-1: heading 0–360° clockwise from north, pitch ±90° nose up, roll ±180° "
+        "right side down",
+    ),
+    ("Error", "rotation angle |log(C_est^T C_ref)| in degrees, whatever the axis"),
+    ("Earth rate", "neglected, as in Alexiev (2021): 15°/h"),
+)
+HOW_TO_REFERENCE = (
+    "Nothing was given to compare with. Give an attitude that you know: "
+    "--reference 'end same as start' (put back in its place), "
+    "--reference 'end 2 turns about z since start', "
+    "--reference '12.5 roll 0 pitch 0 heading 90', or --reference TRUTH.csv."
+)
+
+
+def degrees(value: float | None) -> str:
+    """An angle to three significant digits, rounding errors as what they are."""
+    if value is None:
+        return "–"
+    if abs(value) < 1e-9:
+        return "< 1e-9°"
+    if abs(value) < 1e-3:
+        return f"{value:.1e}°"
+    return f"{value:.3g}°" if abs(value) < 100 else f"{value:.1f}°"
+
+
+def seconds(value: float) -> str:
+    """An instant to a millisecond."""
+    return f"{value:.3f}".rstrip("0").rstrip(".") + " s"
+
+
+def headline(bench: AttitudeBench) -> str:
+    """One or two sentences: the answer, first."""
+    truth = [s for s in bench.scores if s.against == "truth"]
+    points = [s for s in bench.scores if s.against != "truth"]
+    if truth:
+        return _ranked(truth, "from the truth", "at the end")
+    if points:
+        last = points[-1].against
+        return _ranked([s for s in points if s.against == last], f"off at {last}", "")
+    if len(bench.runs) < 2:
+        return f"{bench.runs[0].algorithm} ran over the log. {HOW_TO_REFERENCE}"
+    table = bench.differences_deg.to_numpy()
+    far = divmod(int(table.argmax()), len(table))
+    a, b = bench.runs[far[0]].algorithm, bench.runs[far[1]].algorithm
+    return (
+        f"The algorithms differ by up to {degrees(float(table.max()))} ({a} against {b}) on these "
+        "samples."
+    )
+
+
+def _ranked(scores: list[Score], off: str, when: str) -> str:
+    ranked = sorted(scores, key=lambda s: s.error_deg)
+    best, worst = ranked[0], ranked[-1]
+    # Equal to what a reader can see: two algorithms that agree are named together.
+    level = [s.algorithm for s in ranked if degrees(s.error_deg) == degrees(best.error_deg)]
+    text = f"{' and '.join(level)}: {degrees(best.error_deg)} {off} {when}".rstrip()
+    if worst.algorithm not in level:
+        text += f"; {worst.algorithm}: {degrees(worst.error_deg)}"
+    return text + "."
+
+
+def result_columns(bench: AttitudeBench) -> list[str]:
+    """Headings of the table of results."""
+    columns = ["algorithm", "Alexiev"]
+    if any(s.against == "truth" for s in bench.scores):
+        columns += ["error at the end", "RMS", "largest"]
+    for number in range(1, len(bench.references) + 1):
+        columns.append(f"error at R{number}")
+    return [*columns, "own condition"]
+
+
+def result_rows(bench: AttitudeBench) -> list[list[str]]:
+    """Rows of the table of results, one an algorithm."""
+    rows = []
+    for run in bench.runs:
+        scores = [s for s in bench.scores if s.algorithm == run.algorithm]
+        row = [run.algorithm, f"Eq. {run.equations}"]
+        for s in scores:
+            row.append(degrees(s.error_deg))
+            if s.against == "truth":
+                row += [degrees(s.rms_deg), degrees(s.max_deg)]
+        rows.append([*row, condition(run.diagnostics)])
+    return rows
+
+
+def condition(diagnostics: dict[str, float]) -> str:
+    """What an algorithm says of itself, in words."""
+    parts = []
+    if "closest_to_pole_deg" in diagnostics:
+        parts.append(
+            f"{degrees(diagnostics['closest_to_pole_deg'])} from ±90° pitch at "
+            f"{seconds(diagnostics['closest_to_pole_time_s'])}"
+        )
+    if "orthogonality_loss" in diagnostics:
+        parts.append(f"|CᵀC − I| = {diagnostics['orthogonality_loss']:.1e}")
+    if "norm_error" in diagnostics:
+        parts.append(f"|q| − 1 = {diagnostics['norm_error']:.1e}")
+    return "; ".join(parts) or "–"
+
+
+def reference_lines(bench: AttitudeBench) -> list[str]:
+    """Each reference point in words, with the turned angle where turns were counted."""
+    lines = []
+    for number, (_, row) in enumerate(bench.references.iterrows(), start=1):
+        text = f"R{number}: {in_words(row)}"
+        score = next((s for s in bench.scores if s.against == in_words(row)), None)
+        if score is not None and score.turned_deg is not None and score.expected_deg:
+            share = score.turned_deg / score.expected_deg - 1.0
+            text += (
+                f"; the gyro turned {score.turned_deg:.1f}° of {score.expected_deg:.1f}° "
+                f"({100 * share:+.2f} %: scale factor, bias and the hand)"
+            )
+        if score is not None and score.sd_deg is not None:
+            text += f"; known to {score.sd_deg:g}° (1σ)"
+        lines.append(text)
+    return lines
+
+
+def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
+    """What the run stood on."""
+    i, b = bench.initial, bench.gyro_bias
+    found = [
+        ("Log", bench.description),
+        (
+            "Initial attitude",
+            f"roll {i['roll_deg']:.3f}°, pitch {i['pitch_deg']:.3f}°, heading "
+            f"{i['heading_deg']:.3f}° at {seconds(i['time_s'])}: {i['from']}",
+        ),
+        ("Gyro bias", _bias_words(b)),
+    ]
+    if bench.sampling_error_deg is not None:
+        found.append(
+            (
+                "Sampling error",
+                f"{degrees(bench.sampling_error_deg)} at the end: what noise-free samples at this "
+                "rate lose, with exact arithmetic; no algorithm can do better on them",
+            )
+        )
+    if bench.rests:
+        found.append(("At rest", "; ".join(_rest_words(bench))))
+    elif not bench.scores:
+        found.append(("At rest", "no stationary stretch of a second or more was found"))
+    return found
+
+
+def _bias_words(bias: dict[str, Any]) -> str:
+    from math import degrees as to_degrees
+
+    if bias["rad_per_s"] is None:
+        return str(bias["from"])
+    values = ", ".join(f"{to_degrees(v):.4f}" for v in bias["rad_per_s"])
+    return f"({values}) deg/s about forward, right, down removed: {bias['from']}"
+
+
+def _rest_words(bench: AttitudeBench) -> list[str]:
+    from math import degrees as to_degrees
+
+    shown = [
+        f"{seconds(r.start)} to {seconds(r.end)}, mean rate "
+        f"({', '.join(f'{to_degrees(v):.3f}' for v in r.gyro_mean)}) deg/s"
+        for r in bench.rests[:6]
+    ]
+    more = len(bench.rests) - len(shown)
+    return shown + ([f"and {more} more"] if more > 0 else [])

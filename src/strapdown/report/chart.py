@@ -1,0 +1,120 @@
+"""A chart as plain data, drawn alike in a page and in a picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# Okabe and Ito's colours, which the colour-blind can tell apart.
+ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"
+VERMILLION, PURPLE, BLACK, GREY = "#D55E00", "#CC79A7", "#1b1f24", "#8a939e"
+AXIS_COLOURS = (VERMILLION, GREEN, BLUE)
+SERIES_COLOURS = (ORANGE, VERMILLION, GREEN, BLUE, PURPLE, SKY, "#7f6000", GREY)
+DASHES = ("solid", "solid", "solid", "dash", "dot", "dashdot", "dash", "dot")
+
+# Points that a screen can show; more only makes the file larger.
+BUCKETS = 1500
+
+
+@dataclass(frozen=True)
+class Line:
+    """One curve. `dash` is solid, dash, dot or dashdot."""
+
+    name: str
+    x: Array
+    y: Array
+    colour: str
+    dash: str = "solid"
+    width: float = 1.4
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An instant that matters, as a vertical line with a label."""
+
+    x: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Band:
+    """A stretch of time, shaded."""
+
+    start: float
+    end: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One set of axes."""
+
+    y_label: str
+    lines: tuple[Line, ...]
+    log: bool = False
+
+
+@dataclass(frozen=True)
+class Chart:
+    """Panels above each other that share the horizontal axis.
+
+    Attributes
+    ----------
+    slug : str
+        Name of the file.
+    title, caption : str
+    x_label : str
+        With its unit.
+    panels : tuple of Panel
+    marks : tuple of Mark
+    bands : tuple of Band
+    """
+
+    slug: str
+    title: str
+    caption: str
+    x_label: str
+    panels: tuple[Panel, ...]
+    marks: tuple[Mark, ...] = field(default=())
+    bands: tuple[Band, ...] = field(default=())
+
+
+def thin(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+    """Thin a curve to what a screen shows, keeping every peak.
+
+    Parameters
+    ----------
+    x, y : array_like, (n,)
+        NaN in `y` breaks the curve.
+
+    Returns
+    -------
+    x, y : ndarray
+        The least and the greatest of each of 1500 equal runs of samples, in their order.
+    """
+    xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
+    if xs.size <= 2 * BUCKETS:
+        return xs, ys
+    keep = {0, xs.size - 1}
+    for part in np.array_split(np.arange(xs.size), BUCKETS):
+        values = ys[part]
+        if np.isnan(values).all():
+            keep.add(int(part[0]))
+            continue
+        keep |= {int(part[np.nanargmin(values)]), int(part[np.nanargmax(values)])}
+        if np.isnan(values).any():
+            keep.add(int(part[np.argmax(np.isnan(values))]))
+    chosen = np.array(sorted(keep))
+    return xs[chosen], ys[chosen]
+
+
+def break_jumps(angle_deg: ArrayLike) -> Array:
+    """Copy of a wrapped angle with NaN where it jumps by more than half a turn."""
+    out = np.array(angle_deg, dtype=np.float64)
+    jumps = np.flatnonzero(np.abs(np.diff(out)) > 180.0)
+    out[jumps + 1] = np.nan
+    return out

@@ -1,0 +1,122 @@
+"""A simulated log as files, with its exact attitude, sealed in a bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.config import ScenarioSpec, SimulateSpec
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
+from strapdown.simulation import find_scenario
+from strapdown.systems.attitude_bench import simulate_scenario
+
+__all__ = ["simulate", "write_simulation"]
+
+
+def simulate(
+    name: str,
+    out: str | Path,
+    *,
+    rate: float = 100.0,
+    sampling: str = "instantaneous",
+    seed: int = 0,
+    formats: Sequence[str] = ("csv",),
+    force: bool = False,
+) -> Seal:
+    """Write the gyro log of a scenario and its exact attitude.
+
+    Parameters
+    ----------
+    name : str
+        One of `simulation.SCENARIOS`.
+    out : str or Path
+        Folder to make.
+    rate : float, Hz
+    sampling : {'instantaneous', 'mean'}
+        The rate at each stamp, or its exact mean over the interval that ends there.
+    seed : int
+        Of the noise.
+    formats : sequence of str
+        Of `formats.log_writers.LOG_WRITERS`, or ``all``.
+    force : bool
+        Replace a bundle that is there.
+
+    Returns
+    -------
+    Seal
+        The folder holds ``log.*`` (rad/s, body forward-right-down, with the true attitude in
+        further columns), ``truth.csv`` and ``scenario.json``.
+
+    Raises
+    ------
+    ConfigError
+        The scenario, the rate, the sampling or a format is unknown, or `out` may not be
+        written.
+    """
+    scenario = ScenarioSpec(name=name, rate_hz=rate, sampling=sampling, seed=seed)
+    return write_simulation(
+        SimulateSpec(scenario=scenario, formats=tuple(formats)), Path(out), force=force
+    )
+
+
+def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> Seal:
+    """Write a simulation from its specification; as `simulate`."""
+    check_destination(out, force)
+    formats = tuple(LOG_WRITERS) if "all" in spec.formats else spec.formats
+    for name in formats:
+        if name not in LOG_WRITERS:
+            raise ConfigError(
+                f"there is no writer for '{name}'",
+                quantity="--format",
+                remedy=nearest(name, [*LOG_WRITERS, "all"]),
+            )
+    imu, truth = simulate_scenario(spec.scenario)
+    scenario = find_scenario(spec.scenario.name)
+    seals: list[Seal] = []
+    with write_bundle(
+        out,
+        command="simulate",
+        configuration=spec.model_dump(mode="json"),
+        force=force,
+        seals=seals,
+    ) as folder:
+        for name in formats:
+            LOG_WRITERS[name](folder / f"log.{name}", imu, truth)
+        write_attitude_csv(folder / "truth.csv", truth)
+        final = truth.iloc[-1]
+        description = {
+            "schema": "strapdown scenario 1",
+            "scenario": spec.scenario.name,
+            "title": scenario.title,
+            "origin": f"Alexiev (2021), {scenario.origin}",
+            "sampling": spec.scenario.sampling,
+            "rate_hz": spec.scenario.rate_hz,
+            "seed": spec.scenario.seed,
+            "duration_s": scenario.motion.duration,
+            "pulses": [
+                {
+                    "axis": "xyz"[p.axis],
+                    "start_s": p.start,
+                    "end_s": p.end,
+                    "end_closed": p.closed,
+                    "rate_rad_per_s": p.rate,
+                }
+                for p in scenario.motion.pulses
+            ],
+            "gyro_errors": {
+                "noise_density_rad_per_s_per_sqrt_hz": scenario.errors.noise_density,
+                "bias_rad_per_s": scenario.errors.bias,
+                "trend_rad_per_s2": scenario.errors.trend,
+            },
+            "final_attitude": {
+                "time_s": float(truth.index[-1]),
+                "q_nb": [float(final[q]) for q in ("q_w", "q_x", "q_y", "q_z")],
+                "roll_deg": float(final["roll"]),
+                "pitch_deg": float(final["pitch"]),
+                "heading_deg": float(final["heading"]),
+            },
+        }
+        (folder / "scenario.json").write_text(to_json(description), encoding="utf-8")
+    return seals[0]

@@ -1,0 +1,191 @@
+"""Frozen results: what a run found, with what a reader needs to judge it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from strapdown.exceptions import Finding
+
+__all__ = ["AttitudeBench", "AttitudeRun", "InputFiles", "Reading", "RestStretch", "Score"]
+
+
+@dataclass(frozen=True)
+class AttitudeRun:
+    """One algorithm over one record.
+
+    Attributes
+    ----------
+    algorithm : str
+        Name and options, as the command line takes them.
+    title, equations : str
+        For people; the equations are numbered as in the algorithm's source.
+    attitude : DataFrame
+        Attitude table at every sample.
+    diagnostics : dict of str to float
+        What the algorithm says of its own condition; each key carries its unit.
+    """
+
+    algorithm: str
+    title: str
+    equations: str
+    attitude: pd.DataFrame = field(repr=False)
+    diagnostics: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a reader took one column of a log for.
+
+    Attributes
+    ----------
+    source : str
+        Name of the column in the file.
+    quantity : str
+        Column of the table that it became, with a sign where it was reversed.
+    unit : str
+        Unit in the file.
+    why : str
+        What that was concluded from.
+    first : float
+        The first value, as it stands in the file.
+    """
+
+    source: str
+    quantity: str
+    unit: str
+    why: str
+    first: float
+
+
+@dataclass(frozen=True)
+class RestStretch:
+    """A stretch in which the sensor did not turn.
+
+    Attributes
+    ----------
+    start, end : float, s
+    gyro_mean : tuple of float, rad/s
+        Mean of each gyro over it: its bias, where the Earth's 15 deg/h does not matter.
+    gyro_sd : tuple of float, rad/s
+    accel_mean : tuple of float or None, m/s²
+    """
+
+    start: float
+    end: float
+    gyro_mean: tuple[float, float, float]
+    gyro_sd: tuple[float, float, float]
+    accel_mean: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Score:
+    """How one algorithm compares with one thing that is known.
+
+    Attributes
+    ----------
+    algorithm : str
+    against : str
+        ``truth``, or the reference point in words.
+    time : float, s
+        Where the comparison ends.
+    error_deg : float
+        Rotation angle between the computed and the known attitude, at that instant.
+    rms_deg, max_deg : float or None
+        Over every scored instant; None for a reference point.
+    turned_deg, expected_deg : float or None
+        For a number of turns: the integrated angle about the axis, and what it should be.
+    sd_deg : float or None
+        How well the reference itself is known.
+    """
+
+    algorithm: str
+    against: str
+    time: float
+    error_deg: float
+    rms_deg: float | None = None
+    max_deg: float | None = None
+    turned_deg: float | None = None
+    expected_deg: float | None = None
+    sd_deg: float | None = None
+
+
+@dataclass(frozen=True)
+class InputFiles:
+    """Files that a result depends on.
+
+    Attributes
+    ----------
+    role : str
+        ``log``, ``truth`` or ``gyro-bias``.
+    path : Path
+        As it was given: a file, or a folder.
+    files : tuple of Path
+        Every file that was read.
+    """
+
+    role: str
+    path: Path
+    files: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class AttitudeBench:
+    """What the attitude bench found.
+
+    Attributes
+    ----------
+    source : str
+        Name of the log or the scenario.
+    description : str
+    specification : dict
+        Everything that determines the run, as it is sealed with the outputs.
+    imu : DataFrame
+        The samples as used: body axes, SI, bias removed where that was asked for.
+    runs : tuple of AttitudeRun
+    truth : DataFrame or None
+        Attitude table at (some of) the samples' stamps.
+    scored : ndarray of bool or None
+        Which rows of `truth` count.
+    scores : tuple of Score
+    sampling_error_deg : float or None
+        For a scenario: what the samples themselves lost, with exact arithmetic.
+    differences_deg : DataFrame
+        Largest rotation angle between each pair of algorithms.
+    rests : tuple of RestStretch
+    initial : dict
+        The initial attitude in degrees and where it came from.
+    gyro_bias : dict
+        What was subtracted, in rad/s, and where it came from.
+    references : DataFrame
+    readings : tuple of Reading
+    findings : tuple of Finding
+        Warnings and notes, in words.
+    inputs : tuple of InputFiles
+    """
+
+    source: str
+    description: str
+    specification: dict[str, Any] = field(repr=False)
+    imu: pd.DataFrame = field(repr=False)
+    runs: tuple[AttitudeRun, ...] = field(repr=False)
+    truth: pd.DataFrame | None = field(repr=False)
+    scored: Any = field(repr=False)
+    scores: tuple[Score, ...]
+    sampling_error_deg: float | None
+    differences_deg: pd.DataFrame = field(repr=False)
+    rests: tuple[RestStretch, ...]
+    initial: dict[str, Any]
+    gyro_bias: dict[str, Any]
+    references: pd.DataFrame = field(repr=False)
+    readings: tuple[Reading, ...] = field(repr=False)
+    findings: tuple[Finding, ...]
+    inputs: tuple[InputFiles, ...] = field(repr=False)
+
+    @property
+    def summary(self) -> pd.DataFrame:
+        """One row an algorithm and a comparison; angles in degrees, time in seconds."""
+        return pd.DataFrame([vars(score) for score in self.scores])

@@ -1,0 +1,521 @@
+"""Rotations as arrays: quaternion, direction cosine matrix, Euler angles, rotation vector.
+
+Conventions, here and everywhere in strapdown:
+
+* Quaternions are Hamilton's, scalar first, ``(..., 4)``; ``q_ab`` turns a vector from frame
+  ``b`` into frame ``a``: ``v_a = rotate(q_ab, v_b)``; ``q`` and ``-q`` are the same rotation.
+* Matrices are ``(..., 3, 3)``: ``v_a = C_ab @ v_b``; neighbouring letters cancel.
+* Euler angles are ``(..., 3)``: roll, pitch, heading in degrees, 3-2-1:
+  ``C_nb = Rz(heading) Ry(pitch) Rx(roll)``; heading in [0, 360), clockwise from north seen
+  from above (north-east-down axes), roll in (-180, 180], pitch in [-90, 90].
+* A rotation vector is ``(..., 3)`` in rad: the turn by its length about its direction.
+
+Alexiev (2021) prints the elementary matrices (4)-(6) as rotations of the *frame*; with them
+Eq. (3) must read ``C_nb = Cz^T Cy^T Cx^T``, which is the product above, and only this reading
+agrees with his kinematics (8)-(10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown._kernels import rotation as kernel
+from strapdown.exceptions import DataError
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+__all__ = [
+    "compose",
+    "conjugate",
+    "dcm_from_euler",
+    "dcm_from_quaternion",
+    "dcm_from_rotation_vector",
+    "euler_from_dcm",
+    "euler_from_quaternion",
+    "euler_from_rotation_vector",
+    "from_scipy",
+    "quaternion_from_dcm",
+    "quaternion_from_euler",
+    "quaternion_from_rotation_vector",
+    "rotate",
+    "rotation_angle",
+    "rotation_vector_from_dcm",
+    "rotation_vector_from_euler",
+    "rotation_vector_from_quaternion",
+    "to_scipy",
+]
+
+# How far a norm or C^T C may lie from one before an input is refused as no rotation. Hand
+# written quaternions carry three or four digits; a mistaken order of components does not pass.
+_TOLERANCE = 1e-2
+
+
+def _rows(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array, tuple[int, ...]]:
+    """Return `values` as C-contiguous rows and the leading shape."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
+        raise DataError(
+            f"shape {array.shape} does not end in {shape}",
+            quantity=name,
+            remedy=f"pass an array of shape (..., {', '.join(map(str, shape))})",
+        )
+    if not np.isfinite(array).all():
+        bad = int(np.argwhere(~np.isfinite(array).reshape(-1, int(np.prod(shape))).all(axis=1))[0])
+        raise DataError("not a finite number", row=bad + 1, quantity=name)
+    leading = array.shape[: array.ndim - len(shape)]
+    return np.ascontiguousarray(array.reshape(-1, int(np.prod(shape)))), leading
+
+
+def _unit(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
+    rows, leading = _rows(q, (4,), name)
+    norm = np.sqrt((rows * rows).sum(axis=1))
+    bad = np.flatnonzero(np.abs(norm - 1.0) > _TOLERANCE)
+    if bad.size:
+        raise DataError(
+            f"a rotation needs a quaternion of norm 1, and this one has {norm[bad[0]]:.6g}",
+            row=int(bad[0]) + 1,
+            quantity=name,
+            remedy="normalise it, and check the order: scalar first (w, x, y, z)",
+        )
+    return rows / norm[:, None], leading
+
+
+def _proper(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+    rows, leading = _rows(dcm, (3, 3), "direction cosine matrix")
+    matrices = rows.reshape(-1, 3, 3)
+    loss = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2), initial=0.0)
+    bad = np.flatnonzero((loss > _TOLERANCE) | (np.linalg.det(matrices) < 0))
+    if bad.size:
+        raise DataError(
+            "not a rotation: C^T C differs from the identity by "
+            f"{loss[bad[0]]:.3g}, determinant {np.linalg.det(matrices[bad[0]]):.3g}",
+            row=int(bad[0]) + 1,
+            quantity="direction cosine matrix",
+            remedy="pass right-handed orthogonal matrices with C_nb @ v_b = v_n",
+        )
+    return rows, leading
+
+
+def _apply(
+    loop: Callable[[Array, Array], Any], rows: Array, leading: tuple[int, ...], *shape: int
+) -> Array:
+    out = np.empty((rows.shape[0], int(np.prod(shape))))
+    loop(rows, out)
+    return out.reshape(leading + shape)
+
+
+def quaternion_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
+    """Exponential map: the quaternion of a rotation vector.
+
+    Parameters
+    ----------
+    rotation_vector : array_like, (..., 3), rad
+        Any length; turns beyond pi come back as the same attitude.
+
+    Returns
+    -------
+    ndarray, (..., 4)
+        Unit quaternions, correct to rounding at every length, zero included.
+
+    Raises
+    ------
+    DataError
+        The shape is wrong or a value is not finite.
+
+    Notes
+    -----
+    Alexiev (2021), Eqs. (14)-(17), and the series (21)-(22) near zero, where those divide
+    zero by zero.
+    """
+    rows, leading = _rows(rotation_vector, (3,), "rotation vector")
+    return _apply(kernel.quats_from_rotvecs, rows, leading, 4)
+
+
+def rotation_vector_from_quaternion(q: ArrayLike) -> Array:
+    """Logarithm: the rotation vector of a quaternion, of length at most pi.
+
+    Parameters
+    ----------
+    q : array_like, (..., 4)
+        Quaternions of norm 1 within 1 %; they are normalised first.
+
+    Returns
+    -------
+    ndarray, (..., 3), rad
+        At exactly half a turn both directions are right and one is returned.
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    rows, leading = _unit(q, "quaternion")
+    return _apply(kernel.rotvecs_from_quats, rows, leading, 3)
+
+
+def dcm_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
+    """Exponential map: the direction cosine matrix of a rotation vector.
+
+    Parameters
+    ----------
+    rotation_vector : array_like, (..., 3), rad
+
+    Returns
+    -------
+    ndarray, (..., 3, 3)
+
+    Raises
+    ------
+    DataError
+        The shape is wrong or a value is not finite.
+
+    Notes
+    -----
+    Alexiev (2021), Eq. (12), by functions of the half angle, so that nothing cancels and
+    zero needs no special case.
+    """
+    rows, leading = _rows(rotation_vector, (3,), "rotation vector")
+    return _apply(kernel.dcms_from_rotvecs, rows, leading, 3, 3)
+
+
+def rotation_vector_from_dcm(dcm: ArrayLike) -> Array:
+    """Logarithm of a direction cosine matrix, of length at most pi.
+
+    Parameters
+    ----------
+    dcm : array_like, (..., 3, 3)
+
+    Returns
+    -------
+    ndarray, (..., 3), rad
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or no rotation (1 % of orthogonality).
+    """
+    return rotation_vector_from_quaternion(quaternion_from_dcm(dcm))
+
+
+def dcm_from_quaternion(q: ArrayLike) -> Array:
+    """Direction cosine matrix of a quaternion.
+
+    Parameters
+    ----------
+    q : array_like, (..., 4)
+        Quaternions of norm 1 within 1 %; they are normalised first.
+
+    Returns
+    -------
+    ndarray, (..., 3, 3)
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    rows, leading = _unit(q, "quaternion")
+    return _apply(kernel.dcms_from_quats, rows, leading, 3, 3)
+
+
+def quaternion_from_dcm(dcm: ArrayLike) -> Array:
+    """Quaternion of a direction cosine matrix.
+
+    Parameters
+    ----------
+    dcm : array_like, (..., 3, 3)
+        Rotations; up to 1 % from orthogonal is accepted.
+
+    Returns
+    -------
+    ndarray, (..., 4)
+        Unit quaternions; the sign is free.
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or no rotation.
+
+    Notes
+    -----
+    From the largest of the four components (Shepperd 1978, doi:10.2514/3.55767b), so that no
+    attitude loses accuracy.
+    """
+    rows, leading = _proper(dcm)
+    return _apply(kernel.quats_from_dcms, rows, leading, 4)
+
+
+def quaternion_from_euler(roll_pitch_heading: ArrayLike) -> Array:
+    """Quaternion of 3-2-1 Euler angles.
+
+    Parameters
+    ----------
+    roll_pitch_heading : array_like, (..., 3), deg
+        Any finite angles.
+
+    Returns
+    -------
+    ndarray, (..., 4)
+        ``q_nb``, body to local level.
+
+    Raises
+    ------
+    DataError
+        The shape is wrong or a value is not finite.
+    """
+    rows, leading = _rows(roll_pitch_heading, (3,), "roll, pitch, heading")
+    return _apply(kernel.quats_from_eulers, np.radians(rows), leading, 4)
+
+
+def euler_from_quaternion(q: ArrayLike) -> Array:
+    """Return the 3-2-1 Euler angles of a quaternion.
+
+    Parameters
+    ----------
+    q : array_like, (..., 4)
+        ``q_nb``, norm 1 within 1 %.
+
+    Returns
+    -------
+    ndarray, (..., 3), deg
+        Roll (-180, 180], pitch [-90, 90], heading [0, 360). At a pitch of exactly +-90 deg
+        only heading -+ roll is defined: roll is then zero.
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    rows, leading = _unit(q, "quaternion")
+    angles = np.degrees(_apply(kernel.eulers_from_quats, rows, leading, 3))
+    heading = angles[..., 2]
+    wrapped = np.where(heading < 0.0, heading + 360.0, heading)
+    # A heading of -1e-17 deg rounds to 360 and not to just under it.
+    angles[..., 2] = np.where(wrapped >= 360.0, 0.0, wrapped)
+    return angles
+
+
+def dcm_from_euler(roll_pitch_heading: ArrayLike) -> Array:
+    """Direction cosine matrix ``C_nb`` of 3-2-1 Euler angles.
+
+    Parameters
+    ----------
+    roll_pitch_heading : array_like, (..., 3), deg
+
+    Returns
+    -------
+    ndarray, (..., 3, 3)
+
+    Raises
+    ------
+    DataError
+        The shape is wrong or a value is not finite.
+
+    Notes
+    -----
+    Alexiev (2021), Eq. (3) as corrected in the text above: ``Cz^T Cy^T Cx^T``.
+    """
+    return dcm_from_quaternion(quaternion_from_euler(roll_pitch_heading))
+
+
+def euler_from_dcm(dcm: ArrayLike) -> Array:
+    """Return the 3-2-1 Euler angles of ``C_nb``; ranges as in `euler_from_quaternion`.
+
+    Parameters
+    ----------
+    dcm : array_like, (..., 3, 3)
+
+    Returns
+    -------
+    ndarray, (..., 3), deg
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or no rotation.
+    """
+    return euler_from_quaternion(quaternion_from_dcm(dcm))
+
+
+def rotation_vector_from_euler(roll_pitch_heading: ArrayLike) -> Array:
+    """Rotation vector of 3-2-1 Euler angles, of length at most pi.
+
+    Parameters
+    ----------
+    roll_pitch_heading : array_like, (..., 3), deg
+
+    Returns
+    -------
+    ndarray, (..., 3), rad
+
+    Raises
+    ------
+    DataError
+        The shape is wrong or a value is not finite.
+    """
+    return rotation_vector_from_quaternion(quaternion_from_euler(roll_pitch_heading))
+
+
+def euler_from_rotation_vector(rotation_vector: ArrayLike) -> Array:
+    """Return the 3-2-1 Euler angles of a rotation vector; ranges as in `euler_from_quaternion`.
+
+    Parameters
+    ----------
+    rotation_vector : array_like, (..., 3), rad
+
+    Returns
+    -------
+    ndarray, (..., 3), deg
+
+    Raises
+    ------
+    DataError
+        The shape is wrong or a value is not finite.
+    """
+    return euler_from_quaternion(quaternion_from_rotation_vector(rotation_vector))
+
+
+def compose(q_ab: ArrayLike, q_bc: ArrayLike) -> Array:
+    """Compose rotations: ``q_ac = q_ab q_bc``.
+
+    Parameters
+    ----------
+    q_ab, q_bc : array_like, (..., 4)
+        Leading shapes are broadcast.
+
+    Returns
+    -------
+    ndarray, (..., 4)
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    a, lead_a = _unit(q_ab, "q_ab")
+    b, lead_b = _unit(q_bc, "q_bc")
+    leading = np.broadcast_shapes(lead_a, lead_b)
+    left, right = (
+        np.ascontiguousarray(np.broadcast_to(q.reshape((*lead, 4)), (*leading, 4)).reshape(-1, 4))
+        for q, lead in ((a, lead_a), (b, lead_b))
+    )
+    out = np.empty_like(left)
+    kernel.quats_multiply(left, right, out)
+    return out.reshape((*leading, 4))
+
+
+def conjugate(q_ab: ArrayLike) -> Array:
+    """Reverse a rotation: ``q_ba`` from ``q_ab``.
+
+    Parameters
+    ----------
+    q_ab : array_like, (..., 4)
+
+    Returns
+    -------
+    ndarray, (..., 4)
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    rows, leading = _unit(q_ab, "quaternion")
+    q_ba: Array = rows * np.array([1.0, -1.0, -1.0, -1.0])
+    return q_ba.reshape((*leading, 4))
+
+
+def rotate(q_ab: ArrayLike, v_b: ArrayLike) -> Array:
+    """Turn vectors from frame ``b`` into frame ``a``.
+
+    Parameters
+    ----------
+    q_ab : array_like, (..., 4)
+    v_b : array_like, (..., 3), any unit
+        Leading shapes are broadcast.
+
+    Returns
+    -------
+    ndarray, (..., 3), the unit of `v_b`
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    q, lead_q = _unit(q_ab, "quaternion")
+    v, lead_v = _rows(v_b, (3,), "vector")
+    leading = np.broadcast_shapes(lead_q, lead_v)
+    quats = np.broadcast_to(q.reshape((*lead_q, 4)), (*leading, 4)).reshape(-1, 4)
+    vectors = np.broadcast_to(v.reshape((*lead_v, 3)), (*leading, 3)).reshape(-1, 3)
+    out = np.empty((len(vectors), 3))
+    kernel.quats_rotate(np.ascontiguousarray(quats), np.ascontiguousarray(vectors), out)
+    return out.reshape((*leading, 3))
+
+
+def rotation_angle(q_1: ArrayLike, q_2: ArrayLike) -> Array:
+    """Angle of the rotation between two attitudes: the length of ``log(C_1^T C_2)``.
+
+    Parameters
+    ----------
+    q_1, q_2 : array_like, (..., 4)
+        Leading shapes are broadcast.
+
+    Returns
+    -------
+    ndarray, (...), deg
+        Between 0 and 180; small angles keep their relative accuracy.
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    difference = rotation_vector_from_quaternion(compose(conjugate(q_1), q_2))
+    angle: Array = np.asarray(np.degrees(np.sqrt((difference * difference).sum(axis=-1))))
+    return angle
+
+
+def to_scipy(q: ArrayLike) -> Rotation:
+    """Turn quaternions into a `scipy.spatial.transform.Rotation` (scalar last inside).
+
+    Parameters
+    ----------
+    q : array_like, (..., 4)
+
+    Returns
+    -------
+    scipy.spatial.transform.Rotation
+        A stack of rotations, or a single one.
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    from scipy.spatial.transform import Rotation
+
+    rows, leading = _unit(q, "quaternion")
+    return Rotation.from_quat(rows.reshape((*leading, 4))[..., [1, 2, 3, 0]])
+
+
+def from_scipy(rotation: Rotation) -> Array:
+    """Turn a `scipy.spatial.transform.Rotation` into quaternions, scalar first.
+
+    Parameters
+    ----------
+    rotation : scipy.spatial.transform.Rotation
+
+    Returns
+    -------
+    ndarray, (..., 4)
+    """
+    q: Array = np.ascontiguousarray(rotation.as_quat()[..., [3, 0, 1, 2]], dtype=np.float64)
+    return q

@@ -1,0 +1,1 @@
+"""What a sensor does and what can be known of it."""

@@ -1,0 +1,114 @@
+"""Stretches of a log in which the sensor did not turn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.results import RestStretch
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+# A window is judged as a whole: long enough for a standard deviation that means something,
+# short enough that a pause of a second shows.
+WINDOW = 0.5  # s
+LEAST_SAMPLES = 5
+LEAST_LENGTH = 1.0  # s
+# The quietest twentieth of the windows sets the noise of this sensor; rest is what stays
+# within three times that.
+QUIET_QUANTILE = 0.05
+QUIET_FACTOR = 3.0
+# What no consumer sensor exceeds at rest, and every hand does: so that a log that is never at
+# rest does not have its least busy moment taken for one.
+MAX_GYRO_SD = 0.02  # rad/s, of the three axes together
+MAX_ACCEL_SD = 0.3  # m/s²
+MAX_MEAN_RATE = 0.2  # rad/s: the turn-on bias of a cheap gyro is under 20 deg/s = 0.35 rad/s at
+# its data sheet's limit, and a few deg/s in use
+SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
+# A sensor without noise (a simulation) is at rest where it reads a constant, to rounding.
+ROUNDING = 1e-9  # rad/s
+
+
+def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
+    """Find the stationary stretches of a log, from its own noise.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table.
+
+    Returns
+    -------
+    tuple of RestStretch
+        In order of time, each at least 1 s long. A slow turn at a constant rate about the
+        vertical cannot be told from a bias by a single stretch; it is refused here only where
+        another stretch of the log shows a bias that differs by more than 0.01 rad/s.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    gyro = imu[GYRO].to_numpy(dtype=np.float64)
+    accel = imu[ACCEL].to_numpy(dtype=np.float64) if set(ACCEL) <= set(imu.columns) else None
+    starts, ends = _windows(time)
+    if not len(starts):
+        return ()
+    gyro_sd = _window_sd(gyro, starts, ends)
+    quiet = max(QUIET_FACTOR * float(np.quantile(gyro_sd, QUIET_QUANTILE)), ROUNDING)
+    still = gyro_sd <= min(quiet, MAX_GYRO_SD)
+    still &= np.linalg.norm(_window_mean(gyro, starts, ends), axis=1) <= MAX_MEAN_RATE
+    if accel is not None:
+        still &= _window_sd(accel, starts, ends) <= MAX_ACCEL_SD
+    rests = [
+        _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
+        for a, b in _runs(still)
+        if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
+    ]
+    return _of_one_bias(rests)
+
+
+def _windows(time: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First and one-past-last sample of windows that overlap by half."""
+    grid = np.arange(time[0], time[-1] - WINDOW, 0.5 * WINDOW)
+    starts = np.searchsorted(time, grid, side="left")
+    ends = np.searchsorted(time, grid + WINDOW, side="right")
+    enough = ends - starts >= LEAST_SAMPLES
+    return starts[enough].astype(np.int64), ends[enough].astype(np.int64)
+
+
+def _window_mean(values: Array, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> Array:
+    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
+    return np.asarray((total[ends] - total[starts]) / (ends - starts)[:, None])
+
+
+def _window_sd(values: Array, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> Array:
+    """Root of the summed variances of the axes, per window."""
+    centred = values - values.mean(axis=0)
+    mean = _window_mean(centred, starts, ends)
+    square = _window_mean(centred * centred, starts, ends)
+    return np.asarray(np.sqrt(np.clip(square - mean * mean, 0.0, None).sum(axis=1)))
+
+
+def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> RestStretch:
+    mean, sd = gyro[a:b].mean(axis=0), gyro[a:b].std(axis=0)
+    level = None if accel is None else accel[a:b].mean(axis=0)
+    return RestStretch(
+        float(time[a]),
+        float(time[b - 1]),
+        (float(mean[0]), float(mean[1]), float(mean[2])),
+        (float(sd[0]), float(sd[1]), float(sd[2])),
+        None if level is None else (float(level[0]), float(level[1]), float(level[2])),
+    )
+
+
+def _of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
+    if not rests:
+        return ()
+    least = min(rests, key=lambda r: float(np.linalg.norm(r.gyro_mean)))
+    return tuple(
+        r for r in rests if np.linalg.norm(np.subtract(r.gyro_mean, least.gyro_mean)) <= SAME_BIAS
+    )

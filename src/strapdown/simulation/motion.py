@@ -1,0 +1,123 @@
+"""Rotations whose attitude is known in closed form at every instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Pulse:
+    """A constant rate about one body axis for a while.
+
+    Attributes
+    ----------
+    axis : int
+        0, 1, 2: forward, right, down.
+    start, end : float, s
+        The pulse acts on the half-open interval [start, end).
+    rate : float, rad/s
+    closed : bool
+        Let a sample that falls on `end` still read the rate. The motion is the same (one
+        instant turns nothing), but the samples then hold one pulse value too many: a way to
+        see the error that sampling makes at an edge.
+    """
+
+    axis: int
+    start: float
+    end: float
+    rate: float
+    closed: bool = False
+
+
+@dataclass(frozen=True)
+class PulseMotion:
+    """Any number of pulses, overlapping or not, from an initial attitude.
+
+    Between two edges the rate vector is constant in body axes, so that the attitude is an
+    exact product of exponentials, whatever overlaps.
+
+    Attributes
+    ----------
+    pulses : tuple of Pulse
+    duration : float, s
+    q_nb : tuple of float
+        Attitude at time zero, scalar first.
+    """
+
+    pulses: tuple[Pulse, ...]
+    duration: float
+    q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate as a gyro reads it at each instant.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), rad/s
+        """
+        t = np.asarray(time, dtype=np.float64)
+        out = np.zeros((t.size, 3))
+        for p in self.pulses:
+            acts = (t >= p.start) & ((t <= p.end) if p.closed else (t < p.end))
+            out[acts, p.axis] += p.rate
+        return out
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), rad
+        """
+        t = np.asarray(time, dtype=np.float64)
+        out = np.zeros((t.size, 3))
+        for p in self.pulses:
+            out[:, p.axis] += p.rate * np.clip(t - p.start, 0.0, p.end - p.start)
+        return out
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Exact attitude.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+            Not before zero.
+
+        Returns
+        -------
+        ndarray, (n, 4)
+            ``q_nb``, correct to the rounding of one product for each edge passed.
+        """
+        t = np.asarray(time, dtype=np.float64)
+        edges = np.unique([0.0, *(e for p in self.pulses for e in (p.start, p.end))])
+        # Measured in the middle, where no edge can be ambiguous.
+        middle = np.append(0.5 * (edges[:-1] + edges[1:]), edges[-1] + 1.0)
+        rates = PulseMotion(tuple(_half_open(p) for p in self.pulses), 0.0).rate(middle)
+        at_edge = [np.asarray(self.q_nb, dtype=np.float64)]
+        for k, length in enumerate(np.diff(edges)):
+            turn = rotation.quaternion_from_rotation_vector(rates[k] * length)
+            at_edge.append(rotation.compose(at_edge[-1], turn))
+        last = np.searchsorted(edges, t, side="right") - 1
+        since = rates[last] * (t - edges[last])[:, None]
+        return rotation.compose(
+            np.array(at_edge)[last], rotation.quaternion_from_rotation_vector(since)
+        )
+
+
+def _half_open(pulse: Pulse) -> Pulse:
+    return Pulse(pulse.axis, pulse.start, pulse.end, pulse.rate)

@@ -1,0 +1,624 @@
+"""System A, Alexiev (2021): attitude algorithms on one log, and how far they can be trusted."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.alignment.levelling import level
+from strapdown.attitude import Quaternion, make_algorithm, run_attitude
+from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
+from strapdown.constants import GYRO_UNITS
+from strapdown.evaluation.differences import attitude_at, error_angles, largest_differences
+from strapdown.evaluation.reference_points import references_from_words, score_references
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats import read_log
+from strapdown.formats.columns import parse_unit
+from strapdown.formats.recording import ReadOptions
+from strapdown.formats.references import read_reference_words, read_truth
+from strapdown.increments import increments_from_imu
+from strapdown.results import AttitudeBench, AttitudeRun, InputFiles, Reading, RestStretch, Score
+from strapdown.sensors.rest import find_rests
+from strapdown.simulation import SCENARIOS, GyroErrors, find_scenario, simulate_gyro
+from strapdown.tables import GYRO, QUATERNION
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+__all__ = ["bench_attitude", "run_bench", "simulate_scenario"]
+
+# Within this of ±90° of pitch the kinematics of Euler angles amplify every error tenfold.
+NEAR_POLE = 5.7  # deg: 1/cos = 10
+# A step that turns by more than this says little of what happened within it.
+LARGE_STEP = 0.5  # rad
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A log or a scenario, read."""
+
+    name: str
+    description: str
+    imu: pd.DataFrame
+    truth: pd.DataFrame | None
+    scored: NDArray[np.bool_] | None
+    readings: tuple[Reading, ...]
+    findings: tuple[Finding, ...]
+    inputs: tuple[InputFiles, ...]
+    sampling_error_deg: float | None
+
+
+def bench_attitude(
+    source: str | Path,
+    *,
+    algorithms: Sequence[str] = ("naive", "euler", "dcm", "quaternion"),
+    reference: Sequence[str] = (),
+    initial: str = "auto",
+    gyro_bias: str = "none",
+    rate: float | None = None,
+    sampling: str | None = None,
+    seed: int = 0,
+    columns: dict[str, str] | None = None,
+    gyro_unit: str | None = None,
+    accel_unit: str | None = None,
+    time_unit: str | None = None,
+    axes: str | None = None,
+    repair: bool = False,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    progress: Progress = _silent,
+) -> AttitudeBench:
+    """Run attitude algorithms over a log or a scenario and compare them with what is known.
+
+    Parameters
+    ----------
+    source : str or Path
+        Name of a scenario (`simulation.SCENARIOS`), or path of a log: a file of a known
+        format, or the folder of a known recording.
+    algorithms : sequence of str
+        Names with options, as in ``quaternion:order=3`` (`attitude.make_algorithm`).
+    reference : sequence of str
+        Reference points in words (``end same as start``, `evaluation.reference_points`), or
+        the path of a file of them, or of an attitude truth.
+    initial : str
+        ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
+        the truth where there is one, levelled where the log begins at rest, and zero else.
+    gyro_bias : str
+        ``none``; ``rest``, the mean over the first stationary stretch; three numbers and a
+        unit about forward, right, down; or the path of a log of the sensor lying still.
+    rate : float, optional, Hz
+        Of a scenario (100 if not given), or of a log without a time column.
+    sampling : {'instantaneous', 'mean'}, optional
+        What a row holds: the rate at its stamp, or its mean over the interval ending there.
+    seed : int
+        Of a scenario's noise.
+    columns, gyro_unit, accel_unit, time_unit, axes, repair
+        How to read a log, as in `formats.recording.ReadOptions`.
+    from_s, to_s : float, optional, s
+        Use a part of the log.
+    progress : callable, optional
+        Called with the name of a stage and the share done.
+
+    Returns
+    -------
+    AttitudeBench
+        Attitudes as tables (quaternion; roll, pitch, heading in deg), errors in deg.
+
+    Raises
+    ------
+    DataError
+        The log or a reference cannot be used; the message names file, row and remedy.
+    ConfigError
+        Something that was asked for is not known, or cannot be had from this log.
+
+    Notes
+    -----
+    Alexiev (2021). The Earth's rotation is neglected, as in the paper: 15 deg/h.
+    """
+    words, truth_path = _references(reference)
+    bias_path = gyro_bias if _is_path(gyro_bias) else None
+    return run_bench(
+        AttitudeSpec(
+            source=_source_spec(
+                source,
+                rate,
+                sampling,
+                seed,
+                columns,
+                gyro_unit,
+                accel_unit,
+                time_unit,
+                axes,
+                repair,
+            ),
+            algorithms=tuple(algorithms),
+            initial=initial,
+            gyro_bias="log" if bias_path else gyro_bias,
+            references=words,
+            truth_path=truth_path,
+            gyro_bias_path=bias_path,
+            from_s=from_s,
+            to_s=to_s,
+        ),
+        progress,
+    )
+
+
+def _source_spec(
+    source: str | Path,
+    rate: float | None,
+    sampling: str | None,
+    seed: int,
+    columns: dict[str, str] | None,
+    gyro_unit: str | None,
+    accel_unit: str | None,
+    time_unit: str | None,
+    axes: str | None,
+    repair: bool,
+) -> ScenarioSpec | LogSpec:
+    text = str(source)
+    if text in SCENARIOS:
+        return ScenarioSpec(
+            name=text,
+            rate_hz=100.0 if rate is None else rate,
+            sampling=sampling or "instantaneous",
+            seed=seed,
+        )
+    if not Path(text).exists() and not Path(text).suffix and len(Path(text).parts) == 1:
+        find_scenario(text)  # says which names there are
+    return LogSpec(
+        path=text,
+        columns=columns or {},
+        gyro_unit=gyro_unit,
+        accel_unit=accel_unit,
+        time_unit=time_unit,
+        axes=axes,
+        sampling=sampling,
+        rate_hz=rate,
+        repair=repair,
+    )
+
+
+def _is_path(text: str) -> bool:
+    return text not in ("none", "rest") and Path(text).exists()
+
+
+def _references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
+    """Sort references into sentences and the path of a truth."""
+    words: list[str] = []
+    truth: str | None = None
+    for item in items:
+        path = Path(item)
+        if not path.exists():
+            words.append(item)
+        elif (listed := read_reference_words(path)) is not None:
+            words += listed
+        elif truth is None:
+            truth = item
+        else:
+            raise ConfigError(
+                f"two attitude truths were given: {truth} and {item}",
+                quantity="reference",
+                remedy="give one; reference points may be as many as you like",
+            )
+    return tuple(words), truth
+
+
+def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench:
+    """Run attitude algorithms over a log or a scenario and compare them with what is known.
+
+    Parameters
+    ----------
+    spec : AttitudeSpec
+    progress : callable, optional
+        Called with the name of a stage and the share that is done, 0 to 1.
+
+    Returns
+    -------
+    AttitudeBench
+
+    Raises
+    ------
+    DataError
+        The log or a reference cannot be used.
+    ConfigError
+        Something that was asked for is not known, or cannot be had from this log.
+    """
+    algorithms = [make_algorithm(text) for text in spec.algorithms]
+    if not algorithms:
+        raise ConfigError("none is named", quantity="algorithms", remedy="name at least one")
+    if len({a.label for a in algorithms}) < len(algorithms):
+        raise ConfigError(
+            f"one is named twice: {', '.join(a.label for a in algorithms)}",
+            quantity="algorithms",
+            remedy="name each once, or give it different options",
+        )
+    progress("reading", 0.0)
+    source = _with_truth(_read(spec), spec)
+    source = replace(source, imu=_window(source.imu, spec.from_s, spec.to_s, source.name))
+    rests = find_rests(source.imu)
+    bias, bias_input = _gyro_bias(spec, source, rests)
+    findings = list(source.findings)
+    imu = source.imu
+    if bias["rad_per_s"] is not None:
+        imu = imu.copy()
+        imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias["rad_per_s"])
+    q_nb, initial, begin = _initial(spec.initial, source, rests)
+    imu = imu[imu.index >= begin]
+    if len(imu) < 2:
+        raise DataError(
+            f"fewer than two samples are left from {begin:.9g} s, where the attitude is known",
+            file=source.name,
+            remedy="give another --initial",
+        )
+    increments = increments_from_imu(imu)
+    runs = []
+    for k, algorithm in enumerate(algorithms):
+        progress(algorithm.title, (k + 0.5) / (len(algorithms) + 1.0))
+        runs.append(run_attitude(algorithm, increments, q_nb))
+    progress("comparing", 0.9)
+    span = (float(imu.index[0]), float(imu.index[-1]))
+    references = references_from_words(list(spec.references), *span)
+    scores = [s for run in runs for s in _truth_score(run, source)]
+    scores += [s for run in runs for s in score_references(run, references, imu)]
+    findings += _judge(runs, increments)
+    truth, scored = source.truth, source.scored
+    if truth is not None and scored is not None:
+        inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
+        truth, scored = truth[inside], scored[inside]
+    progress("done", 1.0)
+    return AttitudeBench(
+        source=source.name,
+        description=source.description,
+        specification=spec.model_dump(mode="json"),
+        imu=imu,
+        runs=tuple(runs),
+        truth=truth,
+        scored=scored,
+        scores=tuple(scores),
+        sampling_error_deg=source.sampling_error_deg,
+        differences_deg=largest_differences(tuple(runs)),
+        rests=rests,
+        initial=initial,
+        gyro_bias=bias,
+        references=references,
+        readings=source.readings,
+        findings=tuple(findings),
+        inputs=source.inputs + bias_input,
+    )
+
+
+# --- the log ----------------------------------------------------------------------------
+
+
+def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return the samples of a scenario and its exact attitude.
+
+    Parameters
+    ----------
+    spec : ScenarioSpec
+
+    Returns
+    -------
+    imu, truth : DataFrame
+        Imu and Attitude tables on the same stamps.
+
+    Raises
+    ------
+    ConfigError
+        The scenario, the rate or the sampling is unknown.
+    """
+    scenario = find_scenario(spec.name)
+    return simulate_gyro(
+        scenario.motion,
+        scenario.errors,
+        rate=spec.rate_hz,
+        sampling=spec.sampling,
+        seed=spec.seed,
+        source=spec.name,
+    )
+
+
+def read_options(spec: LogSpec) -> ReadOptions:
+    """Return what a specification says about reading its log."""
+    return ReadOptions(
+        columns=dict(spec.columns),
+        gyro_unit=spec.gyro_unit,
+        accel_unit=spec.accel_unit,
+        time_unit=spec.time_unit,
+        axes=spec.axes,
+        sampling=spec.sampling,
+        rate=spec.rate_hz,
+        repair=spec.repair,
+    )
+
+
+def _read(spec: AttitudeSpec) -> _Source:
+    if isinstance(spec.source, ScenarioSpec):
+        return _scenario(spec.source)
+    recording = read_log(spec.source.path, read_options(spec.source))
+    inputs = (InputFiles("log", Path(spec.source.path), recording.files),)
+    return _Source(
+        recording.name,
+        _describe(recording.imu, "recorded log"),
+        recording.imu,
+        recording.truth,
+        recording.scored,
+        recording.readings,
+        recording.findings,
+        inputs,
+        None,
+    )
+
+
+def _scenario(spec: ScenarioSpec) -> _Source:
+    scenario = find_scenario(spec.name)
+    imu, truth = simulate_scenario(spec)
+    clean, _ = simulate_gyro(
+        scenario.motion, GyroErrors(), rate=spec.rate_hz, sampling=spec.sampling
+    )
+    exact = run_attitude(Quaternion(), increments_from_imu(clean), truth[QUATERNION].to_numpy()[0])
+    lost = rotation.rotation_angle(
+        exact.attitude[QUATERNION].to_numpy()[-1], truth[QUATERNION].to_numpy()[-1]
+    )
+    return _Source(
+        spec.name,
+        _describe(imu, f"simulated: {scenario.title} (Alexiev 2021, {scenario.origin})"),
+        imu,
+        truth,
+        np.ones(len(truth), dtype=bool),
+        (),
+        (),
+        (),
+        float(lost),
+    )
+
+
+def _describe(imu: pd.DataFrame, what: str) -> str:
+    length = float(imu.index[-1] - imu.index[0])
+    rate = (len(imu) - 1) / length
+    kind = {
+        "instantaneous": "rates at the instant of each stamp",
+        "mean": "mean rates over the interval that ends at each stamp",
+    }[imu.attrs["sampling"]]
+    return f"{what}; {len(imu)} samples in {length:.4g} s, {rate:.4g} Hz on average; {kind}"
+
+
+def _with_truth(source: _Source, spec: AttitudeSpec) -> _Source:
+    if spec.truth_path is None:
+        return source
+    path = Path(spec.truth_path)
+    truth = read_truth(path)
+    inside = np.asarray(
+        (truth.index >= source.imu.index[0]) & (truth.index <= source.imu.index[-1])
+    )
+    if not inside.any():
+        raise DataError(
+            f"it runs from {truth.index[0]:.9g} to {truth.index[-1]:.9g} s, and the log from "
+            f"{source.imu.index[0]:.9g} to {source.imu.index[-1]:.9g} s",
+            file=path.name,
+            quantity="time",
+            remedy="bring both to one clock",
+        )
+    return replace(
+        source,
+        truth=truth[inside],
+        scored=np.ones(int(inside.sum()), dtype=bool),
+        inputs=(*source.inputs, InputFiles("truth", path, (path,))),
+    )
+
+
+def _window(imu: pd.DataFrame, from_s: float | None, to_s: float | None, name: str) -> pd.DataFrame:
+    start = imu.index[0] if from_s is None else from_s
+    end = imu.index[-1] if to_s is None else to_s
+    part = imu[(imu.index >= start) & (imu.index <= end)]
+    if len(part) < 2:
+        raise ConfigError(
+            f"{len(part)} samples lie between {start:.9g} and {end:.9g} s; the log runs from "
+            f"{imu.index[0]:.9g} to {imu.index[-1]:.9g} s",
+            file=name,
+            quantity="--from, --to",
+            remedy="choose a window within the log",
+        )
+    return part
+
+
+# --- bias and initial attitude ----------------------------------------------------------
+
+
+def _gyro_bias(
+    spec: AttitudeSpec, source: _Source, rests: tuple[RestStretch, ...]
+) -> tuple[dict[str, Any], tuple[InputFiles, ...]]:
+    if spec.gyro_bias_path is not None:
+        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        other = read_log(spec.gyro_bias_path, options)
+        found = find_rests(other.imu)
+        if not found:
+            raise DataError(
+                "no stationary stretch of a second or more was found in it",
+                file=other.name,
+                quantity="gyro bias",
+                remedy="give a log of the sensor lying still, or the bias itself",
+            )
+        longest = max(found, key=lambda r: r.end - r.start)
+        files = InputFiles("gyro-bias", Path(spec.gyro_bias_path), other.files)
+        return _bias_of(longest, f"{longest.end - longest.start:.4g} s of rest in {other.name}"), (
+            files,
+        )
+    if spec.gyro_bias == "none":
+        return {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
+    if spec.gyro_bias == "rest":
+        if not rests:
+            raise DataError(
+                "no stationary stretch of a second or more was found",
+                file=source.name,
+                quantity="gyro bias",
+                remedy="give the bias itself, as in --gyro-bias '4.5,0.1,1.1 deg/s', or a log of "
+                "the sensor lying still",
+            )
+        first = rests[0]
+        return _bias_of(first, f"mean over the rest {first.start:.4g}–{first.end:.4g} s"), ()
+    numbers, unit = _stated_bias(spec.gyro_bias)
+    bias = [v * GYRO_UNITS[unit] for v in numbers]
+    return {"rad_per_s": bias, "from": f"stated: {spec.gyro_bias}"}, ()
+
+
+def _bias_of(rest: RestStretch, where: str) -> dict[str, Any]:
+    return {"rad_per_s": list(rest.gyro_mean), "from": where}
+
+
+def _stated_bias(text: str) -> tuple[list[float], str]:
+    match = re.fullmatch(r"\s*([^,]+),([^,]+),([^,\s]+)\s*(.*?)\s*", text)
+    try:
+        if match is None:
+            raise ValueError
+        numbers = [float(match.group(k)) for k in (1, 2, 3)]
+    except ValueError:
+        raise ConfigError(
+            f"'{text}' is no bias",
+            quantity="--gyro-bias",
+            remedy="give none, rest, three numbers and a unit about the body's forward, right and "
+            "down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
+        ) from None
+    return numbers, parse_unit(match.group(4) or "rad/s", "gyro")
+
+
+def _initial(
+    text: str, source: _Source, rests: tuple[RestStretch, ...]
+) -> tuple[Array, dict[str, Any], float]:
+    """Attitude at the start of the run, in words, and where the run starts."""
+    start = float(source.imu.index[0])
+    at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None
+    choice = text.strip().lower()
+    if choice == "auto":
+        choice = "truth" if source.truth is not None else "level" if at_rest else "zero"
+        how = {
+            "truth": "from the truth",
+            "level": "levelled; heading zero, because nothing says what it is",
+            "zero": "zero, because none was given and the log does not begin at rest with an "
+            "accelerometer",
+        }[choice]
+    else:
+        how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}.get(
+            choice, "given"
+        )
+    if choice == "truth":
+        q_nb, begin = _first_truth(source, start)
+    elif choice == "level":
+        q_nb, begin = _levelled(source, rests, at_rest), start
+    elif choice == "zero":
+        q_nb, begin = np.array([1.0, 0.0, 0.0, 0.0]), start
+    else:
+        q_nb, begin = rotation.quaternion_from_euler(_three_angles(text)), start
+    roll, pitch, heading = (float(a) for a in rotation.euler_from_quaternion(q_nb))
+    words = {
+        "roll_deg": roll,
+        "pitch_deg": pitch,
+        "heading_deg": heading,
+        "time_s": begin,
+        "from": how,
+    }
+    return q_nb, words, begin
+
+
+def _first_truth(source: _Source, start: float) -> tuple[Array, float]:
+    if source.truth is None:
+        raise ConfigError(
+            "the log has no truth to take it from",
+            file=source.name,
+            quantity="--initial",
+            remedy="give --reference TRUTH.csv, or use level, zero or 'roll,pitch,heading'",
+        )
+    stamps = source.imu.index.to_numpy()
+    first = max(start, float(source.truth.index[0]))
+    begin = float(stamps[min(int(np.searchsorted(stamps, first)), len(stamps) - 1)])
+    return attitude_at(source.truth, [begin])[0], begin
+
+
+def _levelled(source: _Source, rests: tuple[RestStretch, ...], at_rest: bool) -> Array:
+    if not at_rest:
+        raise ConfigError(
+            "levelling needs an accelerometer and a log that begins at rest",
+            file=source.name,
+            quantity="--initial",
+            remedy="begin at a rest with --from, or give 'roll,pitch,heading' in deg",
+        )
+    assert rests[0].accel_mean is not None
+    roll, pitch = level(rests[0].accel_mean)
+    return rotation.quaternion_from_euler([roll, pitch, 0.0])
+
+
+def _three_angles(text: str) -> list[float]:
+    try:
+        angles = [float(part) for part in text.split(",")]
+    except ValueError:
+        angles = []
+    if len(angles) != 3 or not np.isfinite(angles).all():
+        raise ConfigError(
+            f"'{text}' is no attitude",
+            quantity="--initial",
+            remedy="use truth, level, zero, or roll,pitch,heading in degrees, as in 0,0,90",
+        )
+    return angles
+
+
+# --- judging ----------------------------------------------------------------------------
+
+
+def _truth_score(run: AttitudeRun, source: _Source) -> list[Score]:
+    if source.truth is None or source.scored is None:
+        return []
+    errors = error_angles(run.attitude, source.truth[source.scored])
+    if errors.empty:
+        return []
+    return [
+        Score(
+            algorithm=run.algorithm,
+            against="truth",
+            time=float(errors.index[-1]),
+            error_deg=float(errors.iloc[-1]),
+            rms_deg=float(np.sqrt((errors**2).mean())),
+            max_deg=float(errors.max()),
+        )
+    ]
+
+
+def _judge(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
+    findings = []
+    for run in runs:
+        near = run.diagnostics.get("closest_to_pole_deg", 90.0)
+        if near < NEAR_POLE:
+            findings.append(
+                Finding(
+                    f"came within {near:.3g}° of ±90° pitch at "
+                    f"{run.diagnostics['closest_to_pole_time_s']:.6g} s, where its equations "
+                    "divide by zero; what it says from there on is not to be trusted",
+                    quantity=run.algorithm,
+                    remedy="use dcm or quaternion, which have no such place",
+                )
+            )
+    turn = np.sqrt((increments[["theta_x", "theta_y", "theta_z"]].to_numpy() ** 2).sum(axis=1))
+    largest = int(turn.argmax())
+    if turn[largest] > LARGE_STEP:
+        findings.append(
+            Finding(
+                f"a single step turns by {np.degrees(turn[largest]):.3g}° (at "
+                f"{increments.index[largest]:.6g} s): the rate says little of what happened "
+                "within it",
+                quantity="gyro",
+                remedy="use a higher rate",
+            )
+        )
+    return findings
