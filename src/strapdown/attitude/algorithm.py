@@ -50,6 +50,14 @@ class AttitudeAlgorithm(ABC):
     def quaternions(self, history: Array) -> Array:
         """Return unit quaternions ``q_nb``, (n, 4), of `width` numbers a row."""
 
+    @property
+    @abstractmethod
+    def accuracy_order(self) -> int:
+        """Power of the step with which the attitude error falls on general motion.
+
+        For rates sampled at the stamps and exact increments alike; 0 where no rate helps.
+        """
+
     @abstractmethod
     def kernel_options(self) -> tuple[float, ...]:
         """Return the options as numbers, at most two, as the kernels take them."""

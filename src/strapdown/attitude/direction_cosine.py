@@ -61,13 +61,19 @@ class DirectionCosine(AttitudeAlgorithm):
 
     def quaternions(self, history: Array) -> Array:
         """Read the matrices as rotations; those that have lost orthogonality, as the nearest."""
+        rows = history
         if self.order:
-            from scipy.spatial.transform import Rotation
-
-            return rotation.from_scipy(Rotation.from_matrix(history.reshape(-1, 3, 3)))
-        q = np.empty((len(history), 4))
-        kernel_rotation.quats_from_dcms(np.ascontiguousarray(history), q)
+            # The nearest rotation in Frobenius norm; a truncated series is none itself.
+            left, _, right = np.linalg.svd(history.reshape(-1, 3, 3))
+            rows = (left @ right).reshape(-1, 9)
+        q = np.empty((len(rows), 4))
+        kernel_rotation.quats_from_dcms(np.ascontiguousarray(rows), q)
         return q
+
+    @property
+    def accuracy_order(self) -> int:
+        """Two, whatever the order of the series: what it stretches, it does not turn."""
+        return 2
 
     def kernel_options(self) -> tuple[float, ...]:
         """Return the order and the steps between re-orthogonalisations."""

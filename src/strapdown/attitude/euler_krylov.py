@@ -56,6 +56,11 @@ class EulerKrylov(AttitudeAlgorithm):
         kernel_rotation.quats_from_eulers(np.ascontiguousarray(history), q)
         return q
 
+    @property
+    def accuracy_order(self) -> int:
+        """One for the forward step; two for Runge-Kutta's, which the linear rate limits."""
+        return 2 if self.step == "rk4" else 1
+
     def kernel_options(self) -> tuple[float, ...]:
         """Return whether the step is Runge-Kutta's."""
         return (float(self.step == "rk4"),)

@@ -39,6 +39,11 @@ class Naive(AttitudeAlgorithm):
         kernel_rotation.quats_from_eulers(np.ascontiguousarray(history), q)
         return q
 
+    @property
+    def accuracy_order(self) -> int:
+        """Zero: the error is of commutation, and not of the step."""
+        return 0
+
     def kernel_options(self) -> tuple[float, ...]:
         """Return nothing: there are no options."""
         return ()

@@ -63,6 +63,11 @@ class Quaternion(AttitudeAlgorithm):
             )
         return np.asarray(history / norm)
 
+    @property
+    def accuracy_order(self) -> int:
+        """Two, whatever the order of the series: 2 atan(r/2) is r to that order already."""
+        return 2
+
     def kernel_options(self) -> tuple[float, ...]:
         """Return the order and whether to normalise."""
         return (int(self.order), bool(self.normalise))

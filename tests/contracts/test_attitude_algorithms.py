@@ -1,0 +1,223 @@
+"""What every attitude algorithm promises, held for every entry of the table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown import rotation
+from strapdown.attitude import ALGORITHMS, AttitudeTracker, make_algorithm, run_attitude
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.increments import increments_from_imu
+from strapdown.tables import QUATERNION, imu_table, increments_table
+
+VARIANTS = [
+    "naive",
+    "euler",
+    "euler:step=rk4",
+    "dcm",
+    "dcm:order=1",
+    "dcm:order=3,orthogonalise_every=7",
+    "dcm:orthogonalise_every=1",
+    "quaternion",
+    "quaternion:order=1",
+    "quaternion:order=3,normalise=false",
+    "quaternion:normalise=false",
+]
+START = rotation.quaternion_from_euler([20.0, -35.0, 250.0])
+
+
+def test_the_variants_cover_the_table():
+    assert {v.partition(":")[0] for v in VARIANTS} == set(ALGORITHMS)
+
+
+def shaken_log(sampling: str, samples: int = 400):
+    """Irregular in time, bursts and pauses among it, and never twice about the same axis."""
+    rng = np.random.default_rng(5)
+    time = np.cumsum(rng.choice([0.001, 0.004, 0.01, 0.08], samples)) + 17.0
+    return imu_table(time, rng.normal(0.0, 2.0, (samples, 3)), sampling=sampling)
+
+
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_sample_by_sample_gives_the_bits_of_the_batch(variant, sampling):
+    algorithm, log = make_algorithm(variant), shaken_log(sampling)
+    batch = run_attitude(algorithm, increments_from_imu(log), START)
+    tracker = AttitudeTracker(algorithm, START, sampling)
+    found = []
+    for time, rate in zip(log.index, log.to_numpy(), strict=True):
+        tracker.update(time, rate)
+        found.append(tracker.quaternion)
+    assert np.array_equal(batch.attitude[QUATERNION].to_numpy(), np.array(found))
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_run_cut_anywhere_and_continued_gives_the_same_bits(variant):
+    algorithm, increments = make_algorithm(variant), increments_from_imu(shaken_log("mean"))
+    whole_state, whole = algorithm.advance(algorithm.begin(START), increments)
+    state, parts, at = algorithm.begin(START), [], 0
+    for length in (1, 1, 2, 57, 0, 100, 1, len(increments)):
+        state, part = algorithm.advance(state, increments.iloc[at : at + length])
+        parts.append(part)
+        at += length
+    assert np.array_equal(np.vstack(parts), whole)
+    assert np.array_equal(state, whole_state)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_advance_leaves_its_inputs_alone(variant):
+    algorithm, increments = make_algorithm(variant), increments_from_imu(shaken_log("mean"))
+    state, table = algorithm.begin(START), increments.copy()
+    before = state.copy()
+    algorithm.advance(state, increments)
+    assert np.array_equal(state, before)
+    assert increments.equals(table)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_it_starts_where_it_is_told_and_stays_there_at_rest(variant):
+    time = np.array([3.0, 3.5, 9.0])
+    run = run_attitude(
+        make_algorithm(variant), increments_from_imu(imu_table(time, np.zeros((3, 3)))), START
+    )
+    assert np.array_equal(run.attitude.index, time)
+    angles = rotation.rotation_angle(run.attitude[QUATERNION].to_numpy(), START)
+    assert angles.max() < 1e-13  # a handful of roundings of 1e-16 rad = 6e-15 deg each
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_turn_about_one_axis_from_level(variant, axis):
+    """The angle of each step is known in closed form, truncated series included."""
+    algorithm = make_algorithm(variant)
+    steps, turn = 40, 0.03
+    theta = np.zeros((steps, 3))
+    theta[:, axis] = turn
+    run = run_attitude(
+        algorithm, increments_table(np.arange(1, steps + 1) * 0.01, np.full(steps, 0.01), theta)
+    )
+    about = np.zeros(3)
+    about[axis] = steps * angle_of_a_step(variant, turn)
+    exact = rotation.quaternion_from_rotation_vector(about)
+    error = rotation.rotation_angle(run.attitude[QUATERNION].to_numpy()[-1], exact)
+    assert error < steps * 4e-14  # deg: a few roundings of 1.1e-16 rad in each step
+
+
+def angle_of_a_step(variant: str, turn: float) -> float:
+    """2 atan of the quaternion's series, atan of the matrix's; else the turn itself."""
+    if "order=1" in variant:
+        return 2 * np.arctan2(turn / 2, 1.0) if "quat" in variant else np.arctan2(turn, 1.0)
+    if "order=3" in variant:
+        if "quat" in variant:
+            return 2 * np.arctan2(turn / 2 - turn**3 / 48, 1 - turn**2 / 8)
+        return np.arctan2(turn - turn**3 / 6, 1 - turn**2 / 2)
+    return turn
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_bad_sample_is_refused_and_changes_nothing(variant):
+    tracker = AttitudeTracker(make_algorithm(variant), START)
+    tracker.update(1.0, np.array([0.1, 0.2, 0.3]))
+    tracker.update(1.1, np.array([0.1, 0.2, 0.3]))
+    before = tracker.quaternion
+    bad = [
+        (1.1, [0.1, 0.2, 0.3], "time does not advance"),
+        (0.5, [0.1, 0.2, 0.3], "time does not advance"),
+        (np.nan, [0.1, 0.2, 0.3], "three finite rates"),
+        (1.2, [np.nan, 0.2, 0.3], "three finite rates"),
+        (1.2, [0.1, np.inf, 0.3], "three finite rates"),
+        (1.2, [0.1, 0.2], "three finite rates"),
+    ]
+    for time, rate, message in bad:
+        with pytest.raises(DataError, match=message):
+            tracker.update(time, rate)
+        assert np.array_equal(tracker.quaternion, before)
+    tracker.update(1.2, [0.1, 0.2, 0.3])  # and it goes on
+    assert not np.array_equal(tracker.quaternion, before)
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_label_makes_the_same_algorithm_again(variant):
+    algorithm = make_algorithm(variant)
+    assert make_algorithm(algorithm.label) == algorithm
+
+
+# --- order of accuracy ------------------------------------------------------------------
+
+
+def smooth_motion(time):
+    """Roll, pitch, heading as smooth functions, and the body rates that give them exactly."""
+    t = np.asarray(time)
+    roll, roll_dot = 0.5 * np.sin(1.3 * t), 0.65 * np.cos(1.3 * t)
+    pitch, pitch_dot = 0.4 * np.sin(0.9 * t + 0.4), 0.36 * np.cos(0.9 * t + 0.4)
+    heading, heading_dot = 0.7 * t + 0.3 * np.cos(1.7 * t), 0.7 - 0.51 * np.sin(1.7 * t)
+    rates = np.column_stack(
+        [
+            roll_dot - heading_dot * np.sin(pitch),
+            pitch_dot * np.cos(roll) + heading_dot * np.cos(pitch) * np.sin(roll),
+            -pitch_dot * np.sin(roll) + heading_dot * np.cos(pitch) * np.cos(roll),
+        ]
+    )
+    return np.degrees(np.column_stack([roll, pitch, heading])), rates
+
+
+def exact_increments(time):
+    """Integral of the rate over each step by Gauss-Legendre with ten points: to rounding."""
+    nodes, weights = np.polynomial.legendre.leggauss(10)
+    dt = np.diff(time)
+    theta = np.zeros((len(dt), 3))
+    for node, weight in zip(nodes, weights, strict=True):
+        theta += weight * smooth_motion(time[:-1] + 0.5 * dt * (node + 1.0))[1]
+    return increments_table(time[1:], dt, theta * 0.5 * dt[:, None])
+
+
+@pytest.mark.parametrize("source", ["rates", "increments"])
+@pytest.mark.parametrize(
+    "variant",
+    ["naive", "euler", "euler:step=rk4", "dcm", "dcm:order=1", "quaternion:order=1", "quaternion"],
+)
+def test_the_order_of_accuracy_that_it_declares(variant, source):
+    algorithm = make_algorithm(variant)
+    rates = np.array([50, 100, 200, 400])
+    errors = []
+    for rate in rates:
+        time = np.arange(4 * rate + 1) / rate
+        euler, gyro = smooth_motion(time)
+        increments = (
+            increments_from_imu(imu_table(time, gyro))
+            if source == "rates"
+            else exact_increments(time)
+        )
+        start = rotation.quaternion_from_euler(euler[0])
+        run = run_attitude(algorithm, increments, start)
+        errors.append(
+            rotation.rotation_angle(
+                run.attitude[QUATERNION].to_numpy()[-1], rotation.quaternion_from_euler(euler[-1])
+            )
+        )
+    slope = -np.polyfit(np.log(rates), np.log(errors), 1)[0]
+    # Between whole orders lies 1; the next term of the error moves the fit by its share, which
+    # is under a tenth at these steps.
+    assert slope == pytest.approx(algorithm.accuracy_order, abs=0.1)
+
+
+# --- words ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("quaternoin", "did you mean 'quaternion'"),
+        ("dcm:ordr=3", "did you mean 'order'"),
+        ("dcm:order=x", "not a whole number"),
+        ("dcm:order=99", "out of range"),
+        ("dcm:orthogonalise_every=-1", "negative"),
+        ("quaternion:order=-1", "out of range"),
+        ("quaternion:normalise=maybe", "not true or false"),
+        ("euler:step=heun", "no step"),
+        ("naive:order=2", "has no options"),
+    ],
+)
+def test_what_is_not_understood_is_named(text, message):
+    with pytest.raises(ConfigError, match=message):
+        make_algorithm(text)
