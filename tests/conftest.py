@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import os
+import sys
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -22,3 +26,35 @@ def recordings():
         return path
 
     return find
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a command printed and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture(scope="session")
+def run_cli():
+    """A function that runs the command line in this process, as `strapdown` itself would."""
+
+    def run(*arguments: object) -> Result:
+        from strapdown.cli import main
+
+        out, err = io.StringIO(), io.StringIO()
+        before = sys.argv
+        sys.argv = ["strapdown", *(str(a) for a in arguments)]
+        code = 0
+        try:
+            with redirect_stdout(out), redirect_stderr(err):
+                main.run()
+        except SystemExit as end:
+            code = int(end.code or 0)
+        finally:
+            sys.argv = before
+        return Result(code, out.getvalue(), err.getvalue())
+
+    return run

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
-from strapdown.formats.columns import TRIADS, read_name
+from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog
 
-AXES = "xyz"
 RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
 # What a small file may unfold to; a longer log is honest about its size.
 LARGEST_RATIO = 1000
@@ -71,7 +70,6 @@ def raw_log(
         There is no numeric array of two samples or more.
     """
     columns: dict[str, NDArray[Any]] = {}
-    stated: dict[str, tuple[str, str]] = {}
     for name, array in arrays.items():
         columns |= _columns(name, np.squeeze(array))
     lengths = [c.size for c in columns.values()]
@@ -83,19 +81,11 @@ def raw_log(
         )
     samples = _samples(columns, lengths)
     columns = {n: c for n, c in columns.items() if c.size == samples}
-    for name in columns:
-        base, _, index = name.partition("[")
-        said = read_name(base)
-        unit = units.get(base) or said.unit or ""
-        if index and said.quantity in TRIADS and index[0] in "012":
-            stated[name] = (f"{said.quantity}_{AXES[int(index[0])]}", unit)
-        elif said.quantity and said.quantity not in TRIADS:
-            stated[name] = (said.quantity, unit)
     return RawLog(
         name=path.name,
         files=(path,),
         columns=columns,
-        stated={n: (q, u) for n, (q, u) in stated.items()},
+        units={n: units[b] for n in columns if (b := n.partition("[")[0]) in units},
         rate=_rate(meta),
         sampling=_text(meta.get("sampling")),
         axes="x,y,z" if _text(meta.get("axes")) == "forward-right-down" else None,
@@ -117,7 +107,7 @@ def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
 def _samples(columns: dict[str, NDArray[Any]], lengths: list[int]) -> int:
     """Length of the gyro's arrays, or else the most common length."""
     for name, column in columns.items():
-        if str(read_name(name.partition("[")[0]).quantity).startswith("gyro"):
+        if str(read_name(name).quantity).startswith("gyro"):
             return int(column.size)
     return max(set(lengths), key=lengths.count)
 

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
-from strapdown.formats.columns import EULERS, QUATERNIONS, TRIADS, parse_axes, parse_unit, read_name
+from strapdown.formats.columns import (
+    EULERS,
+    QUATERNIONS,
+    TRIADS,
+    UNIT_OF,
+    parse_axes,
+    parse_unit,
+    read_name,
+)
 from strapdown.formats.recording import RawLog, ReadOptions, Recording
 from strapdown.formats.stamps import Stamps, read_stamps
 from strapdown.results import Reading
@@ -21,6 +29,12 @@ from strapdown.tables import SAMPLINGS, attitude_table, find_gaps, imu_table
 Array = NDArray[np.float64]
 AXES = "xyz"
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS}
+
+# No gyro in a phone, a toy, a car or an aircraft reads this; a unit that is wrong does.
+ABSURD_RATE = 100.0  # rad/s, 16 turns a second
+# Full scales that gyros are made with, deg/s. A run of equal readings at one of them was cut off.
+FULL_SCALES = (125.0, 250.0, 400.0, 450.0, 500.0, 1000.0, 2000.0, 4000.0)
+CUT_OFF_RUN = 3  # samples
 
 # A gap this long holds a motion that nothing tells of.
 LONG_GAP = 1.0  # s
@@ -95,6 +109,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         )
     sampling = _sampling(raw, options, findings)
     _report_gaps(raw, time, columns["gyro"], findings)
+    _report_absurd(raw, columns["gyro"], findings)
     imu = imu_table(time, columns["gyro"], columns.get("accel"), sampling=sampling, source=raw.name)
     truth, scored = _truth(raw, found, time, keep, (axis, sign), readings)
     return Recording(raw.name, raw.files, imu, truth, scored, tuple(readings), tuple(findings))
@@ -112,7 +127,7 @@ def _find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     for quantity, source in options.columns.items():
         for q, name in _asked(raw, quantity, source):
             stated = found[q].unit if q in found and found[q].source == name else None
-            found[q] = Column(name, read_name(name).unit or stated, "stated by --columns")
+            found[q] = Column(name, _unit_of(raw, name) or stated, "stated by --columns")
     return found
 
 
@@ -136,8 +151,14 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
                 quantity=quantity,
                 remedy=f"choose one with --columns {quantity}={names[0]}",
             )
-        found[quantity] = Column(names[0], read_name(names[0]).unit, "by its name")
+        found[quantity] = Column(names[0], _unit_of(raw, names[0]), "by its name")
     return found
+
+
+def _unit_of(raw: RawLog, column: str) -> str | None:
+    if column in raw.units:
+        return UNIT_OF.get(raw.units[column].strip().lower())
+    return read_name(column).unit
 
 
 def _members(quantity: str) -> list[str]:
@@ -185,8 +206,9 @@ def _numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
     values = raw.columns[column.source]
     if values.dtype.kind in "iufb":
         return values
-    numbers = pd.to_numeric(pd.Series(values), errors="coerce").to_numpy(dtype=np.float64)
-    bad = np.flatnonzero(np.isnan(numbers) & ~pd.isna(values))
+    texts = pd.Series(values)
+    numbers = pd.to_numeric(texts, errors="coerce").to_numpy(dtype=np.float64)
+    bad = np.flatnonzero(np.isnan(numbers) & texts.notna().to_numpy())
     if bad.size:
         raise DataError(
             f"'{values[bad[0]]}' is not a number (column '{column.source}')",
@@ -397,6 +419,42 @@ def _report_gaps(raw: RawLog, time: Array, gyro: Array, findings: list[Finding])
     if worst.length >= LONG_GAP:
         remedy = "split the log there, or put a reference point on each side of it"
     findings.append(Finding(what, file=raw.name, quantity="time", remedy=remedy))
+
+
+def _report_absurd(raw: RawLog, gyro: Array, findings: list[Finding]) -> None:
+    """Say where a rate is more than can be, or is cut off at the sensor's full scale."""
+    largest = np.abs(gyro).max(axis=0)
+    k = int(largest.argmax())
+    if largest[k] > ABSURD_RATE:
+        row = int(np.abs(gyro[:, k]).argmax())
+        findings.append(
+            Finding(
+                f"{gyro[row, k]:.4g} rad/s is {largest[k] / (2 * np.pi):.3g} turns a second",
+                file=raw.name,
+                row=raw.first_row + row,
+                quantity=f"gyro_{AXES[k]}",
+                remedy="if the sensor was not spun like that, the unit is another: --gyro-unit",
+            )
+        )
+    for k in range(3):
+        reading = float(np.degrees(largest[k]))
+        # A 16-bit reading ends one step short of the full scale.
+        scale = next((s for s in FULL_SCALES if s * (1 - 1e-3) <= reading <= s * 1.0001), None)
+        if scale is None:
+            continue
+        full = np.abs(gyro[:, k]) == largest[k]
+        run = np.convolve(full, np.ones(CUT_OFF_RUN), mode="valid") == CUT_OFF_RUN
+        if run.any():
+            findings.append(
+                Finding(
+                    f"{int(full.sum())} samples stand at {reading:.6g} deg/s, a full scale: the "
+                    "rate was cut off there, and what it was beyond is not known",
+                    file=raw.name,
+                    row=raw.first_row + int(run.argmax()),
+                    quantity=f"gyro_{AXES[k]}",
+                    remedy="use a larger range of the gyro; do not trust the attitude from there",
+                )
+            )
 
 
 # --- truth that came with the log -------------------------------------------------------

@@ -96,6 +96,8 @@ _SPELLINGS = {
     "rad": "rad radian radians",
 }
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
+_INDEXED = re.compile(r".*\[\d+\]")
+_AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
 
@@ -121,14 +123,18 @@ def read_name(name: str) -> ColumnName:
     Parameters
     ----------
     name : str
-        As ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``.
+        As ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``; or
+        ``gyro[0]``, the first of an array of three.
 
     Returns
     -------
     ColumnName
         With None for what the name does not say.
     """
-    text = name.strip()
+    text, _, index = (
+        name.strip().partition("[") if _INDEXED.fullmatch(name.strip()) else (name, "", "")
+    )
+    text = text.strip()
     bracket = _BRACKETS.search(text)
     unit = UNIT_OF.get(bracket.group(1).lower().replace(" ", "")) if bracket else None
     if bracket:
@@ -136,7 +142,10 @@ def read_name(name: str) -> ColumnName:
     words = [w for w in re.split(r"[\s_\-./:]+", text.lower()) if w]
     if unit is None:
         words, unit = _split_unit(words)
-    return ColumnName(_quantity("".join(words)), unit)
+    quantity = _quantity("".join(words))
+    if quantity in TRIADS and index[:1] in _AXES_BY_INDEX:
+        quantity = f"{quantity}_{_AXES_BY_INDEX[index[0]]}"
+    return ColumnName(quantity, unit)
 
 
 def _split_unit(words: list[str]) -> tuple[list[str], str | None]:

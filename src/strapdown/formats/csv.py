@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats.recording import RawLog
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%")
+Columns = list[NDArray[Any]]
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|nan|[+-]?inf(inity)?", re.I)
 
 
@@ -77,7 +77,7 @@ def read(path: Path) -> RawLog:
     names = [f.strip().strip('"') for f in fields] if header else _numbered(len(fields))
     findings = _drop_cut_line(lines, first, len(names), separator, path.name)
     _check_widths(lines, first, len(names), separator, path.name)
-    table = _parse(lines, first, names, separator)
+    columns = _parse(lines, first, len(names), separator)
     meta: dict[str, str] = {}
     for line in lines[:comments]:
         if match := re.match(r"[#%]\s*(\w+)\s*:\s*(.+?)\s*$", line):
@@ -85,7 +85,7 @@ def read(path: Path) -> RawLog:
     return RawLog(
         name=path.name,
         files=(path,),
-        columns={name: table[k].to_numpy() for k, name in enumerate(_unique(names))},
+        columns=dict(zip(_unique(names), columns, strict=True)),
         first_row=first + 1,
         sampling=meta.get("sampling"),
         axes="x,y,z" if meta.get("axes") == "forward-right-down" else None,
@@ -161,28 +161,43 @@ def _check_widths(
             )
 
 
-def _parse(lines: list[str], first: int, names: list[str], separator: str | None) -> pd.DataFrame:
+def _parse(lines: list[str], first: int, count: int, separator: str | None) -> Columns:
+    """Parse the lines under the header, each number to the double nearest to it."""
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
     body = lines[first:]
-    decimal = "," if separator in (";", "\t", None) and any("," in s for s in body[:5]) else "."
-    options: dict[str, Any] = {"sep": separator} if separator else {"sep": r"\s+"}
-    table: pd.DataFrame = pd.read_csv(
-        io.StringIO("\n".join(body)),
-        header=None,
-        names=list(range(len(names))),
-        index_col=False,
-        decimal=decimal,
-        skip_blank_lines=False,
-        skipinitialspace=True,
-        float_precision="round_trip",
-        low_memory=False,
-        na_values=["nan", "NaN", "NAN", ""],
-        keep_default_na=False,
-        **options,
+    decimal = "," if separator != "," and any("," in line for line in body[:5]) else "."
+    if separator is None:
+        body = ["\t".join(line.split()) for line in body]
+    table = pa_csv.read_csv(
+        pa.BufferReader("\n".join(body).encode()),
+        read_options=pa_csv.ReadOptions(
+            column_names=[str(k) for k in range(count)], use_threads=False
+        ),
+        parse_options=pa_csv.ParseOptions(delimiter=separator or "\t", ignore_empty_lines=False),
+        convert_options=pa_csv.ConvertOptions(
+            decimal_point=decimal,
+            null_values=["", "nan", "NaN", "NAN", "-nan"],
+            strings_can_be_null=True,
+            timestamp_parsers=[],
+        ),
     )
-    return table
+    return [_array(table.column(k)) for k in range(count)]
 
 
-def write(path: Path, columns: dict[str, np.ndarray[Any, Any]], comments: dict[str, str]) -> None:
+def _array(column: Any) -> NDArray[Any]:
+    """Numbers as numbers, with NaN for what is missing; anything else as text."""
+    kind = str(column.type)
+    if kind in ("int64", "double"):
+        values: NDArray[Any] = column.to_numpy()
+        return values
+    if kind == "null":
+        return np.full(len(column), np.nan)
+    return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
+
+
+def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:
     """Write columns as text, each number in the fewest digits that give it back exactly.
 
     Parameters

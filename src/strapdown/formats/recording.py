@@ -81,7 +81,9 @@ class RawLog:
     first_row : int
         Row of the file in which the first sample stands, counted from 1.
     stated : dict of str to (str, str)
-        For a known recording or a file of our own: column to (quantity, unit).
+        For a known recording: column to (quantity, unit).
+    units : dict of str to str
+        Column to unit, where the file states it apart from the name.
     rate : float or None
         Sampling rate in Hz, where the file states it apart from stamps.
     sampling, axes : str or None
@@ -95,6 +97,7 @@ class RawLog:
     columns: dict[str, NDArray[Any]]
     first_row: int = 1
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
     sampling: str | None = None
     axes: str | None = None

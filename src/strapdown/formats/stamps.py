@@ -174,7 +174,8 @@ def _repaired(
     if dropped := int((~keep).sum()):
         findings.append(
             Finding(
-                f"{dropped} rows dropped, whose stamps are not later than every one before",
+                f"{dropped} row{'s' if dropped > 1 else ''} left out, whose stamp is not later "
+                "than every one before",
                 file=file,
                 quantity="time",
             )

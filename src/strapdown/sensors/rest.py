@@ -22,7 +22,7 @@ QUIET_QUANTILE = 0.05
 QUIET_FACTOR = 3.0
 # What no consumer sensor exceeds at rest, and every hand does: so that a log that is never at
 # rest does not have its least busy moment taken for one.
-MAX_GYRO_SD = 0.02  # rad/s, of the three axes together
+MAX_GYRO_SD = 0.03  # rad/s, of the three axes together
 MAX_ACCEL_SD = 0.3  # m/s²
 MAX_MEAN_RATE = 0.2  # rad/s: the turn-on bias of a cheap gyro is under 20 deg/s = 0.35 rad/s at
 # its data sheet's limit, and a few deg/s in use

@@ -28,7 +28,7 @@ from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeBench, AttitudeRun, InputFiles, Reading, RestStretch, Score
 from strapdown.sensors.rest import find_rests
 from strapdown.simulation import SCENARIOS, GyroErrors, find_scenario, simulate_gyro
-from strapdown.tables import GYRO, QUATERNION
+from strapdown.tables import GYRO, QUATERNION, THETA
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -609,7 +609,9 @@ def _judge(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
                     remedy="use dcm or quaternion, which have no such place",
                 )
             )
-    turn = np.sqrt((increments[["theta_x", "theta_y", "theta_z"]].to_numpy() ** 2).sum(axis=1))
+    turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))
+    # Gaps have been reported when the log was read.
+    turn[increments["dt"].to_numpy() > 3.0 * float(increments["dt"].quantile(0.95))] = 0.0
     largest = int(turn.argmax())
     if turn[largest] > LARGE_STEP:
         findings.append(

@@ -1,0 +1,272 @@
+"""Bad input: how to make it, and what is said about it. The manual's page is made of this."""
+
+from __future__ import annotations
+
+import io
+import struct
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+HEADER = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"
+
+
+def rows(count: int = 50, step: float = 0.01, start: float = 0.0) -> list[str]:
+    return [f"{start + k * step:.6f},0.1,-0.2,{0.01 * k:.3f}" for k in range(count)]
+
+
+def text(path: Path, lines: list[str], header: str | None = HEADER, end: str = "\n") -> Path:
+    path.write_text("\n".join(([header] if header else []) + lines) + end, encoding="utf-8")
+    return path
+
+
+def with_row(number: int, row: str) -> Callable[[Path], Path]:
+    """A log whose data row `number`, counted from 0, is replaced."""
+
+    def make(folder: Path) -> Path:
+        lines = rows()
+        lines[number] = row
+        return text(folder / "log.csv", lines)
+
+    return make
+
+
+def stamps(values: list[str], header: str = HEADER) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        return text(folder / "log.csv", [f"{v},0.1,-0.2,0.3" for v in values], header)
+
+    return make
+
+
+def wrapped(folder: Path) -> Path:
+    ticks = [(4294960000 + 10000 * k) % 2**32 for k in range(40)]
+    return stamps([str(t) for t in ticks], HEADER.replace("time_s", "time_us"))(folder)
+
+
+def empty(folder: Path) -> Path:
+    (folder / "log.csv").write_bytes(b"")
+    return folder / "log.csv"
+
+
+def empty_mat(folder: Path) -> Path:
+    (folder / "log.mat").write_bytes(b"")
+    return folder / "log.mat"
+
+
+def unknown_folder(folder: Path) -> Path:
+    (folder / "recording").mkdir()
+    (folder / "recording" / "notes.txt").write_text("hello")
+    return folder / "recording"
+
+
+def _npy(shape: tuple[int, ...], data: bytes) -> bytes:
+    stream = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        stream, {"descr": "<f8", "fortran_order": False, "shape": shape}
+    )
+    return stream.getvalue() + data
+
+
+def lying_header(folder: Path) -> Path:
+    """The array's own header claims eight terabytes."""
+    with zipfile.ZipFile(folder / "log.npz", "w") as archive:
+        archive.writestr("time_s.npy", _npy((10,), bytes(80)))
+        archive.writestr("gyro_rad_s.npy", _npy((333_333_333_333, 3), bytes(240)))
+    return folder / "log.npz"
+
+
+def lying_directory(folder: Path) -> Path:
+    """The archive's directory claims less than unfolds: zeros without end, if one lets them."""
+    path = folder / "log.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("gyro_rad_s.npy", _npy((100_000, 3), bytes(2_400_000)))
+    data = bytearray(path.read_bytes())
+    entry = data.rfind(b"PK\x01\x02")
+    data[entry + 24 : entry + 28] = struct.pack("<I", 2_000)
+    path.write_bytes(bytes(data))
+    return path
+
+
+def bomb(folder: Path) -> Path:
+    """A few kilobytes that honestly say they unfold to gigabytes of zeros."""
+    path = folder / "log.npz"
+    with (
+        zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive,
+        archive.open("gyro_rad_s.npy", "w", force_zip64=True) as member,
+    ):
+        member.write(_npy((3_000_000, 3), b""))
+        for _ in range(72):
+            member.write(bytes(1_000_000))
+    return path
+
+
+def cut_archive(folder: Path) -> Path:
+    whole = folder / "whole.npz"
+    np.savez(whole, time_s=np.arange(9.0), gyro_rad_s=np.ones((9, 3)))
+    (folder / "log.npz").write_bytes(whole.read_bytes()[:-40])
+    return folder / "log.npz"
+
+
+def pickled(folder: Path) -> Path:
+    np.savez(folder / "log.npz", gyro_rad_s=np.array([{"run": "me"}, None], dtype=object))
+    return folder / "log.npz"
+
+
+def no_matlab(folder: Path) -> Path:
+    (folder / "log.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
+    return folder / "log.mat"
+
+
+def no_hdf5(folder: Path) -> Path:
+    (folder / "log.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(300))
+    return folder / "log.h5"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One bad input.
+
+    `fails` is False where the log is used all the same and a note says what was done.
+    """
+
+    title: str
+    make: Callable[[Path], Path]
+    options: tuple[str, ...] = ()
+    fails: bool = True
+
+
+CASES = [
+    Case("An empty file", empty),
+    Case("An empty binary file", empty_mat),
+    Case("A header, and nothing under it", lambda f: text(f / "log.csv", [])),
+    Case(
+        "A last line that was cut",
+        lambda f: text(f / "log.csv", [*rows(), "0.500000,0.1"], end=""),
+        fails=False,
+    ),
+    Case("A line with too many fields", with_row(7, "0.07,0.1,-0.2,0.3,0.4")),
+    Case("Text in a column of numbers", with_row(7, "0.07,0.1,n/a,0.3")),
+    Case("NaN", with_row(7, "0.07,0.1,nan,0.3")),
+    Case("An empty field", with_row(7, "0.07,0.1,,0.3")),
+    Case("Infinity", with_row(7, "0.07,0.1,inf,0.3")),
+    Case("NaN, with --repair", with_row(7, "0.07,0.1,nan,0.3"), ("--repair",), False),
+    Case("A stamp twice", with_row(7, "0.06,0.1,-0.2,0.3")),
+    Case("A stamp twice, with --repair", with_row(7, "0.06,0.1,-0.2,0.3"), ("--repair",), False),
+    Case("Time going back", with_row(7, "0.01,0.1,-0.2,0.3")),
+    Case("A clock that wrapped", wrapped),
+    Case("A clock that wrapped, with --repair", wrapped, ("--repair",), False),
+    Case(
+        "Milliseconds that do not say so",
+        stamps([str(10 * k) for k in range(50)], HEADER.replace("time_s", "time")),
+    ),
+    Case(
+        "Nanoseconds since 1970 that do not say so",
+        stamps(
+            [str(1_700_000_000_000_000_000 + 10_000_000 * k) for k in range(50)],
+            HEADER.replace("time_s", "time"),
+        ),
+    ),
+    Case(
+        "Nanoseconds since 1970, with --time-unit ns",
+        stamps(
+            [str(1_700_000_000_000_000_000 + 10_000_000 * k) for k in range(50)],
+            HEADER.replace("time_s", "time"),
+        ),
+        ("--time-unit", "ns"),
+        False,
+    ),
+    Case(
+        "A gap of seconds",
+        lambda f: text(f / "log.csv", rows(100) + rows(100, start=4.0)),
+        fails=False,
+    ),
+    Case("A log of one sample", lambda f: text(f / "log.csv", rows(1))),
+    Case(
+        "No unit of the rate",
+        lambda f: text(f / "log.csv", rows(), "time_s,gx,gy,gz"),
+    ),
+    Case(
+        "A unit that is none",
+        lambda f: text(f / "log.csv", rows(), "time_s,gx,gy,gz"),
+        ("--gyro-unit", "rpm"),
+    ),
+    Case(
+        "Degrees that were called radians",
+        lambda f: text(f / "log.csv", [f"{0.01 * k:.2f},0,0,{120 + k}" for k in range(50)]),
+        fails=False,
+    ),
+    Case(
+        "A gyro at the end of its range",
+        lambda f: text(
+            f / "log.csv",
+            [f"{0.01 * k:.2f},0,0,{min(50.0 * k, 1999.939)}" for k in range(50)],
+            "time_s,gx_dps,gy_dps,gz_dps",
+        ),
+        fails=False,
+    ),
+    Case("Unknown columns", lambda f: text(f / "log.csv", rows(), "a,b,c,d")),
+    Case(
+        "A column that is not there",
+        lambda f: text(f / "log.csv", rows(), "time_s,wx,wy,wz"),
+        ("--columns", "gyro_x=wxx"),
+    ),
+    Case(
+        "A quantity that is none",
+        lambda f: text(f / "log.csv", rows()),
+        ("--columns", "gyr_x=wx"),
+    ),
+    Case(
+        "Two columns that could be one quantity",
+        lambda f: text(f / "log.csv", [f"{r},0.5" for r in rows()], HEADER + ",wx"),
+    ),
+    Case("Axes that are none", lambda f: text(f / "log.csv", rows()), ("--axes", "x,y,y")),
+    Case(
+        "Axes that are a mirror image",
+        lambda f: text(f / "log.csv", rows()),
+        ("--axes", "x,y,-z"),
+        False,
+    ),
+    Case(
+        "A reference point outside the log",
+        lambda f: text(f / "log.csv", rows()),
+        ("--reference", "7.5 same as start"),
+    ),
+    Case(
+        "A reference that is not understood",
+        lambda f: text(f / "log.csv", rows()),
+        ("--reference", "the end is the start"),
+    ),
+    Case(
+        "A window outside the log",
+        lambda f: text(f / "log.csv", rows()),
+        ("--from", "5"),
+    ),
+    Case(
+        "Levelling without an accelerometer",
+        lambda f: text(f / "log.csv", rows()),
+        ("--initial", "level"),
+    ),
+    Case(
+        "A bias from a rest that there is not",
+        lambda f: text(f / "log.csv", rows()),
+        ("--gyro-bias", "rest"),
+    ),
+    Case(
+        "An algorithm that is none",
+        lambda f: text(f / "log.csv", rows()),
+        ("--algorithms", "quaternoin"),
+    ),
+    Case("No such file", lambda f: f / "lgo.csv"),
+    Case("A folder that is no known recording", unknown_folder),
+    Case("An unknown format", lambda f: text(f / "log.xlsx", rows())),
+    Case("An archive that claims more than it holds", lying_header),
+    Case("An archive whose directory claims less than it holds", lying_directory),
+    Case("An archive that would unfold without measure", bomb),
+    Case("An archive that was cut", cut_archive),
+    Case("An archive of Python objects", pickled),
+    Case("A damaged MATLAB file", no_matlab),
+    Case("A damaged HDF5 file", no_hdf5),
+]

@@ -1,0 +1,70 @@
+"""What is said about bad input, word for word: the manual's page is the expectation.
+
+`make messages` writes the page anew; read the difference before you commit it.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from bad_inputs import CASES
+
+PAGE = Path(__file__).parents[2] / "docs" / "messages.md"
+HEAD = """# What is said about bad input
+
+Each message names the file, the row as an editor counts it, the quantity, and what to do. Where
+a log cannot be used, nothing is written and the exit code is not 0; where it can, a note says what
+was done, and stands in the report too. This page is written by the tests, which hold every word
+of it.
+
+"""
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, run_cli):
+    """The page as the command line would fill it now."""
+    sections = []
+    for number, case in enumerate(CASES):
+        folder = tmp_path_factory.mktemp(f"case{number}")
+        source = case.make(folder)
+        before = sorted(p.name for p in folder.rglob("*"))
+        result = run_cli("attitude", source, "--out", folder / "out", *case.options)
+        said = result.err.replace(str(folder) + os.sep, "")
+        assert "Traceback" not in said
+        if case.fails:
+            assert result.code in (3, 4), case.title
+            assert sorted(p.name for p in folder.rglob("*")) == before, "something was left behind"
+        else:
+            assert result.code == 0, (case.title, said)
+            assert (folder / "out" / "report.html").is_file()
+            # What every log without further words is told is said once, at the end.
+            said = "\n".join(_without_usual(said.splitlines())) + "\n"
+        words = " ".join(f"'{o}'" if " " in o else o for o in case.options)
+        sections.append(
+            f"## {case.title}\n\n"
+            + (f"With `{words}`:\n\n" if words else "")
+            + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
+        )
+    return HEAD + "".join(sections).rstrip("\n") + "\n"
+
+
+def _without_usual(lines: list[str]) -> list[str]:
+    kept, skip = [], False
+    for line in lines:
+        if line.startswith("note: "):
+            skip = "nothing says otherwise" in line or "nothing says that it is a mean" in line
+        if not skip:
+            kept.append(line)
+    return kept
+
+
+def test_every_message_is_as_the_manual_has_it(page):
+    if os.environ.get("STRAPDOWN_WRITE_MESSAGES"):
+        PAGE.write_text(page, encoding="utf-8")
+    assert page == PAGE.read_text(encoding="utf-8"), "run `make messages` and read the difference"

@@ -1,0 +1,68 @@
+"""Every writer's file is read back by its reader to the same bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.formats import read_log
+from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
+from strapdown.formats.references import read_truth
+from strapdown.increments import increments_from_imu
+from strapdown.tables import QUATERNION, imu_table
+
+
+def tables(sampling: str, *, accel: bool):
+    rng = np.random.default_rng(1)
+    time = 5.0 + np.cumsum(rng.uniform(0.001, 0.03, 200))
+    imu = imu_table(
+        time,
+        rng.normal(size=(200, 3)),
+        rng.normal(size=(200, 3)) if accel else None,
+        sampling=sampling,
+        source="log",
+    )
+    truth = run_attitude(make_algorithm("quaternion"), increments_from_imu(imu)).attitude
+    return imu, truth
+
+
+@pytest.mark.parametrize("accel", [False, True])
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+@pytest.mark.parametrize("suffix", LOG_WRITERS)
+def test_a_log_and_its_truth_come_back_as_they_were(tmp_path, suffix, sampling, accel):
+    imu, truth = tables(sampling, accel=accel)
+    path = tmp_path / f"log.{suffix}"
+    LOG_WRITERS[suffix](path, imu, truth)
+    back = read_log(path)
+    assert np.array_equal(back.imu.to_numpy(), imu.to_numpy())
+    assert np.array_equal(back.imu.index, imu.index)
+    assert list(back.imu.columns) == list(imu.columns)
+    assert back.imu.attrs["sampling"] == sampling
+    assert np.array_equal(back.truth[QUATERNION], truth[QUATERNION])
+    assert back.findings == ()  # our own files leave nothing to guess
+
+
+@pytest.mark.parametrize("suffix", LOG_WRITERS)
+def test_without_truth_there_is_none(tmp_path, suffix):
+    imu, _ = tables("mean", accel=False)
+    LOG_WRITERS[suffix](tmp_path / f"log.{suffix}", imu, None)
+    assert read_log(tmp_path / f"log.{suffix}").truth is None
+
+
+@pytest.mark.parametrize("suffix", LOG_WRITERS)
+def test_the_same_log_gives_the_same_bytes(tmp_path, suffix):
+    imu, truth = tables("mean", accel=True)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        LOG_WRITERS[suffix](tmp_path / name / f"log.{suffix}", imu, truth)
+    a, b = ((tmp_path / n / f"log.{suffix}").read_bytes() for n in ("a", "b"))
+    assert a == b
+
+
+def test_an_attitude_comes_back(tmp_path):
+    _, truth = tables("mean", accel=False)
+    write_attitude_csv(tmp_path / "truth.csv", truth)
+    back = read_truth(tmp_path / "truth.csv")
+    assert np.array_equal(back[QUATERNION], truth[QUATERNION])
+    assert np.array_equal(back.index, truth.index)

@@ -1,0 +1,181 @@
+"""A bundle is whole or absent, knows each of its bytes, and can be run again anywhere."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from strapdown import bench_attitude, simulate, verify, write_attitude
+from strapdown.bundle import MANIFEST, sha256, write_bundle
+from strapdown.exceptions import ConfigError, DataError
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A simulated log, and a second one to take a bias from."""
+    folder = tmp_path_factory.mktemp("logs")
+    simulate("alexiev-fig2e", folder / "log", rate=50, seed=3, formats=["csv"])
+    return folder / "log" / "log.csv"
+
+
+@pytest.fixture(scope="module")
+def sealed(log, tmp_path_factory):
+    bench = bench_attitude(
+        log, reference=["end same as 4.5", str(log.with_name("truth.csv"))], gyro_bias=str(log)
+    )
+    return write_attitude(bench, tmp_path_factory.mktemp("sealed") / "bundle")
+
+
+@pytest.fixture
+def copy(sealed, tmp_path):
+    return shutil.copytree(sealed.path, tmp_path / "copy")
+
+
+def test_the_seal_is_the_digest_of_the_manifest(sealed):
+    assert sealed.digest == sha256(sealed.path / MANIFEST)
+
+
+def test_what_a_run_writes(sealed):
+    names = {p.relative_to(sealed.path).as_posix() for p in sealed.path.rglob("*") if p.is_file()}
+    assert names == {
+        "attitude.csv",
+        "attitude.json",
+        "report.html",
+        "figures/gyro.svg",
+        "figures/attitude.svg",
+        "figures/error.svg",
+        "figures/difference.svg",
+        "inputs/log/log.csv",
+        "inputs/truth/truth.csv",
+        "inputs/gyro-bias/log.csv",
+        "manifest.json",
+    }
+
+
+def test_it_verifies_where_it_stands_and_elsewhere_without_its_inputs(sealed, copy, log):
+    assert verify(sealed.path).verdict == "identical"
+    hidden = log.rename(log.with_suffix(".hidden"))
+    try:
+        assert verify(copy).verdict == "identical"
+    finally:
+        hidden.rename(log)
+
+
+def test_the_same_run_gives_the_same_seal(log, tmp_path):
+    seals = [write_attitude(bench_attitude(log), tmp_path / name) for name in ("a", "b")]
+    assert seals[0].digest == seals[1].digest
+
+
+def test_one_changed_byte_in_any_file_is_found_and_named(copy):
+    manifest = json.loads((copy / MANIFEST).read_text())
+    for item in [*manifest["inputs"], *manifest["outputs"]]:
+        path = copy / item["name"]
+        good = path.read_bytes()
+        middle = len(good) // 2
+        path.write_bytes(good[:middle] + bytes([good[middle] ^ 1]) + good[middle + 1 :])
+        found = verify(copy)
+        path.write_bytes(good)
+        assert found.verdict == "changed"
+        assert found.details == (f"{item['name']}: changed after it was sealed",)
+
+
+def test_a_missing_and_a_foreign_file_are_named(copy):
+    (copy / "attitude.csv").unlink()
+    (copy / "note.txt").write_text("hello")
+    assert set(verify(copy).details) == {
+        "attitude.csv: missing",
+        "note.txt: not in the manifest",
+    }
+
+
+def test_timing_stands_outside_the_seal(copy):
+    (copy / "timing.json").write_text("{}")
+    assert verify(copy).verdict == "identical"
+
+
+def test_a_manifest_whose_configuration_was_changed_does_not_reproduce(copy):
+    manifest = json.loads((copy / MANIFEST).read_text())
+    manifest["configuration"]["gyro_bias_path"] = None
+    manifest["configuration"]["gyro_bias"] = "none"
+    (copy / MANIFEST).write_text(json.dumps(manifest))
+    found = verify(copy)
+    assert found.verdict == "changed"
+    assert any(line.startswith("attitude.json") for line in found.details)
+
+
+@pytest.mark.parametrize(("shift", "verdict"), [(1e-9, "numerically equal"), (1e-3, "changed")])
+def test_numbers_that_differ_are_told_by_how_much(copy, shift, verdict):
+    """As another processor would have sealed it: the outputs shifted, and sealed like that."""
+    path = copy / "attitude.json"
+    content = json.loads(path.read_text())
+    final = content["algorithms"][0]["final"]
+    relative = shift / max(1.0, abs(final["roll_deg"] + shift))
+    final["roll_deg"] += shift
+    path.write_text(json.dumps(content))
+    manifest = json.loads((copy / MANIFEST).read_text())
+    next(o for o in manifest["outputs"] if o["name"] == path.name)["sha256"] = sha256(path)
+    (copy / MANIFEST).write_text(json.dumps(manifest))
+    found = verify(copy)
+    assert found.verdict == verdict
+    assert found.within == pytest.approx(relative, rel=1e-4)
+
+
+def test_a_run_that_fails_leaves_nothing(tmp_path):
+    with (
+        pytest.raises(RuntimeError),
+        write_bundle(tmp_path / "out", command="x", configuration={}, seals=[]) as folder,
+    ):
+        (folder / "half").write_text("half")
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_bundle_is_replaced_only_when_asked(log, tmp_path):
+    bench = bench_attitude(log)
+    first = write_attitude(bench, tmp_path / "out")
+    with pytest.raises(ConfigError, match="--force"):
+        write_attitude(bench, tmp_path / "out")
+    again = write_attitude(bench, tmp_path / "out", force=True)
+    assert again.digest == first.digest
+    assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_folder_that_is_no_bundle_is_never_touched(log, tmp_path, force):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "thesis.tex").write_text("years of work")
+    with pytest.raises(ConfigError):
+        write_attitude(bench_attitude(log), tmp_path / "out", force=force)
+    assert (tmp_path / "out" / "thesis.tex").read_text() == "years of work"
+
+
+def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypatch):
+    monkeypatch.setattr("strapdown.bundle.COPY_LIMIT", 10)
+    source = shutil.copy(log, tmp_path / "mine.csv")
+    seal = write_attitude(bench_attitude(source), tmp_path / "out")
+    assert not (seal.path / "inputs").exists()
+    assert json.loads((seal.path / MANIFEST).read_text())["inputs"][0]["kept"] == "reference"
+    assert verify(seal.path).verdict == "identical"
+    with source.open("a") as stream:
+        stream.write("\n")
+    assert verify(seal.path).details == (f"{source}: changed after it was sealed",)
+
+
+def test_what_is_no_bundle_is_said_to_be_none(tmp_path):
+    with pytest.raises(DataError, match="no manifest"):
+        verify(tmp_path)
+    (tmp_path / MANIFEST).write_text("{")
+    with pytest.raises(DataError, match="no JSON"):
+        verify(tmp_path)
+    (tmp_path / MANIFEST).write_text('{"schema": "other"}')
+    with pytest.raises(DataError, match="not a manifest"):
+        verify(tmp_path)
+
+
+def test_a_simulation_verifies_too(tmp_path):
+    seal = simulate("alexiev-fig2f", tmp_path / "s", rate=20, seed=9, formats=["all"])
+    assert verify(seal.path).verdict == "identical"
+    other = simulate("alexiev-fig2f", tmp_path / "t", rate=20, seed=10, formats=["all"])
+    assert other.digest != seal.digest
