@@ -10,6 +10,7 @@ from strapdown.results import RestStretch
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 # A window is judged as a whole: long enough for a standard deviation that means something,
 # short enough that a pause of a second shows.
@@ -66,7 +67,7 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     return _of_one_bias(rests)
 
 
-def _windows(time: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _windows(time: Array) -> tuple[Indices, Indices]:
     """First and one-past-last sample of windows that overlap by half."""
     grid = np.arange(time[0], time[-1] - WINDOW, 0.5 * WINDOW)
     starts = np.searchsorted(time, grid, side="left")
@@ -75,17 +76,18 @@ def _windows(time: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return starts[enough].astype(np.int64), ends[enough].astype(np.int64)
 
 
-def _window_mean(values: Array, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> Array:
-    total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])
-    return np.asarray((total[ends] - total[starts]) / (ends - starts)[:, None])
+def _window_mean(values: Array, starts: Indices, ends: Indices) -> Array:
+    return np.array([values[a:b].mean(axis=0) for a, b in zip(starts, ends, strict=True)])
 
 
-def _window_sd(values: Array, starts: NDArray[np.int64], ends: NDArray[np.int64]) -> Array:
-    """Root of the summed variances of the axes, per window."""
-    centred = values - values.mean(axis=0)
-    mean = _window_mean(centred, starts, ends)
-    square = _window_mean(centred * centred, starts, ends)
-    return np.asarray(np.sqrt(np.clip(square - mean * mean, 0.0, None).sum(axis=1)))
+def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
+    """Root of the summed variances of the axes, per window.
+
+    Window by window, and not by running sums, whose rounding would look like noise in a
+    record that has none.
+    """
+    variances = [values[a:b].var(axis=0).sum() for a, b in zip(starts, ends, strict=True)]
+    return np.asarray(np.sqrt(variances), dtype=np.float64)
 
 
 def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -1,0 +1,61 @@
+"""Stationary stretches: found where there are some, not invented where there are none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown.sensors.rest import find_rests
+from strapdown.tables import imu_table
+
+
+def log(rate, noise, moving, *, seconds=20.0, bias=(0.0, 0.0, 0.0), accel=True, seed=0):
+    """Moves between the instants of `moving` as a hand does; at rest otherwise."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(int(seconds * rate)) / rate
+    busy = np.zeros_like(time)
+    for start, end in moving:
+        busy[(time >= start) & (time < end)] = 1.0
+    shake = np.column_stack([np.sin(9 * time), np.cos(7 * time), np.sin(11 * time + 1)])
+    gyro = noise * rng.normal(size=(len(time), 3)) + np.asarray(bias) + busy[:, None] * shake
+    force = np.array([0, 0, -9.81]) + 0.02 * rng.normal(size=gyro.shape) + busy[:, None] * shake
+    return imu_table(time, gyro, force if accel else None)
+
+
+@pytest.mark.parametrize("accel", [True, False])
+@pytest.mark.parametrize("noise", [0.0, 1e-5, 2e-3, 1e-2])
+@pytest.mark.parametrize("rate", [20, 100, 1000])
+def test_both_rests_are_found_whatever_the_noise_and_the_rate(rate, noise, accel):
+    bias = (0.08, -0.002, 0.02)  # rad/s, a cheap gyro's
+    rests = find_rests(log(rate, noise, [(6.0, 14.0)], bias=bias, accel=accel))
+    assert len(rests) == 2
+    # A window is 0.5 s long and they start every 0.25 s: no edge is off by more than that.
+    assert rests[0].start == pytest.approx(0.0, abs=0.5)
+    assert rests[0].end == pytest.approx(6.0, abs=0.5)
+    assert rests[1].start == pytest.approx(14.0, abs=0.5)
+    # The mean of n samples is known to noise/√n; four of these is a fair bound.
+    for rest in rests:
+        samples = (rest.end - rest.start) * rate
+        assert (
+            np.abs(np.subtract(rest.gyro_mean, bias)).max() <= 4 * noise / np.sqrt(samples) + 1e-12
+        )
+
+
+def test_a_hand_is_never_at_rest():
+    assert find_rests(log(100, 2e-3, [(0.0, 20.0)])) == ()
+
+
+def test_a_pause_shorter_than_a_second_is_none():
+    assert find_rests(log(100, 2e-3, [(0.0, 10.0), (10.8, 20.0)])) == ()
+
+
+def test_a_steady_turn_is_not_taken_for_a_bias_where_a_rest_shows_it():
+    table = log(100, 2e-3, [(6.0, 8.0), (14.0, 16.0)], accel=False)
+    turning = (table.index >= 8.0) & (table.index < 14.0)
+    table.loc[turning, "gyro_z"] += 0.1
+    rests = find_rests(table)
+    assert [round(r.start) for r in rests] == [0, 16]
+
+
+def test_too_short_a_log_has_none():
+    assert find_rests(imu_table([0.0, 0.1], np.zeros((2, 3)))) == ()
