@@ -148,7 +148,7 @@ def test_heading_a_hair_west_of_north_is_zero_and_not_360():
 
 
 def test_heading_west_is_270():
-    # sqrt(1/2) twice is a quarter turn to a rounding of either: U, and 2 x 19 U and degrees.
+    # Both components are the same double, so the turn is a quarter exactly.
     q = [math.sqrt(0.5), 0.0, 0.0, -math.sqrt(0.5)]
     heading = rotation.euler_from_quaternion(q)[2]
     assert abs(heading - 270.0) <= math.degrees(TURN)
@@ -260,10 +260,11 @@ def test_the_kinematics_agree_with_the_transposes_and_not_with_the_print():
     rng = np.random.default_rng(4)
     for angles in np.radians(ATTITUDES):
         w = rng.uniform(-1.0, 1.0, 3)
-        # Central difference: h^2/6 times the third derivative of a product of sines of the
-        # angles, at most (|p'| + |q'| + |h'|)^3 <= (1.7 + 2 x 3.5 + 1.5)^3 ~ 1100 for |w| <= sqrt 3
-        # and cos(pitch) >= 1/2: 2e-8. The matrices' roundings, 19 U / h, are 2e-10.
-        assert growth(as_read, angles, w) <= 2.1e-8
+        # |w| <= sqrt 3 and cos(pitch) >= 1/2: pitch changes by 1.42 rad/s at most, heading by 2.83
+        # and roll by 1 + 0.87 x 2.83 = 3.45. Along a straight line in the angles the third
+        # derivative is at most (3.45 + 1.42 + 2.83)^3 = 457: h^2/6 of it is 7.7e-9. The
+        # matrices' roundings, 19 U / h, are 2.2e-10.
+        assert growth(as_read, angles, w) <= 7.9e-9
     wrong = [growth(as_printed, a, rng.uniform(-1.0, 1.0, 3)) for a in np.radians(ATTITUDES)]
     assert min(wrong) > 1e-3
     assert np.median(wrong) > 0.5
@@ -285,10 +286,10 @@ def test_euler_angles_of_a_slightly_turned_body_change_at_the_rates_of_the_kinem
         change -= 2 * math.pi * np.round(change / (2 * math.pi))
         roll, pitch = np.radians(attitude[:2])
         rates = np.array(euler_rates(roll, pitch, *w)[:3])
-        # Third derivatives of the angles under a steady turn |w| <= sqrt 3: they grow as
-        # |w|^3 (2 / cos^3 + ...) <= 5.2 x 2 x 8 = 83 at 60 deg: h^2/6 of it 1.4e-9. Rounding:
-        # each end TURN / cos(pitch), over 2 h: 2 x 1.7e-14 x 2 / 2e-5 = 3.4e-9.
-        assert np.abs(change / (2 * h) - rates).max() <= 1.4e-9 + 2 * TURN / (2 * h)
+        # With the first derivatives of the test above, (8)-(10) give at most 16.6 (roll), 4.9 and
+        # 16.8 (heading) for the second and 234 (roll) for the third: h^2/6 of it is 3.9e-9.
+        # Each end is wrong by TURN / cos(pitch).
+        assert np.abs(change / (2 * h) - rates).max() <= 3.9e-9 + 2 * (2 * TURN) / (2 * h)
 
 
 # --- shapes -------------------------------------------------------------------------------
@@ -569,8 +570,9 @@ def test_a_matrix_that_is_no_rotation_is_refused_and_its_row_named(name):
 def test_a_matrix_within_one_percent_is_accepted():
     good = random_turns(20).as_matrix()
     found = rotation.quaternion_from_dcm(1.004 * good)
-    # Off by 0.4 % of length and nothing of direction: the largest component, from 1 + trace,
-    # takes (1 + 1.004 t)/(1.004 (1 + t)) - 1 < 0.4 % of itself, a turn of 0.004 rad at most.
+    # Off by 0.4 % of length and by nothing in direction. The three small components grow by that,
+    # and the largest, from 1 + trace, by less: by up to 0.004 less, in a vector of length 2 at
+    # least. That is a turn of twice 0.002 rad at most.
     turn = angle_between(Rotation.from_matrix(good), from_form("quaternion", found))
     assert turn.max() <= 0.004
 

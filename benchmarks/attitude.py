@@ -1,0 +1,127 @@
+"""Attitude: a batch against C and against vqf, one sample a call against vqf."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.measure import Ratio, by_turns
+
+SAMPLES = 200_000
+STEP = 0.01
+
+
+def rates() -> np.ndarray:
+    t = np.arange(SAMPLES) * STEP
+    return np.column_stack([0.3 * np.sin(t), 0.2 * np.cos(0.7 * t), np.full(SAMPLES, 0.1)])
+
+
+def c_loop() -> ctypes.CDLL | None:
+    if shutil.which("gcc") is None:
+        print("no gcc on this machine: the C loop is left out")
+        return None
+    library = Path(tempfile.mkdtemp()) / "limit.so"
+    flags = ["-O3", "-march=native", "-fno-math-errno", "-mprefer-vector-width=128"]
+    source = Path(__file__).with_name("attitude_limit.c")
+    subprocess.run(
+        ["gcc", *flags, "-shared", "-fPIC", str(source), "-o", str(library), "-lm"], check=True
+    )
+    loaded = ctypes.CDLL(str(library))
+    pointer = ctypes.POINTER(ctypes.c_double)
+    loaded.att_exact.argtypes = [ctypes.c_long, pointer, ctypes.c_double, pointer]
+    loaded.att_exact.restype = None
+    return loaded
+
+
+def ratios() -> Iterator[Ratio]:
+    from strapdown._kernels import attitude as kernel
+    from strapdown.attitude import AttitudeTracker, Quaternion, run_attitude
+    from strapdown.increments import increments_from_imu
+    from strapdown.tables import imu_table
+
+    gyro = rates()
+    theta = np.ascontiguousarray(gyro * STEP)
+    dtheta = np.zeros_like(theta)
+    history = np.empty((SAMPLES, 4))
+
+    def batch() -> None:
+        kernel.quaternion_advance(np.array([1.0, 0, 0, 0]), theta, dtheta, history, 0, True)
+
+    pointer = ctypes.POINTER(ctypes.c_double)
+    library = c_loop()
+    if library is not None:
+        out = np.zeros((SAMPLES + 1, 4))
+        out[0, 0] = 1.0
+        g, q = gyro.ctypes.data_as(pointer), out.ctypes.data_as(pointer)
+        ours, theirs = by_turns(batch, lambda: library.att_exact(SAMPLES, g, STEP, q))
+        # Both must have done the same work for the ratio to mean anything: rounding apart.
+        assert np.abs(history - out[1:]).max() < 1e-9
+        yield Ratio(
+            "exact quaternion, batch, a sample",
+            ours / SAMPLES * 1e9,
+            "the same in C",
+            theirs / SAMPLES * 1e9,
+            "ns",
+            1.3,
+        )
+
+    try:
+        from vqf import VQF
+    except ImportError:
+        print("vqf is not installed (the extra 'bench'): left out")
+        return
+    accel = np.tile([0.0, 0.0, 9.81], (SAMPLES, 1))
+    ours, theirs = by_turns(batch, lambda: VQF(STEP).updateBatch(gyro, accel), rounds=7)
+    yield Ratio(
+        "exact quaternion, batch, a sample",
+        ours / SAMPLES * 1e9,
+        "vqf updateBatch",
+        theirs / SAMPLES * 1e9,
+        "ns",
+        1 / 5,
+    )
+
+    part = 20_000
+    stamps = (np.arange(part) * STEP).tolist()
+    samples = list(gyro[:part])
+
+    def one_by_one() -> None:
+        update = AttitudeTracker(Quaternion()).update
+        for time, rate in zip(stamps, samples, strict=True):
+            update(time, rate)
+
+    def vqf_one_by_one() -> None:
+        update = VQF(STEP).updateGyr
+        for rate in samples:
+            update(rate)
+
+    ours, theirs = by_turns(one_by_one, vqf_one_by_one)
+    yield Ratio(
+        "exact quaternion, one sample a call",
+        ours / part * 1e9,
+        "vqf updateGyr",
+        theirs / part * 1e9,
+        "ns",
+        4.0,
+    )
+
+    imu = imu_table(np.arange(SAMPLES) * STEP, gyro)
+
+    def from_table() -> None:
+        run_attitude(Quaternion(), increments_from_imu(imu))
+
+    ours, theirs = by_turns(from_table, batch, rounds=7)
+    yield Ratio(
+        "from Imu table to Attitude table, a sample",
+        ours / SAMPLES * 1e9,
+        "the kernel alone",
+        theirs / SAMPLES * 1e9,
+        "ns",
+        None,
+    )

@@ -1,0 +1,159 @@
+"""The commands as a person and a script meet them."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+
+from strapdown.cli.main import EXIT_CODES
+
+COMMANDS = ["attitude", "simulate", "verify", "modules", "demo"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def shell(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "strapdown", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+        env={**os.environ, "TERM": "dumb", "COLUMNS": "120"},
+    )
+
+
+def test_help_of_every_command_has_a_working_example(here, run_cli):
+    for command in COMMANDS:
+        text = " ".join(run_cli(command, "--help").out.split())
+        assert "Usage:" in text
+        if command == "modules":
+            continue
+        assert "Example: strapdown" in text.replace("│", " ")
+
+
+def test_the_examples_of_the_help_work(here, run_cli):
+    assert run_cli("attitude", "alexiev-fig4", "--rate", "100").code == 0
+    lines = ["time_s,wx,wy,wz"] + [f"{0.01 * k:.2f},0,0,{k}" for k in range(30)]
+    (here / "log.csv").write_text("\n".join(lines) + "\n")
+    done = run_cli(
+        "attitude", "log.csv", "--gyro-unit", "deg/s", "--reference", "end same as start"
+    )
+    assert done.code == 0
+    options = ["--rate", "100", "--format", "all", "--out", "fig4"]
+    assert run_cli("simulate", "alexiev-fig4", *options).code == 0
+    assert run_cli("verify", "alexiev-fig4-attitude").out.startswith("identical")
+    assert sorted(p.name for p in here.iterdir()) == [
+        "alexiev-fig4-attitude",
+        "fig4",
+        "log-attitude",
+        "log.csv",
+    ]
+
+
+def test_exit_codes_are_those_of_the_help(here, run_cli):
+    assert "3 the data cannot be used" in " ".join(EXIT_CODES.split())
+    (here / "empty.csv").write_text("")
+    assert run_cli("attitude", "alexiev-fig4", "--quiet").code == 0
+    assert run_cli("attitude").code == 2
+    assert run_cli("attitude", "--no-such-option").code == 2
+    assert run_cli("attitude", "empty.csv").code == 3
+    assert run_cli("attitude", "alexiev-fig4", "--algorithms", "x", "--force").code == 4
+    assert run_cli("verify", ".").code == 3
+    page = here / "alexiev-fig4-attitude" / "report.html"
+    page.write_bytes(page.read_bytes() + b" ")
+    found = run_cli("verify", "alexiev-fig4-attitude")
+    assert found.code == 6
+    assert "report.html: changed after it was sealed" in found.out
+
+
+def test_json_alone_is_json(here, run_cli):
+    found = run_cli("attitude", "alexiev-fig4", "--json")
+    result = json.loads(found.out)
+    assert result == json.loads((here / "alexiev-fig4-attitude" / "attitude.json").read_text())
+    assert [a["algorithm"] for a in result["algorithms"]] == ["naive", "euler", "dcm", "quaternion"]
+    assert json.loads(run_cli("simulate", "alexiev-fig2a", "--json").out)["rate_hz"] == 100.0
+    verdict = json.loads(run_cli("verify", "alexiev-fig4-attitude", "--json").out)["verdict"]
+    assert verdict == "identical"
+
+
+def test_quiet_says_nothing(here, run_cli):
+    found = run_cli("attitude", "alexiev-fig4", "--quiet")
+    assert (found.out, found.err) == ("", "")
+
+
+def test_the_table_says_what_the_json_says(here, run_cli):
+    text = run_cli("attitude", "alexiev-fig4").out
+    assert re.search(r"naive\s+Eq\. \(2\)\s+5\.12°", text)
+    assert re.search(r"euler\s+Eq\. \(8\)-\(10\)\s+2\.55°", text)
+    assert re.search(r"dcm\s+Eq\. \(11\)-\(13\)\s+< 1e-9°", text)
+    assert re.search(r"quaternion\s+Eq\. \(20\)-\(22\)\s+< 1e-9°", text)
+    assert "Seal  sha256" in text
+
+
+def test_without_a_reference_it_says_what_it_can_tell_and_how_to_give_one(here, run_cli):
+    lines = ["time_s,wx_dps,wy_dps,wz_dps"] + [f"{0.01 * k:.2f},0,{k},9" for k in range(300)]
+    (here / "log.csv").write_text("\n".join(lines) + "\n")
+    text = run_cli("attitude", "log.csv").out
+    assert "differ by up to" in text
+    assert "no stationary stretch" in text
+    assert "--reference 'end same as start'" in text
+
+
+@pytest.mark.parametrize(
+    ("text", "labels"),
+    [
+        ("naive euler", ["naive", "euler"]),
+        ("naive,dcm", ["naive", "dcm"]),
+        (
+            "dcm:order=3,orthogonalise_every=10, quaternion:normalise=no",
+            ["dcm:order=3,orthogonalise_every=10", "quaternion:normalise=false"],
+        ),
+    ],
+)
+def test_algorithms_are_named_with_their_options(here, run_cli, text, labels):
+    found = run_cli("attitude", "alexiev-fig4", "--algorithms", text, "--json")
+    assert [a["algorithm"] for a in json.loads(found.out)["algorithms"]] == labels
+
+
+def test_modules_lists_what_there_is(run_cli):
+    text = run_cli("modules").out
+    for word in ("naive", "euler", "dcm", "quaternion", "alexiev-fig4", "broad", "npz", "h5"):
+        assert word in text
+
+
+def test_the_demo_runs_without_any_recording(here, run_cli, monkeypatch):
+    monkeypatch.setenv("STRAPDOWN_DATA", str(here / "nowhere"))
+    found = run_cli("demo")
+    assert found.code == 0
+    assert "set STRAPDOWN_DATA" in found.out
+    assert (here / "demo" / "alexiev-fig4" / "report.html").is_file()
+
+
+def test_python_m_strapdown_and_a_closed_pipe(tmp_path):
+    assert shell("--version").stdout.startswith("strapdown 0.")
+    done = shell("attitude", "no-such-log.csv", cwd=tmp_path)
+    assert done.returncode == 4
+    assert done.stderr.startswith("error: no-such-log.csv: there is no such file")
+    piped = subprocess.run(
+        f"{sys.executable} -m strapdown modules | head -1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert piped.stderr == ""
+
+
+def test_redirected_output_is_plain_text(tmp_path):
+    done = shell("modules", cwd=tmp_path)
+    assert "\x1b[" not in done.stdout
