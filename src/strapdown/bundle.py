@@ -23,7 +23,7 @@ from typing import Any
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.results import InputFiles
 
-__all__ = ["Seal", "read_manifest", "sha256", "unsealed_changes", "write_bundle"]
+__all__ = ["Seal", "read_manifest", "sha256", "unsealed_changes", "write_bundle", "write_timing"]
 
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
@@ -248,6 +248,19 @@ def _move(staging: Path, out: Path) -> None:
         (old / out.name).replace(out)
         raise
     shutil.rmtree(old)
+
+
+def write_timing(seal: Seal, seconds: dict[str, float]) -> None:
+    """Put the times that a run took beside its bundle's seal.
+
+    Parameters
+    ----------
+    seal : Seal
+    seconds : dict of str to float
+        Stage to seconds.
+    """
+    rounded = {stage: round(taken, 4) for stage, taken in seconds.items()}
+    (seal.path / TIMING).write_text(to_json({"seconds": rounded}), encoding="utf-8")
 
 
 def read_manifest(bundle: Path) -> dict[str, Any]:

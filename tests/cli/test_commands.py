@@ -93,10 +93,10 @@ def test_quiet_says_nothing(here, run_cli):
 
 def test_the_table_says_what_the_json_says(here, run_cli):
     text = run_cli("attitude", "alexiev-fig4").out
-    assert re.search(r"naive\s+Eq\. \(2\)\s+5\.12°", text)
-    assert re.search(r"euler\s+Eq\. \(8\)-\(10\)\s+2\.55°", text)
-    assert re.search(r"dcm\s+Eq\. \(11\)-\(13\)\s+< 1e-9°", text)
-    assert re.search(r"quaternion\s+Eq\. \(20\)-\(22\)\s+< 1e-9°", text)
+    assert re.search(r"naive\s+5\.12°.*\(2\)", text)
+    assert re.search(r"euler\s+2\.55°.*\(8\)-\(10\)", text)
+    assert re.search(r"dcm\s+< 1e-9°.*\(11\)-\(13\)", text)
+    assert re.search(r"quaternion\s+< 1e-9°.*\(20\)-\(22\)", text)
     assert "Seal  sha256" in text
 
 

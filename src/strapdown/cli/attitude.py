@@ -144,8 +144,15 @@ def attitude(
     gyro log or a scenario, compares them with what is known, and writes a table, JSON, CSV, a
     report page and its figures.
     """
-    from strapdown.bundle import check_destination
-    from strapdown.cli.console import console, print_findings, print_seal, print_table, progress
+    from strapdown.bundle import check_destination, write_timing
+    from strapdown.cli.console import (
+        Stopwatch,
+        console,
+        print_findings,
+        print_seal,
+        print_table,
+        progress,
+    )
     from strapdown.formats.columns import parse_column_option
     from strapdown.report import attitude_words as words
     from strapdown.report.attitude import attitude_json, write_attitude
@@ -153,7 +160,8 @@ def attitude(
 
     folder = out or Path(f"{Path(source).resolve().stem}-attitude")
     check_destination(folder, force)
-    with progress(quiet or json) as report:
+    with progress(quiet or json) as show:
+        report = Stopwatch(show)
         bench = bench_attitude(
             source,
             algorithms=_split(algorithms),
@@ -175,6 +183,8 @@ def attitude(
         )
         report("writing", 0.95)
         seal = write_attitude(bench, folder, force=force)
+        report.stop()
+        write_timing(seal, report.seconds)
     if json:
         typer.echo(json_module.dumps(attitude_json(bench), indent=2, ensure_ascii=False))
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -18,6 +19,28 @@ def console(*, err: bool = False) -> Console:
     from rich.console import Console
 
     return Console(stderr=err, markup=False, highlight=False, soft_wrap=True)
+
+
+class Stopwatch:
+    """Pass progress on, and keep how long each stage took."""
+
+    def __init__(self, report: Callable[[str, float], None]) -> None:
+        self._report = report
+        self._stage: tuple[str, float] | None = None
+        self.seconds: dict[str, float] = {}
+
+    def __call__(self, stage: str, share: float) -> None:
+        """Begin a stage."""
+        self.stop()
+        self._stage = (stage, perf_counter())
+        self._report(stage, share)
+
+    def stop(self) -> None:
+        """End the last stage."""
+        if self._stage is not None:
+            name, start = self._stage
+            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+        self._stage = None
 
 
 @contextmanager
@@ -45,7 +68,7 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, header_style="bold")
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 1), header_style="bold")
     for k, name in enumerate(columns):
         text = k in (0, len(columns) - 1)
         table.add_column(name, justify="left" if text else "right", overflow="fold")

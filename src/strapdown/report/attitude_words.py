@@ -27,6 +27,10 @@ HOW_TO_REFERENCE = (
 )
 
 
+# Two exact algorithms that differ by less than this have the same answer.
+AGREE = 1e-6  # deg
+
+
 def degrees(value: float | None) -> str:
     """An angle to three significant digits, rounding errors as what they are."""
     if value is None:
@@ -44,44 +48,60 @@ def seconds(value: float) -> str:
 
 
 def headline(bench: AttitudeBench) -> str:
-    """One or two sentences: the answer, first."""
+    """The answer first, in a sentence or two."""
     truth = [s for s in bench.scores if s.against == "truth"]
-    points = [s for s in bench.scores if s.against != "truth"]
     if truth:
-        return _ranked(truth, "from the truth", "at the end")
-    if points:
-        last = points[-1].against
-        return _ranked([s for s in points if s.against == last], f"off at {last}", "")
-    if len(bench.runs) < 2:
-        return f"{bench.runs[0].algorithm} ran over the log. {HOW_TO_REFERENCE}"
-    table = bench.differences_deg.to_numpy()
-    far = divmod(int(table.argmax()), len(table))
-    a, b = bench.runs[far[0]].algorithm, bench.runs[far[1]].algorithm
-    return (
-        f"The algorithms differ by up to {degrees(float(table.max()))} ({a} against {b}) on these "
-        "samples."
-    )
+        answer = f"At {seconds(truth[0].time)}, {_ranked(truth, 'from the truth')}."
+    elif bench.scores:
+        last = bench.scores[-1].against
+        points = [s for s in bench.scores if s.against == last]
+        answer = f"At reference point R{len(bench.references)}, {_ranked(points, 'off')}."
+    elif len(bench.runs) > 1:
+        table = bench.differences_deg.to_numpy()
+        a, b = (bench.runs[k].algorithm for k in divmod(int(table.argmax()), len(table)))
+        answer = (
+            f"The algorithms differ by up to {degrees(float(table.max()))} ({a} against {b}) on "
+            "these samples."
+        )
+    else:
+        answer = f"{bench.runs[0].algorithm} ran over the log."
+    return answer + _whose_error(bench)
 
 
-def _ranked(scores: list[Score], off: str, when: str) -> str:
+def _ranked(scores: list[Score], off: str) -> str:
     ranked = sorted(scores, key=lambda s: s.error_deg)
     best, worst = ranked[0], ranked[-1]
-    # Equal to what a reader can see: two algorithms that agree are named together.
-    level = [s.algorithm for s in ranked if degrees(s.error_deg) == degrees(best.error_deg)]
-    text = f"{' and '.join(level)}: {degrees(best.error_deg)} {off} {when}".rstrip()
+    # Equal to what a reader can see: algorithms that agree are named together.
+    level = [s.algorithm for s in scores if degrees(s.error_deg) == degrees(best.error_deg)]
+    verb = "are" if len(level) > 1 else "is"
+    text = f"{' and '.join(level)} {verb} {degrees(best.error_deg)} {off}"
     if worst.algorithm not in level:
-        text += f"; {worst.algorithm}: {degrees(worst.error_deg)}"
-    return text + "."
+        text += f"; {worst.algorithm} is {degrees(worst.error_deg)}"
+    return text
+
+
+def _whose_error(bench: AttitudeBench) -> str:
+    """Say where what is left cannot come from, when two exact algorithms agree."""
+    names = [run.algorithm for run in bench.runs]
+    exact = [s for s in bench.scores if s.algorithm == "quaternion"]
+    if not {"dcm", "quaternion"} <= set(names) or not exact or exact[-1].error_deg < AGREE:
+        return ""
+    pair = [names.index("dcm"), names.index("quaternion")]
+    if bench.differences_deg.to_numpy()[*pair] > AGREE:
+        return ""
+    return (
+        " Direction cosines and quaternion agree with each other to rounding: what is left comes "
+        "from the sensor, its rate, its bias or the reference, and not from arithmetic."
+    )
 
 
 def result_columns(bench: AttitudeBench) -> list[str]:
     """Headings of the table of results."""
-    columns = ["algorithm", "Alexiev"]
+    columns = ["algorithm"]
     if any(s.against == "truth" for s in bench.scores):
-        columns += ["error at the end", "RMS", "largest"]
-    for number in range(1, len(bench.references) + 1):
-        columns.append(f"error at R{number}")
-    return [*columns, "own condition"]
+        columns += ["final error", "RMS", "largest"]
+    columns += [f"error at R{number}" for number in range(1, len(bench.references) + 1)]
+    return [*columns, "Alexiev Eq.", "own condition"]
 
 
 def result_rows(bench: AttitudeBench) -> list[list[str]]:
@@ -89,12 +109,12 @@ def result_rows(bench: AttitudeBench) -> list[list[str]]:
     rows = []
     for run in bench.runs:
         scores = [s for s in bench.scores if s.algorithm == run.algorithm]
-        row = [run.algorithm, f"Eq. {run.equations}"]
+        row = [run.algorithm]
         for s in scores:
             row.append(degrees(s.error_deg))
             if s.against == "truth":
                 row += [degrees(s.rms_deg), degrees(s.max_deg)]
-        rows.append([*row, condition(run.diagnostics)])
+        rows.append([*row, run.equations, condition(run.diagnostics)])
     return rows
 
 
@@ -103,7 +123,7 @@ def condition(diagnostics: dict[str, float]) -> str:
     parts = []
     if "closest_to_pole_deg" in diagnostics:
         parts.append(
-            f"{degrees(diagnostics['closest_to_pole_deg'])} from ±90° pitch at "
+            f"±90° pitch {degrees(diagnostics['closest_to_pole_deg'])} off at "
             f"{seconds(diagnostics['closest_to_pole_time_s'])}"
         )
     if "orthogonality_loss" in diagnostics:
@@ -143,6 +163,8 @@ def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
         ),
         ("Gyro bias", _bias_words(b)),
     ]
+    if bench.truth is not None:
+        found.append(("Truth", _truth_words(bench)))
     if bench.sampling_error_deg is not None:
         found.append(
             (
@@ -156,6 +178,17 @@ def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
     elif not bench.scores:
         found.append(("At rest", "no stationary stretch of a second or more was found"))
     return found
+
+
+def _truth_words(bench: AttitudeBench) -> str:
+    assert bench.truth is not None
+    counted = bench.truth.index[bench.scored]
+    if not len(counted):
+        return f"known at {len(bench.truth)} samples, none of which counts"
+    return (
+        f"known at {len(bench.truth)} samples; {len(counted)} of them count, from "
+        f"{seconds(float(counted[0]))} to {seconds(float(counted[-1]))}"
+    )
 
 
 def _bias_words(bias: dict[str, Any]) -> str:

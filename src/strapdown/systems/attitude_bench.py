@@ -278,7 +278,6 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     if truth is not None and scored is not None:
         inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
         truth, scored = truth[inside], scored[inside]
-    progress("done", 1.0)
     return AttitudeBench(
         source=source.name,
         description=source.description,
