@@ -235,6 +235,11 @@ CASES = [
         ("--reference", "7.5 same as start"),
     ),
     Case(
+        "A reference file that is not there",
+        lambda f: text(f / "log.csv", rows()),
+        ("--reference", "thruth.csv"),
+    ),
+    Case(
         "A reference that is not understood",
         lambda f: text(f / "log.csv", rows()),
         ("--reference", "the end is the start"),

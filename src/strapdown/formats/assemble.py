@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -111,7 +112,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     _report_gaps(raw, time, columns["gyro"], findings)
     _report_absurd(raw, columns["gyro"], findings)
     imu = imu_table(time, columns["gyro"], columns.get("accel"), sampling=sampling, source=raw.name)
-    truth, scored = _truth(raw, found, time, keep, (axis, sign), readings)
+    truth, scored = _truth(raw, found, time, keep, (axis, sign), readings, findings)
     return Recording(raw.name, raw.files, imu, truth, scored, tuple(readings), tuple(findings))
 
 
@@ -220,6 +221,26 @@ def _numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
     return numbers
 
 
+def _ticks(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
+    """Stamps as numbers; dates and times of day as nanoseconds since 1970, and True."""
+    values = raw.columns[column.source]
+    if values.dtype.kind == "O" and re.match(r"\d{4}-\d\d-\d\d[T ]\d\d:", str(values[0])):
+        dates = pd.to_datetime(pd.Series(values), format="ISO8601", utc=True, errors="coerce")
+        bad = np.flatnonzero(dates.isna().to_numpy())
+        if bad.size:
+            raise DataError(
+                f"'{values[bad[0]]}' is not a date and time like those before it (column "
+                f"'{column.source}')",
+                file=raw.name,
+                row=raw.first_row + int(bad[0]),
+                quantity="time",
+                remedy="correct or delete that row",
+            )
+        stamps = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
+        return stamps.astype(np.int64), True
+    return _numbers(raw, column, "time"), False
+
+
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
     parts = [_numbers(raw, found[f"{triad}_{a}"], f"{triad}_{a}").astype(np.float64) for a in AXES]
     return np.column_stack(parts)
@@ -235,7 +256,7 @@ def _time(
     """Return stamps in seconds, what they were read from, and the rows that can be used."""
     samples = len(values["gyro"])
     if "time" in found:
-        ticks = _numbers(raw, found["time"], "time")
+        ticks, dated = _ticks(raw, found["time"])
     elif rate := options.rate or raw.rate:
         ticks = np.arange(samples) / rate
     else:
@@ -256,7 +277,9 @@ def _time(
         why = f"no time column: {options.rate or raw.rate:g} Hz as stated"
         return stamps, Reading("(none)", "time", "s", why, 0.0), keep
     unit, why = found["time"].unit, "in its name"
-    if options.time_unit:
+    if dated:
+        unit, why = "ns", "dates and times of ISO 8601"
+    elif options.time_unit:
         unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
     elif found["time"].why == "stated by the file":
         why = "stated by the file"
@@ -530,13 +553,15 @@ def _truth(
     keep: NDArray[np.bool_],
     axes: tuple[list[int], list[float]],
     readings: list[Reading],
+    findings: list[Finding],
 ) -> tuple[pd.DataFrame | None, NDArray[np.bool_] | None]:
     if raw.truth is not None:
         q_nb = _turned(raw.truth.q_ns[keep], raw, axes)
         scored = raw.truth.scored[keep]
     else:
-        q, names = _quaternions(raw, found)
+        q, names = _quaternions(raw, found) if raw.axes else (None, [])
         if q is None:
+            _mention_attitude(raw, found, findings)
             return None, None
         for name in names:
             column = found[name]
@@ -547,6 +572,21 @@ def _truth(
     if not known.any():
         return None, None
     return attitude_table(time[known], q_nb[known], raw.name), scored[known]
+
+
+def _mention_attitude(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> None:
+    """An attitude of unknown frames, as a phone computes one, is no truth unless it is said."""
+    if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
+        findings.append(
+            Finding(
+                "it also holds an attitude, which is not used: nothing says whose it is and in "
+                "which frames",
+                file=raw.name,
+                quantity="attitude",
+                remedy="if it is body to north-east-down and better than the gyro, give the file "
+                "as --reference too",
+            )
+        )
 
 
 def _turned(q_ns: Array, raw: RawLog, axes: tuple[list[int], list[float]]) -> Array:

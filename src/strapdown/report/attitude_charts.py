@@ -12,10 +12,10 @@ from strapdown.report.chart import (
     SERIES_COLOURS,
     Band,
     Chart,
-    Line,
     Mark,
     Panel,
     break_jumps,
+    curve,
 )
 from strapdown.results import AttitudeBench
 from strapdown.tables import EULER, GYRO
@@ -64,7 +64,7 @@ def _gyro(bench: AttitudeBench) -> Chart:
     time = bench.imu.index.to_numpy(dtype=np.float64)
     names = ("x, forward", "y, right", "z, down")
     lines = tuple(
-        Line(name, time, np.degrees(bench.imu[column].to_numpy()), colour, width=1.1)
+        curve(name, time, np.degrees(bench.imu[column].to_numpy()), colour, width=1.1)
         for name, column, colour in zip(names, GYRO, AXIS_COLOURS, strict=True)
     )
     removed = bench.gyro_bias["rad_per_s"] is not None
@@ -86,7 +86,7 @@ def _attitude(bench: AttitudeBench) -> Chart:
     panels = []
     for angle in EULER:
         lines = [
-            Line(
+            curve(
                 run.algorithm,
                 run.attitude.index.to_numpy(dtype=np.float64),
                 break_jumps(run.attitude[angle].to_numpy()),
@@ -97,7 +97,7 @@ def _attitude(bench: AttitudeBench) -> Chart:
         ]
         if bench.truth is not None:
             lines.append(
-                Line(
+                curve(
                     "truth",
                     bench.truth.index.to_numpy(dtype=np.float64),
                     break_jumps(bench.truth[angle].to_numpy()),
@@ -125,7 +125,7 @@ def _error(bench: AttitudeBench) -> Chart:
     for k, run in enumerate(bench.runs):
         errors = error_angles(run.attitude, scored)
         lines.append(
-            Line(
+            curve(
                 run.algorithm,
                 errors.index.to_numpy(dtype=np.float64),
                 np.maximum(errors.to_numpy(), LEAST_ERROR),
@@ -147,7 +147,7 @@ def _error(bench: AttitudeBench) -> Chart:
 def _difference(bench: AttitudeBench) -> Chart:
     base = next((r for r in bench.runs if r.algorithm == "quaternion"), bench.runs[-1])
     lines = [
-        Line(
+        curve(
             run.algorithm,
             run.attitude.index.to_numpy(dtype=np.float64),
             np.maximum(error_angles(run.attitude, base.attitude).to_numpy(), LEAST_ERROR),

@@ -22,7 +22,7 @@ BUCKETS = 1500
 
 @dataclass(frozen=True)
 class Line:
-    """One curve. `dash` is solid, dash, dot or dashdot."""
+    """One curve, thinned by `curve`. `dash` is solid, dash, dot or dashdot."""
 
     name: str
     x: Array
@@ -83,6 +83,13 @@ class Chart:
     bands: tuple[Band, ...] = field(default=())
 
 
+def curve(
+    name: str, x: ArrayLike, y: ArrayLike, colour: str, dash: str = "solid", width: float = 1.4
+) -> Line:
+    """Make a line of as many points as a screen can show."""
+    return Line(name, *thin(x, y), colour, dash, width)
+
+
 def thin(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     """Thin a curve to what a screen shows, keeping every peak.
 
@@ -99,16 +106,18 @@ def thin(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     if xs.size <= 2 * BUCKETS:
         return xs, ys
-    keep = {0, xs.size - 1}
-    for part in np.array_split(np.arange(xs.size), BUCKETS):
-        values = ys[part]
-        if np.isnan(values).all():
-            keep.add(int(part[0]))
-            continue
-        keep |= {int(part[np.nanargmin(values)]), int(part[np.nanargmax(values)])}
-        if np.isnan(values).any():
-            keep.add(int(part[np.argmax(np.isnan(values))]))
-    chosen = np.array(sorted(keep))
+    width = -(-xs.size // BUCKETS)
+    first = np.arange(0, xs.size, width)
+    # The last run is filled up with its own last value, which adds no peak and no break.
+    body = np.pad(ys, (0, first.size * width - xs.size), mode="edge").reshape(-1, width)
+    gap = np.isnan(body)
+    keep = [
+        first + np.argmin(np.where(gap, np.inf, body), axis=1),
+        first + np.argmax(np.where(gap, -np.inf, body), axis=1),
+        (first + np.argmax(gap, axis=1))[gap.any(axis=1)],
+        np.array([xs.size - 1]),
+    ]
+    chosen = np.unique(np.concatenate([[0], *keep]))
     return xs[chosen], ys[chosen]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.report.chart import Array, Chart, Panel, thin
+from strapdown.report.chart import Array, Chart, Panel
 
 _GRID = "#e6e9ed"
 _FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": "#1b1f24"}
@@ -101,7 +101,6 @@ def _shape(kind: str, x0: float, x1: float, **style: Any) -> dict[str, Any]:
 def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
     out = []
     for line in panel.lines:
-        x, y = thin(line.x, line.y)
         out.append(
             {
                 "type": "scatter",
@@ -109,8 +108,8 @@ def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
                 "name": html.escape(line.name),
                 "legendgroup": html.escape(line.name),
                 "showlegend": legend,
-                "x": _numbers(x, 9),
-                "y": _numbers(y, 6),
+                "x": _numbers(line.x, 9),
+                "y": _numbers(line.y, 6),
                 "xaxis": "x",
                 "yaxis": axis,
                 "line": {"color": line.colour, "width": line.width, "dash": line.dash},

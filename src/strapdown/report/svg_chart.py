@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.report.chart import Chart, thin
+from strapdown.report.chart import Chart
 
 _DASH = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
 _STYLE: Any = {
@@ -40,10 +40,8 @@ def draw(chart: Chart, path: Path) -> None:
         axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
         for panel, axis in zip(chart.panels, axes, strict=True):
             for line in panel.lines:
-                x, y = thin(line.x, line.y)
-                axis.plot(
-                    x, y, color=line.colour, ls=_DASH[line.dash], lw=line.width, label=line.name
-                )
+                style = {"color": line.colour, "ls": _DASH[line.dash], "lw": line.width}
+                axis.plot(line.x, line.y, label=line.name, **style)
             if panel.log:
                 axis.set_yscale("log")
             axis.set_ylabel(panel.y_label)

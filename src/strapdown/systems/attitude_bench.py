@@ -202,6 +202,13 @@ def _references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
     for item in items:
         path = Path(item)
         if not path.exists():
+            if " " not in item.strip() and path.suffix:
+                raise ConfigError(
+                    "there is no such file",
+                    file=item,
+                    quantity="reference",
+                    remedy="check the path, or say it in words: 'end same as start'",
+                )
             words.append(item)
         elif (listed := read_reference_words(path)) is not None:
             words += listed

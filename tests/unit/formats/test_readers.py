@@ -12,6 +12,7 @@ from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.columns import parse_axes, parse_column_option, read_name
 from strapdown.formats.recording import ReadOptions
+from strapdown.formats.references import read_truth
 from strapdown.tables import ACCEL, GYRO, QUATERNION
 
 TIME = np.arange(30) * 0.02
@@ -124,6 +125,28 @@ def test_nanoseconds_of_1970_keep_their_differences(tmp_path):
     imu = read_log(tmp_path / "log.csv").imu
     # A double of 1.7e18 is only good to 256 ns; counted from the first stamp nothing is lost.
     assert np.array_equal(imu.index, np.arange(30) * 5_000_001 * 1e-9)
+
+
+def test_dates_of_iso_8601(tmp_path):
+    lines = ["timestamp,wx_rad_s,wy_rad_s,wz_rad_s"]
+    lines += [f"2026-03-29T00:59:59.{990 + k:03d}456Z,0,0,0.1" for k in range(10)]
+    lines += [f"2026-03-29 01:00:00.{k:03d}456+00:00,0,0,0.1" for k in range(10)]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    imu = read_log(tmp_path / "log.csv").imu
+    assert np.allclose(imu.index, np.arange(20) * 1e-3, atol=1e-12)
+    lines[3] = "yesterday,0,0,0.1"
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    with pytest.raises(DataError, match=r"row 4, time: 'yesterday' is not a date"):
+        read_log(tmp_path / "log.csv")
+
+
+def test_an_attitude_of_unknown_origin_is_no_truth(tmp_path):
+    header = ["time_s", "wx_rad_s", "wy_rad_s", "wz_rad_s", "roll_deg", "pitch_deg", "yaw_deg"]
+    path = csv(tmp_path / "log.csv", header, [TIME, RATES, RATES])
+    log = read_log(path)
+    assert log.truth is None
+    assert any("whose it is" in f.what for f in log.findings)
+    assert len(read_truth(path)) == 30
 
 
 def test_a_log_without_stamps_takes_a_stated_rate(tmp_path):
