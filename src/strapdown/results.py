@@ -151,8 +151,9 @@ class AttitudeBench:
     scored : ndarray of bool or None
         Which rows of `truth` count.
     scores : tuple of Score
-    sampling_error_deg : float or None
-        For a scenario: what the samples themselves lost, with exact arithmetic.
+    sampling_error_deg : tuple of float, or None
+        For a scenario: what noise-free samples lose with exact arithmetic, at the end and at
+        most.
     differences_deg : DataFrame
         Largest rotation angle between each pair of algorithms.
     rests : tuple of RestStretch
@@ -175,7 +176,7 @@ class AttitudeBench:
     truth: pd.DataFrame | None = field(repr=False)
     scored: Any = field(repr=False)
     scores: tuple[Score, ...]
-    sampling_error_deg: float | None
+    sampling_error_deg: tuple[float, float] | None
     differences_deg: pd.DataFrame = field(repr=False)
     rests: tuple[RestStretch, ...]
     initial: dict[str, Any]

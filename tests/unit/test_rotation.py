@@ -537,6 +537,8 @@ def test_a_quaternion_whose_norm_is_not_one_is_refused_and_its_row_named(name):
         message = refused(function, values, row=3)
         assert f"this one has {shown}" in message
         assert "scalar first" in message
+    values[4] *= 3.0
+    refused(function, values, row=3)
     refused(function, 2.0 * random_quaternions(1)[0], row=1)
 
 
@@ -565,6 +567,8 @@ def test_a_matrix_that_is_no_rotation_is_refused_and_its_row_named(name):
         message = refused(function, values, row=3)
         assert "not a rotation" in message
         refused(function, values[2], row=1)
+        values[4] = -values[4]
+        refused(function, values, row=3)
 
 
 def test_a_matrix_within_one_percent_is_accepted():

@@ -104,7 +104,7 @@ def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
             }
             for run in bench.runs
         ],
-        "sampling_error_deg": bench.sampling_error_deg,
+        "sampling_error_deg": _sampling_error(bench),
         "largest_difference_deg": {
             name: {other: float(v) for other, v in row.items()}
             for name, row in bench.differences_deg.iterrows()
@@ -122,6 +122,12 @@ def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
         "readings": [vars(r) for r in bench.readings],
         "findings": [vars(f) for f in bench.findings],
     }
+
+
+def _sampling_error(bench: AttitudeBench) -> dict[str, float] | None:
+    if bench.sampling_error_deg is None:
+        return None
+    return dict(zip(("final", "max"), bench.sampling_error_deg, strict=True))
 
 
 def _final(row: Any, time: float) -> dict[str, float]:

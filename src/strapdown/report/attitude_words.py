@@ -166,11 +166,12 @@ def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
     if bench.truth is not None:
         found.append(("Truth", _truth_words(bench)))
     if bench.sampling_error_deg is not None:
+        final, most = bench.sampling_error_deg
         found.append(
             (
                 "Sampling error",
-                f"{degrees(bench.sampling_error_deg)} at the end: what noise-free samples at this "
-                "rate lose, with exact arithmetic; no algorithm can do better on them",
+                f"{degrees(final)} at the end, up to {degrees(most)} on the way: what noise-free "
+                "samples at this rate lose, with exact arithmetic",
             )
         )
     if bench.rests:

@@ -70,8 +70,8 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
 def _windows(time: Array) -> tuple[Indices, Indices]:
     """First and one-past-last sample of windows that overlap by half."""
     grid = np.arange(time[0], time[-1] - WINDOW, 0.5 * WINDOW)
-    starts = np.searchsorted(time, grid, side="left")
-    ends = np.searchsorted(time, grid + WINDOW, side="right")
+    starts = np.append(np.searchsorted(time, grid), np.searchsorted(time, time[-1] - WINDOW))
+    ends = np.append(np.searchsorted(time, grid + WINDOW), time.size)
     enough = ends - starts >= LEAST_SAMPLES
     return starts[enough].astype(np.int64), ends[enough].astype(np.int64)
 

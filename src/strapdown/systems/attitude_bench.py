@@ -57,7 +57,7 @@ class _Source:
     readings: tuple[Reading, ...]
     findings: tuple[Finding, ...]
     inputs: tuple[InputFiles, ...]
-    sampling_error_deg: float | None
+    sampling_error_deg: tuple[float, float] | None
 
 
 def bench_attitude(
@@ -376,9 +376,7 @@ def _scenario(spec: ScenarioSpec) -> _Source:
         scenario.motion, GyroErrors(), rate=spec.rate_hz, sampling=spec.sampling
     )
     exact = run_attitude(Quaternion(), increments_from_imu(clean), truth[QUATERNION].to_numpy()[0])
-    lost = rotation.rotation_angle(
-        exact.attitude[QUATERNION].to_numpy()[-1], truth[QUATERNION].to_numpy()[-1]
-    )
+    lost = error_angles(exact.attitude, truth)
     return _Source(
         spec.name,
         _describe(imu, f"simulated: {scenario.title} (Alexiev 2021, {scenario.origin})"),
@@ -388,7 +386,7 @@ def _scenario(spec: ScenarioSpec) -> _Source:
         (),
         (),
         (),
-        float(lost),
+        (float(lost.iloc[-1]), float(lost.max())),
     )
 
 
