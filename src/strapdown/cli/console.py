@@ -14,11 +14,18 @@ if TYPE_CHECKING:
     from strapdown.exceptions import Finding
 
 
+# Redirected output has no width of its own; a table is then as wide as it is.
+PIPE_WIDTH = 160
+
+
 def console(*, err: bool = False) -> Console:
     """A console that takes no text from outside for markup."""
     from rich.console import Console
 
-    return Console(stderr=err, markup=False, highlight=False, soft_wrap=True)
+    out = Console(stderr=err, markup=False, highlight=False, soft_wrap=True)
+    if not out.is_terminal:
+        out.width = PIPE_WIDTH
+    return out
 
 
 class Stopwatch:
@@ -74,9 +81,7 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         table.add_column(name, justify="left" if text else "right", overflow="fold")
     for row in rows:
         table.add_row(*row)
-    out = console()
-    # Redirected output has no width of its own; a table is then as wide as it is.
-    out.print(table, soft_wrap=False, width=None if out.is_terminal else 160)
+    console().print(table, soft_wrap=False)
 
 
 def print_findings(findings: Sequence[Finding]) -> None:

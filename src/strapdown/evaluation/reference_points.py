@@ -140,13 +140,14 @@ def in_words(row: pd.Series) -> str:
     -------
     str
     """
-    at = f"{row['time']:.6g} s"
+    at, since = (f"{float(row[key]):.3f}".rstrip("0").rstrip(".") for key in ("time", "since"))
     if row["kind"] == "same":
-        return f"{at}: same attitude as at {row['since']:.6g} s"
+        return f"{at} s: same attitude as at {since} s"
     if row["kind"] == "turns":
-        return f"{at}: {row['turns']:g} turns about body {row['axis']} since {row['since']:.6g} s"
+        plural = "" if abs(row["turns"]) == 1 else "s"
+        return f"{at} s: {row['turns']:g} turn{plural} about body {row['axis']} since {since} s"
     angles = ", ".join(f"{e} {row[e]:g}°" for e in EULER)
-    return f"{at}: {angles}"
+    return f"{at} s: {angles}"
 
 
 def score_references(

@@ -1,0 +1,43 @@
+"""What the README shows is what the commands print."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
+RUNS = re.findall(r"```text\n\$ strapdown (.*?)\n…\n(.*?)```", README, re.S)
+
+
+def test_there_are_runs_to_hold():
+    assert len(RUNS) == 2
+
+
+@pytest.mark.parametrize(("command", "shown"), RUNS, ids=["scenario", "log"])
+def test_the_output_shown_is_the_output(command, shown, run_cli, recordings, tmp_path, monkeypatch):
+    words = shlex.split(command.replace("\\\n", " "))
+    if "unmoved-10min" in words:
+        monkeypatch.chdir(recordings("mpu6050_turns"))
+    found = run_cli(*words, "--out", tmp_path / "out")
+    assert found.code == 0
+    printed = {line.rstrip() for line in (found.out + found.err).splitlines()}
+    for line in filter(None, (line.rstrip() for line in shown.splitlines())):
+        assert line in printed
+
+
+def test_the_python_shown_runs():
+    import doctest
+
+    (block,) = re.findall(r"```python\n(.*?)```", README, re.S)
+    test = doctest.DocTestParser().get_doctest(block, {}, "README", "README.md", 0)
+    said: list[str] = []
+    failures, _ = doctest.DocTestRunner().run(test, out=said.append)
+    assert failures == 0, "".join(said)
+
+
+def test_links_lead_somewhere():
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (Path(__file__).parent.parent / target).exists(), target
