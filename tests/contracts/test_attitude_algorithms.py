@@ -7,7 +7,7 @@ import pytest
 
 from strapdown import rotation
 from strapdown.attitude import ALGORITHMS, AttitudeTracker, make_algorithm, run_attitude
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.exceptions import ConfigError, DataError, DivergenceError
 from strapdown.increments import increments_from_imu
 from strapdown.tables import QUATERNION, imu_table, increments_table
 
@@ -140,6 +140,14 @@ def test_a_bad_sample_is_refused_and_changes_nothing(variant):
 def test_the_label_makes_the_same_algorithm_again(variant):
     algorithm = make_algorithm(variant)
     assert make_algorithm(algorithm.label) == algorithm
+
+
+@pytest.mark.parametrize("variant", ["dcm:order=1", "quaternion:order=1,normalise=false"])
+def test_a_truncated_series_that_runs_away_says_so(variant):
+    """Each step of 3 rad stretches by sqrt(1 + 9) or sqrt(1 + 9/4); 1e150 is soon reached."""
+    increments = increments_table(np.arange(1, 2001.0), np.ones(2000), np.full((2000, 3), 3**0.5))
+    with pytest.raises(DivergenceError, match=f"row .*{variant[:3]}.*range of floating point"):
+        run_attitude(make_algorithm(variant), increments)
 
 
 # --- order of accuracy ------------------------------------------------------------------

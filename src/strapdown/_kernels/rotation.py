@@ -97,16 +97,12 @@ def rotvec_from_quat(w, x, y, z):
     """Logarithm: the rotation vector of length at most pi."""
     if w < 0.0:
         w, x, y, z = -w, -x, -y, -z
-    # Scaling first: a product of subnormal components would lose them.
-    big = max(abs(x), abs(y), abs(z))
-    if big == 0.0:
-        return 0.0, 0.0, 0.0
-    a, b, c = x / big, y / big, z / big
-    v = big * math.sqrt(a * a + b * b + c * c)
-    if v * v < ATAN_SERIES_LIMIT * w * w:
-        t = (v / w) * (v / w)
+    v2 = x * x + y * y + z * z
+    if v2 < ATAN_SERIES_LIMIT * w * w:
+        t = v2 / (w * w)
         k = 2.0 * (1.0 - t * (1.0 / 3.0 - t * (1.0 / 5.0))) / w
     else:
+        v = math.sqrt(v2)
         k = 2.0 * math.atan2(v, w) / v
     return k * x, k * y, k * z
 
@@ -190,7 +186,7 @@ def quat_from_dcm(c11, c12, c13, c21, c22, c23, c31, c32, c33):
     return quat_normalise(w, x, y, z)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def quat_normalise(w, x, y, z):
     """Scale to unit norm; the zero quaternion gives NaN, which the tables refuse."""
     k = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
@@ -238,9 +234,13 @@ def euler_from_quat(w, x, y, z):
 @njit(cache=True)
 def wrap_pi(angle):
     """Angle in (-pi, pi]; unchanged to the last bit when it already lies there."""
-    if -math.pi < angle <= math.pi:
-        return angle
-    return angle - 2.0 * math.pi * math.ceil((angle - math.pi) / (2.0 * math.pi))
+    # fmod is exact, so that no multiple of 2 pi is rounded twice.
+    angle = np.fmod(angle, 2.0 * math.pi)
+    if angle > math.pi:
+        return angle - 2.0 * math.pi
+    if angle <= -math.pi:
+        return angle + 2.0 * math.pi
+    return angle
 
 
 @njit(cache=True)

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.attitude.algorithm import AttitudeAlgorithm
@@ -15,7 +15,7 @@ from strapdown.attitude.euler_krylov import EulerKrylov
 from strapdown.attitude.naive import Naive
 from strapdown.attitude.quaternion import Quaternion
 from strapdown.attitude.tracker import AttitudeTracker
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.exceptions import ConfigError, DivergenceError, nearest
 from strapdown.results import AttitudeRun
 from strapdown.tables import attitude_table
 
@@ -98,6 +98,18 @@ def _option(name: str, key: str, value: str, default: object) -> object:
     )
 
 
+def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64]) -> None:
+    """Say where a truncated series grew beyond what can be squared."""
+    bad = np.flatnonzero(~(np.abs(history) < rotation.LARGEST).all(axis=1))
+    if bad.size:
+        raise DivergenceError(
+            "its numbers left the range of floating point",
+            row=int(bad[0]) + 1,
+            quantity=algorithm.label,
+            remedy="use a higher order, a higher rate, or let it normalise or orthogonalise",
+        )
+
+
 def run_attitude(
     algorithm: AttitudeAlgorithm,
     increments: pd.DataFrame,
@@ -130,6 +142,7 @@ def run_attitude(
     state = algorithm.begin(unit)
     first = algorithm.quaternions(state[None, : algorithm.width].copy())
     state, history = algorithm.advance(state, increments)
+    _refuse_overflow(algorithm, history)
     ends = increments.index.to_numpy(dtype=np.float64)
     time = np.concatenate([[ends[0] - increments["dt"].iloc[0]], ends])
     return AttitudeRun(

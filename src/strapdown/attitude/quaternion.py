@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown._kernels import attitude as kernel
 from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
-from strapdown.exceptions import ConfigError, DivergenceError
+from strapdown.exceptions import ConfigError
 
 
 @dataclass(frozen=True)
@@ -53,14 +53,6 @@ class Quaternion(AttitudeAlgorithm):
     def quaternions(self, history: Array) -> Array:
         """Scale each to norm 1: a truncated series without `normalise` grows or shrinks."""
         norm = np.sqrt((history * history).sum(axis=1, keepdims=True))
-        bad = ~((norm > 0.0) & np.isfinite(norm))
-        if bad.any():
-            raise DivergenceError(
-                "the norm of the quaternion left the range of floating point",
-                row=int(np.argmax(bad)) + 1,
-                quantity=self.label,
-                remedy="use normalise=true, a higher order or a higher rate",
-            )
         return np.asarray(history / norm)
 
     @property

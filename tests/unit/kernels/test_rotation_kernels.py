@@ -713,16 +713,12 @@ def test_wrap_of_one_turn_more_stays_in_range_at_the_seam():
         assert -math.pi < kernel.wrap_pi(angle) <= math.pi
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the multiple of 2 pi is rounded: from 5 pi on the rest may pass pi"
-)
 def test_wrap_stays_in_range_at_every_seam():
     odd = [(2 * n + 1) * math.pi for n in range(-1000, 1000)]
     for angle in itertools.chain.from_iterable(steps_from(a, 3) for a in odd):
         assert -math.pi < kernel.wrap_pi(angle) <= math.pi
 
 
-@pytest.mark.xfail(strict=True, reason="1e300 comes back as 1e300")
 def test_wrap_brings_every_finite_angle_into_range():
     for angle in (1e9, -1e12, 1e17, -1e17, 1e300, -1e300):
         assert -math.pi < kernel.wrap_pi(angle) <= math.pi
