@@ -11,9 +11,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown._kernels import rotation as kernel
 from strapdown.tables import DTHETA, THETA
 
 Array = NDArray[np.float64]
+
+
+def quaternions_from_angles(roll_pitch_heading: Array) -> Array:
+    """Quaternions of 3-2-1 angles in rad, (n, 3), of any size: pitch beyond ±90° is legal."""
+    q = np.empty((len(roll_pitch_heading), 4))
+    kernel.quats_from_eulers(np.ascontiguousarray(roll_pitch_heading), q)
+    return q
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown._kernels import rotation as kernel_rotation
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm, quaternions_from_angles
 from strapdown.exceptions import ConfigError
 
 
@@ -52,9 +51,7 @@ class EulerKrylov(AttitudeAlgorithm):
 
     def quaternions(self, history: Array) -> Array:
         """Turn the angles into quaternions; pitch beyond ±90° is a legal angle here."""
-        q = np.empty((len(history), 4))
-        kernel_rotation.quats_from_eulers(np.ascontiguousarray(history), q)
-        return q
+        return quaternions_from_angles(history)
 
     @property
     def accuracy_order(self) -> int:

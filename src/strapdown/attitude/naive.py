@@ -8,8 +8,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown._kernels import rotation as kernel_rotation
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.attitude.algorithm import Array, AttitudeAlgorithm, quaternions_from_angles
 
 
 @dataclass(frozen=True)
@@ -35,9 +34,7 @@ class Naive(AttitudeAlgorithm):
 
     def quaternions(self, history: Array) -> Array:
         """Read the sums as 3-2-1 angles, whatever their size."""
-        q = np.empty((len(history), 4))
-        kernel_rotation.quats_from_eulers(np.ascontiguousarray(history), q)
-        return q
+        return quaternions_from_angles(history)
 
     @property
     def accuracy_order(self) -> int:
