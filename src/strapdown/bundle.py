@@ -301,7 +301,25 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
             file=MANIFEST,
             remedy="use the version of strapdown that wrote it",
         )
+    _refuse_escape(manifest)
     return manifest
+
+
+def _refuse_escape(manifest: dict[str, Any]) -> None:
+    """Refuse a manifest that is malformed, or whose own files lie outside its folder."""
+    try:
+        for item in [*manifest["inputs"], *manifest["outputs"]]:
+            path, refers = Path(item["name"]), item.get("kept") == "reference"
+            if not isinstance(item["sha256"], str) or path.is_absolute() != refers:
+                raise ValueError
+            if ".." in path.parts:
+                raise ValueError
+    except (TypeError, KeyError, ValueError, AttributeError):
+        raise DataError(
+            "its list of files is malformed, or names files outside the folder",
+            file=MANIFEST,
+            remedy="do not trust this bundle; get it again from its source",
+        ) from None
 
 
 def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:

@@ -50,7 +50,7 @@ class Reading:
         Unit in the file.
     why : str
         What that was concluded from.
-    first : float
+    first : float or str
         The first value, as it stands in the file.
     """
 
@@ -58,7 +58,7 @@ class Reading:
     quantity: str
     unit: str
     why: str
-    first: float
+    first: float | str
 
 
 @dataclass(frozen=True)
@@ -100,6 +100,8 @@ class Score:
         For a number of turns: the integrated angle about the axis, and what it should be.
     sd_deg : float or None
         How well the reference itself is known.
+    reference : int or None
+        Number of the reference point, from 1.
     """
 
     algorithm: str
@@ -111,6 +113,7 @@ class Score:
     turned_deg: float | None = None
     expected_deg: float | None = None
     sd_deg: float | None = None
+    reference: int | None = None
 
 
 @dataclass(frozen=True)

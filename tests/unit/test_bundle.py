@@ -179,3 +179,12 @@ def test_a_simulation_verifies_too(tmp_path):
     assert verify(seal.path).verdict == "identical"
     other = simulate("alexiev-fig2f", tmp_path / "t", rate=20, seed=10, formats=["all"])
     assert other.digest != seal.digest
+
+
+@pytest.mark.parametrize("name", ["../secret", "/etc/hostname", 7])
+def test_a_manifest_that_names_files_outside_is_refused(copy, name):
+    manifest = json.loads((copy / MANIFEST).read_text())
+    manifest["outputs"][0]["name"] = name
+    (copy / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(DataError, match="outside the folder"):
+        verify(copy)

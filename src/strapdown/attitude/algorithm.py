@@ -28,8 +28,8 @@ def quaternions_from_angles(roll_pitch_heading: Array) -> Array:
 class AttitudeAlgorithm(ABC):
     """One attitude algorithm with its options; it holds no state of its own.
 
-    Class attributes
-    ----------------
+    Attributes
+    ----------
     name : str
         The word for it on the command line.
     title : str

@@ -196,7 +196,7 @@ def attitude(
         page.print("Read as:")
         print_table(
             ["column", "taken as", "unit", "first value"],
-            [[r.source, r.quantity, r.unit, f"{r.first:.6g}"] for r in bench.readings],
+            [[r.source, r.quantity, r.unit, words.first_value(r)] for r in bench.readings],
         )
     for name, text in words.facts(bench):
         page.print(f"{name}: {text}")

@@ -206,6 +206,7 @@ def score_references(
                 turned_deg=turned,
                 expected_deg=expected,
                 sd_deg=sd if np.isfinite(sd) else None,
+                reference=number,
             )
         )
     return tuple(scores)

@@ -170,12 +170,8 @@ def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
     """Resolve one ``quantity=source`` of the user to columns that exist."""
     names = list(raw.columns)
     if quantity in TRIADS:
-        members = [f"{source}[{i}]" for i in range(3)]
-        if all(m in raw.columns for m in members):
+        if members := _three_of(raw, quantity, source):
             return list(zip(_members(quantity), members, strict=True))
-        by_axis = [n for a in AXES for n in names if n.startswith(source) and n.endswith(a)]
-        if len(by_axis) == 3:
-            return list(zip(_members(quantity), by_axis, strict=True))
     elif source in raw.columns:
         return [(quantity, source)]
     elif source.isdigit() and 1 <= int(source) <= len(names):
@@ -186,6 +182,27 @@ def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
         quantity=f"--columns {quantity}",
         remedy=nearest(source, names),
     )
+
+
+def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
+    """Columns of an array of three, of three in a wider array, or of three names in x, y, z."""
+    base, _, index = source.partition("[")
+    width = sum(name.startswith(f"{base}[") for name in raw.columns)
+    if width > 3 and not index:
+        raise ConfigError(
+            f"'{source}' has {width} columns",
+            file=raw.name,
+            quantity=f"--columns {quantity}",
+            remedy=f"say with which of them it begins, as in {quantity}={source}[{width - 3}]",
+        )
+    if width >= 3 and (not index or index.rstrip("]").isdigit()):
+        first = int(index.rstrip("]")) if index else 0
+        members = [f"{base}[{first + k}]" for k in range(3)]
+        return members if all(m in raw.columns for m in members) else []
+    by_axis = [
+        n for a in AXES for n in raw.columns if n.startswith(source) and n.lower().endswith(a)
+    ]
+    return by_axis if len(by_axis) == 3 else []
 
 
 def _require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
@@ -256,6 +273,15 @@ def _time(
     """Return stamps in seconds, what they were read from, and the rows that can be used."""
     samples = len(values["gyro"])
     if "time" in found:
+        if options.rate:
+            findings.append(
+                Finding(
+                    f"--rate {options.rate:g} is not used: the log has stamps (column "
+                    f"'{found['time'].source}')",
+                    file=raw.name,
+                    quantity="time",
+                )
+            )
         ticks, dated = _ticks(raw, found["time"])
     elif rate := options.rate or raw.rate:
         ticks = np.arange(samples) / rate
@@ -298,7 +324,7 @@ def _time(
         "time",
         stamps.unit,
         f"{found['time'].why}; unit {stamps.why}",
-        float(ticks[0]),
+        str(raw.columns[found["time"].source][0]) if dated else float(ticks[0]),
     )
     return Stamps(seconds, stamps.unit, stamps.why, keep, []), reading, keep
 

@@ -58,6 +58,13 @@ TIMES = [
     "seconds",
     "sec",
     "tow",
+    "sow",
+    "gpssow",
+    "gpstow",
+    "gpstime",
+    "unixtime",
+    "epoch",
+    "stamp",
 ]
 QUATERNIONS = {
     "q_w": ["qw", "quatw", "quaternionw", "q0"],

@@ -74,7 +74,7 @@ def read(path: Path) -> RawLog:
             row=comments + 1,
             remedy="check that the recording was saved and copied whole",
         )
-    names = [f.strip().strip('"') for f in fields] if header else _numbered(len(fields))
+    names = [f.strip().strip('"') for f in fields] if header else _above(lines[:comments], fields)
     findings = _drop_cut_line(lines, first, len(names), separator, path.name)
     _check_widths(lines, first, len(names), separator, path.name)
     columns = _parse(lines, first, len(names), separator)
@@ -93,8 +93,15 @@ def read(path: Path) -> RawLog:
     )
 
 
-def _numbered(count: int) -> list[str]:
-    return [f"column {k + 1}" for k in range(count)]
+def _above(comments: list[str], fields: list[str]) -> list[str]:
+    """Names of columns without a header: the last comment, where it is one; else numbers."""
+    for line in reversed(comments):
+        text = line.strip().lstrip("".join(COMMENTS)).strip()
+        names = [f.strip() for f in _split(text, _separator(text))]
+        if len(names) == len(fields) and not any(_NUMBER.fullmatch(n) for n in names):
+            return names
+        break
+    return [f"column {k + 1}" for k in range(len(fields))]
 
 
 def _unique(names: list[str]) -> list[str]:

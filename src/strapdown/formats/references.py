@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from strapdown.exceptions import DataError
+from strapdown.evaluation.reference_points import parse_reference
+from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import read_raw
 from strapdown.formats.assemble import assemble_attitude
 from strapdown.formats.csv import SUFFIXES
@@ -38,19 +40,38 @@ def read_reference_words(path: Path) -> list[str] | None:
         It is a list, and something in it is missing or malformed.
     """
     if path.suffix.lower() == ".toml":
-        return _from_toml(path)
+        return _understood(list(enumerate(_from_toml(path), start=1)), path, "sentence")
     if path.suffix.lower() not in SUFFIXES:
         return None
-    lines = [
-        line.strip()
-        for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+    numbered = [
+        (number, line.strip())
+        for number, line in enumerate(
+            path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), start=1
+        )
         if line.strip() and not line.lstrip().startswith("#")
     ]
+    lines = [line for _, line in numbered]
     if lines and "kind" in [f.strip() for f in lines[0].split(",")]:
         return _from_csv(path)
     if lines and any(f" {word} " in f" {lines[0]} " for word in ("same", "roll", "turns", "turn")):
-        return [line for line in lines if "," not in line or "same" in line]
+        return _understood(numbered, path, "line")
     return None
+
+
+def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[str]:
+    """Return the sentences, or say which of them is not understood."""
+    for number, text in numbered:
+        try:
+            parse_reference(text, -math.inf, math.inf)
+        except ConfigError as error:
+            raise DataError(
+                f"{what} {number}: {error.finding.what}",
+                file=path.name,
+                row=number if what == "line" else None,
+                quantity="reference",
+                remedy=error.finding.remedy,
+            ) from None
+    return [text for _, text in numbered]
 
 
 def _from_toml(path: Path) -> list[str]:

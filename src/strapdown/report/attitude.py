@@ -210,6 +210,7 @@ def attitude_page(bench: AttitudeBench) -> str:
             else None,
             "facts": words.facts(bench),
             "readings": bench.readings,
+            "first_value": words.first_value,
             "conventions": words.CONVENTIONS,
             "version": __version__,
         },

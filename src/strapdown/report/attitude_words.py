@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from strapdown.evaluation.reference_points import in_words
-from strapdown.results import AttitudeBench, Score
+from strapdown.results import AttitudeBench, Reading, Score
+from strapdown.systems.attitude_bench import passed_pole
 
 CONVENTIONS = (
     ("Body axes", "x forward, y right, z down"),
@@ -49,13 +50,13 @@ def seconds(value: float) -> str:
 
 def headline(bench: AttitudeBench) -> str:
     """The answer first, in a sentence or two."""
-    truth = [s for s in bench.scores if s.against == "truth"]
-    if truth:
-        answer = f"At {seconds(truth[0].time)}, {_ranked(truth, 'from the truth')}."
+    scores = [s for s in bench.scores if s.against == "truth"]
+    if scores:
+        answer = f"At {seconds(scores[0].time)}, {_ranked(bench, scores, 'from the truth')}."
     elif bench.scores:
-        last = bench.scores[-1].against
-        points = [s for s in bench.scores if s.against == last]
-        answer = f"At reference point R{len(bench.references)}, {_ranked(points, 'off')}."
+        last = len(bench.references)
+        scores = [s for s in bench.scores if s.reference == last]
+        answer = f"At reference point R{last}, {_ranked(bench, scores, 'off')}."
     elif len(bench.runs) > 1:
         table = bench.differences_deg.to_numpy()
         a, b = (bench.runs[k].algorithm for k in divmod(int(table.argmax()), len(table)))
@@ -65,26 +66,38 @@ def headline(bench: AttitudeBench) -> str:
         )
     else:
         answer = f"{bench.runs[0].algorithm} ran over the log."
-    return answer + _whose_error(bench)
+    return answer + _whose_error(bench, scores)
 
 
-def _ranked(scores: list[Score], off: str) -> str:
+def _ranked(bench: AttitudeBench, scores: list[Score], off: str) -> str:
     ranked = sorted(scores, key=lambda s: s.error_deg)
-    best, worst = ranked[0], ranked[-1]
+    worst = ranked[-1]
+    # What passed the pole may be near the truth by chance; it is not named as the best.
+    lost = {r.algorithm for r in bench.runs if passed_pole(r)}
+    best = next((s for s in ranked if s.algorithm not in lost), ranked[0])
     # Equal to what a reader can see: algorithms that agree are named together.
-    level = [s.algorithm for s in scores if degrees(s.error_deg) == degrees(best.error_deg)]
+    level = [
+        s.algorithm
+        for s in scores
+        if degrees(s.error_deg) == degrees(best.error_deg)
+        and (s is best or s.algorithm not in lost)
+    ]
     verb = "are" if len(level) > 1 else "is"
-    text = f"{' and '.join(level)} {verb} {degrees(best.error_deg)} {off}"
+    text = f"{_listed(level)} {verb} {degrees(best.error_deg)} {off}"
     if worst.algorithm not in level:
         text += f"; {worst.algorithm} is {degrees(worst.error_deg)}"
     return text
 
 
-def _whose_error(bench: AttitudeBench) -> str:
+def _listed(names: list[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+def _whose_error(bench: AttitudeBench, scores: list[Score]) -> str:
     """Say where what is left cannot come from, when two exact algorithms agree."""
     names = [run.algorithm for run in bench.runs]
-    exact = [s for s in bench.scores if s.algorithm == "quaternion"]
-    if not {"dcm", "quaternion"} <= set(names) or not exact or exact[-1].error_deg < AGREE:
+    exact = [s for s in scores if s.algorithm == "quaternion"]
+    if not {"dcm", "quaternion"} <= set(names) or not exact or exact[0].error_deg < AGREE:
         return ""
     pair = [names.index("dcm"), names.index("quaternion")]
     if bench.differences_deg.to_numpy()[*pair] > AGREE:
@@ -133,12 +146,17 @@ def condition(diagnostics: dict[str, float]) -> str:
     return "; ".join(parts) or "–"
 
 
+def first_value(reading: Reading) -> str:
+    """The first value of a column, as a reader shows it."""
+    return reading.first if isinstance(reading.first, str) else f"{reading.first:.6g}"
+
+
 def reference_lines(bench: AttitudeBench) -> list[str]:
     """Each reference point in words, with the turned angle where turns were counted."""
     lines = []
     for number, (_, row) in enumerate(bench.references.iterrows(), start=1):
         text = f"R{number}: {in_words(row)}"
-        score = next((s for s in bench.scores if s.against == in_words(row)), None)
+        score = next((s for s in bench.scores if s.reference == number), None)
         if score is not None and score.turned_deg is not None and score.expected_deg:
             share = score.turned_deg / score.expected_deg - 1.0
             text += (

@@ -167,7 +167,9 @@ def _difference(a: Path, b: Path) -> float:
     worst = 0.0
     for x, y in zip(*leaves, strict=True):
         if isinstance(x, float) and isinstance(y, float):
-            worst = max(worst, abs(x - y) / max(1.0, abs(x)))
+            # A heading just under 360 may come out just above 0 elsewhere.
+            apart = min(abs(x - y), abs(abs(x - y) - 360.0))
+            worst = max(worst, apart / max(1.0, abs(x)))
         elif x != y and not _same_but_numbers(x, y):
             return math.inf
     return worst

@@ -281,6 +281,8 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     scores = [s for run in runs for s in _truth_score(run, source)]
     scores += [s for run in runs for s in score_references(run, references, imu)]
     findings += _judge(runs, increments)
+    findings += _judge_turns(scores)
+    findings += _judge_truth(source, span)
     truth, scored = source.truth, source.scored
     if truth is not None and scored is not None:
         inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
@@ -408,10 +410,12 @@ def _with_truth(source: _Source, spec: AttitudeSpec) -> _Source:
     inside = np.asarray(
         (truth.index >= source.imu.index[0]) & (truth.index <= source.imu.index[-1])
     )
-    if not inside.any():
+    if inside.sum() < 2:
+        log = source.imu.index
         raise DataError(
-            f"it runs from {truth.index[0]:.9g} to {truth.index[-1]:.9g} s, and the log from "
-            f"{source.imu.index[0]:.9g} to {source.imu.index[-1]:.9g} s",
+            f"{int(inside.sum())} of its instants lie within the log: it runs from "
+            f"{truth.index[0]:.9g} to {truth.index[-1]:.9g} s, and the log from {log[0]:.9g} to "
+            f"{log[-1]:.9g} s",
             file=path.name,
             quantity="time",
             remedy="bring both to one clock",
@@ -473,7 +477,7 @@ def _gyro_bias(
                 "the sensor lying still",
             )
         first = rests[0]
-        return _bias_of(first, f"mean over the rest {first.start:.4g}–{first.end:.4g} s"), ()
+        return _bias_of(first, f"mean over the rest {first.start:.3f}–{first.end:.3f} s"), ()
     numbers, unit = _stated_bias(spec.gyro_bias)
     bias = [v * GYRO_UNITS[unit] for v in numbers]
     return {"rad_per_s": bias, "from": f"stated: {spec.gyro_bias}"}, ()
@@ -581,6 +585,11 @@ def _three_angles(text: str) -> list[float]:
 # --- judging ----------------------------------------------------------------------------
 
 
+def passed_pole(run: AttitudeRun) -> bool:
+    """Tell whether a run came so near ±90° of pitch that its angles are not to be trusted."""
+    return run.diagnostics.get("closest_to_pole_deg", 90.0) < NEAR_POLE
+
+
 def _truth_score(run: AttitudeRun, source: _Source) -> list[Score]:
     if source.truth is None or source.scored is None:
         return []
@@ -599,14 +608,48 @@ def _truth_score(run: AttitudeRun, source: _Source) -> list[Score]:
     ]
 
 
+def _judge_turns(scores: list[Score]) -> list[Finding]:
+    """Say where the turns that were stated are not those that the gyro saw."""
+    findings = {}
+    for score in scores:
+        if score.turned_deg is None or score.expected_deg is None:
+            continue
+        off = (score.turned_deg - score.expected_deg) / 360.0
+        if abs(off) > 0.5:
+            findings[score.against] = Finding(
+                f"'{score.against}' says {score.expected_deg / 360.0:g} turns, and the gyro turned "
+                f"{score.turned_deg / 360.0:.2f}",
+                quantity="reference",
+                remedy="check the sign (right-handed about the axis named), the number and the "
+                "axis; the error angle does not tell whole turns apart",
+            )
+    return list(findings.values())
+
+
+def _judge_truth(source: _Source, span: tuple[float, float]) -> list[Finding]:
+    """Say where the truth tells of a small part of the log only."""
+    if source.truth is None or source.scored is None or not source.scored.any():
+        return []
+    counted = source.truth.index[source.scored]
+    covered = float(counted[-1] - counted[0])
+    if covered >= 0.5 * (span[1] - span[0]):
+        return []
+    return [
+        Finding(
+            f"it covers {covered:.4g} of {span[1] - span[0]:.4g} s; of the rest nothing is known",
+            file=source.name,
+            quantity="truth",
+        )
+    ]
+
+
 def _judge(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
     findings = []
     for run in runs:
-        near = run.diagnostics.get("closest_to_pole_deg", 90.0)
-        if near < NEAR_POLE:
+        if passed_pole(run):
             findings.append(
                 Finding(
-                    f"came within {near:.3g}° of ±90° pitch at "
+                    f"came within {run.diagnostics['closest_to_pole_deg']:.3g}° of ±90° pitch at "
                     f"{run.diagnostics['closest_to_pole_time_s']:.6g} s, where its equations "
                     "divide by zero; what it says from there on is not to be trusted",
                     quantity=run.algorithm,

@@ -17,6 +17,7 @@ from strapdown.evaluation.reference_points import (
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
+from strapdown.report.attitude_words import headline
 from strapdown.tables import imu_table
 
 
@@ -163,3 +164,50 @@ def test_a_truth_of_another_time_is_refused(tmp_path):
     )
     with pytest.raises(DataError, match="one clock"):
         bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+
+
+def test_a_truth_that_meets_the_log_in_one_instant_says_nothing(tmp_path):
+    """The start would be compared with itself, and called perfect."""
+    text = "time_s,roll_deg,pitch_deg,heading_deg\n-1,0,0,0\n0,0,0,0\n"
+    (tmp_path / "truth.csv").write_text(text)
+    with pytest.raises(DataError, match="1 of its instants"):
+        bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+
+
+def test_a_truth_of_a_part_of_the_log_is_told_as_that(tmp_path):
+    text = "time_s,roll_deg,pitch_deg,heading_deg\n0,0,0,0\n1,0,0,0\n"
+    (tmp_path / "truth.csv").write_text(text)
+    bench = bench_attitude("alexiev-fig4", reference=[str(tmp_path / "truth.csv")])
+    assert any("covers 1 of 5 s" in f.what for f in bench.findings)
+
+
+def test_every_line_of_a_file_counts_and_a_bad_one_is_named(tmp_path):
+    (tmp_path / "points.txt").write_text("# ours\nend same as start\n3 roll 1, pitch 2\n")
+    with pytest.raises(DataError, match=r"points.txt, row 3, reference: line 3: .* not understood"):
+        read_reference_words(tmp_path / "points.txt")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"), [("-2 turns about z", "-2 turns"), ("5 turns about z", "5 turns")]
+)
+def test_turns_that_the_gyro_did_not_see_are_questioned(words, said):
+    bench = bench_attitude(
+        "alexiev-fig2a", reference=[f"end {words} since start"], algorithms=["dcm", "quaternion"]
+    )
+    (finding,) = [f for f in bench.findings if f.quantity == "reference"]
+    assert said in finding.what
+
+
+def test_the_same_point_twice_is_two_points():
+    bench = bench_attitude("alexiev-fig2a", reference=["end same as start"] * 2)
+    assert [s.reference for s in bench.scores if s.algorithm == "dcm"] == [None, 1, 2]
+    assert headline(bench).count("quaternion") == 1
+
+
+def test_what_passed_the_pole_is_not_named_as_the_best():
+    """At 10 Hz Runge-Kutta's Euler may end anywhere; it has said that it is not to be trusted."""
+    names = ["naive", "euler:step=rk4"]
+    bench = bench_attitude("alexiev-fig4", rate=100, algorithms=names)
+    errors = {s.algorithm: s.error_deg for s in bench.scores}
+    assert errors["euler:step=rk4"] < errors["naive"]
+    assert headline(bench).startswith("At 5 s, naive is")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import h5py
 import numpy as np
 import pytest
@@ -199,6 +201,34 @@ def test_an_array_of_three_is_named_as_a_group(tmp_path):
         columns={"time": "stamp", "gyro": "body"}, gyro_unit="rad/s", time_unit="s"
     )
     assert np.array_equal(read_log(tmp_path / "log.npz", options).imu[GYRO].to_numpy(), RATES)
+
+
+def test_three_columns_of_a_wider_array_must_be_chosen(tmp_path):
+    np.savez(tmp_path / "log.npz", time_s=TIME, imu=np.hstack([9 + RATES, RATES]))
+    with pytest.raises(ConfigError, match=r"gyro=imu\[3\]"):
+        read_log(tmp_path / "log.npz", ReadOptions(columns={"gyro": "imu"}, gyro_unit="rad/s"))
+    options = ReadOptions(columns={"gyro": "imu[3]", "accel": "imu[0]"}, gyro_unit="rad/s")
+    with pytest.raises(DataError, match="--accel-unit"):
+        read_log(tmp_path / "log.npz", options)
+    log = read_log(tmp_path / "log.npz", dataclasses.replace(options, accel_unit="m/s2"))
+    assert np.array_equal(log.imu[GYRO].to_numpy(), RATES)
+    assert np.array_equal(log.imu[ACCEL].to_numpy(), 9 + RATES)
+
+
+def test_a_comment_above_the_numbers_may_be_the_header(tmp_path):
+    lines = ["# made by hand", "# gps_sow_s, gx_rad_s, gy_rad_s, gz_rad_s"]
+    lines += [f"{243000.5 + t},0,0,0.1" for t in TIME]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    log = read_log(tmp_path / "log.csv")
+    assert log.imu.index[0] == 243000.5
+    assert log.readings[0].source == "gps_sow_s"
+
+
+def test_a_rate_for_a_log_with_stamps_is_said_to_be_unused(tmp_path):
+    path = csv(tmp_path / "log.csv", ["time_s", "wx_dps", "wy_dps", "wz_dps"], [TIME, RATES])
+    log = read_log(path, ReadOptions(rate=10.0))
+    assert np.array_equal(log.imu.index, TIME)
+    assert any("--rate 10 is not used" in f.what for f in log.findings)
 
 
 def synthetic_broad(path):

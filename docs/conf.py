@@ -1,0 +1,54 @@
+"""Sphinx configuration of the manual. Building it and reading it need no network."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from docutils.utils.math.latex2mathml import tex2mathml
+
+from strapdown import __version__
+
+project = "strapdown"
+version = release = __version__
+html_title = f"strapdown {__version__}"
+html_show_copyright = False
+
+extensions = [
+    "myst_parser",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+]
+exclude_patterns = ["_build"]
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+
+# The docstrings give type, shape, unit and frame of every argument; annotations would only
+# repeat the first of them.
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+autosummary_generate = True
+numpydoc_show_class_members = False
+numpydoc_class_members_toctree = False
+
+html_theme = "furo"
+html_static_path = ["_static"]
+html_css_files = ["manual.css"]
+html_math_renderer = "mathml"
+
+
+def _math(self: Any, node: Any) -> None:
+    """Write a formula as MathML, which browsers set themselves: no script to load."""
+    from docutils import nodes
+
+    block = isinstance(node, nodes.math_block)
+    text = tex2mathml(node.astext(), as_block=block)
+    self.body.append(f'<div class="math">{text}</div>' if block else text)
+    raise nodes.SkipNode
+
+
+def setup(app: Any) -> dict[str, bool]:
+    """Register the writer of formulas."""
+    app.add_html_math_renderer("mathml", (_math, None), (_math, None))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
