@@ -44,7 +44,7 @@ def run(command: str, folder: Path) -> list[str]:
         check=False,
     )
     text = done.stdout.replace(str(folder), "…")
-    text = re.sub(r"(sha256 [0-9a-f]{8})[0-9a-f]{56}", r"\1…", text)
+    text = re.sub(r"sha256 [0-9a-f]{64}", "sha256 …", text)
     return "\n".join(line.rstrip() for line in text.splitlines()).strip("\n").splitlines()
 
 
