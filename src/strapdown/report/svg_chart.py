@@ -32,6 +32,7 @@ def draw(chart: Chart, path: Path) -> None:
     import matplotlib as mpl
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter
 
     with mpl.rc_context(_STYLE):
         count = len(chart.panels)
@@ -44,6 +45,9 @@ def draw(chart: Chart, path: Path) -> None:
                 axis.plot(line.x, line.y, label=line.name, **style)
             if panel.log:
                 axis.set_yscale("log")
+                # Matplotlib's own label is mathematics, which is switched off for the sake of
+                # names that contain a dollar sign.
+                axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axis.set_ylabel(panel.y_label)
             for band in chart.bands:
                 axis.axvspan(band.start, band.end, color="#0072B2", alpha=0.07, lw=0)

@@ -93,6 +93,7 @@ def test_every_figure_also_stands_beside_the_page(evil_page, tmp_path):
         text = (seal.path / "figures" / f"{chart.slug}.svg").read_text()
         assert text.startswith("<?xml")
         assert "<script" not in text
+        assert "mathdefault" not in text
 
 
 def test_thinning_keeps_peaks_ends_and_breaks():
