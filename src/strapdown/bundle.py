@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import platform
 import shutil
 import tempfile
@@ -67,7 +68,9 @@ def sha256(path: Path) -> str:
 
 def to_json(content: Any) -> str:
     """JSON as bundles hold it: readable, in the order given, the same bytes every time."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    # Names of files need not be text; what is not is shown as a question mark.
+    return text.encode("utf-8", "replace").decode("utf-8")
 
 
 def versions() -> dict[str, str]:
@@ -133,17 +136,20 @@ def write_bundle(
     """
     out = out.absolute()
     check_destination(out, force)
+    made = [p for p in out.parents if not p.exists()]
     out.parent.mkdir(parents=True, exist_ok=True)
     staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
     try:
         yield staging
         manifest = _manifest(staging, command, configuration, inputs)
-        (staging / MANIFEST).write_text(to_json(manifest), encoding="utf-8")
+        (staging / MANIFEST).write_text(to_json(manifest), encoding="utf-8", newline="\n")
         digest = sha256(staging / MANIFEST)
         staging.chmod(0o755)
         _move(staging, out)
     except BaseException:
         shutil.rmtree(staging, ignore_errors=True)
+        for parent in made:
+            parent.rmdir()
         raise
     seals.append(Seal(out, digest))
 
@@ -162,6 +168,7 @@ def check_destination(out: Path, force: bool) -> None:
     ConfigError
     """
     if not out.exists():
+        _refuse_unwritable(out)
         return
     if out.is_dir() and not any(out.iterdir()):
         return
@@ -181,6 +188,18 @@ def check_destination(out: Path, force: bool) -> None:
         )
 
 
+def _refuse_unwritable(out: Path) -> None:
+    """Say before a long run what would fail after it."""
+    parent = next(p for p in out.absolute().parents if p.exists())
+    if not parent.is_dir() or not os.access(parent, os.W_OK):
+        raise ConfigError(
+            f"it cannot be made: {parent} is no folder that may be written",
+            file=str(out),
+            quantity="--out",
+            remedy="name another folder with --out",
+        )
+
+
 def _manifest(
     staging: Path, command: str, configuration: dict[str, Any], inputs: Sequence[InputFiles]
 ) -> dict[str, Any]:
@@ -193,8 +212,10 @@ def _manifest(
     kept, moved = [], {}
     for item in inputs:
         root = Path("inputs") / item.role
-        place = root / item.path.resolve().name
-        for file in item.files:
+        # The name that was given; a link's target may have lost its ending.
+        place = root / (item.path.name or item.path.resolve().name)
+        for file, digest in zip(item.files, item.digests, strict=True):
+            _refuse_changed(file, digest)
             name = place / file.name if item.path.is_dir() else place
             if copy:
                 (staging / name).parent.mkdir(parents=True, exist_ok=True)
@@ -204,7 +225,7 @@ def _manifest(
                     "role": item.role,
                     "name": name.as_posix() if copy else str(file.resolve()),
                     "kept": "copy" if copy else "reference",
-                    "sha256": sha256(file),
+                    "sha256": digest,
                     "bytes": file.stat().st_size,
                 }
             )
@@ -218,6 +239,15 @@ def _manifest(
         "versions": versions(),
         "platform": machine(),
     }
+
+
+def _refuse_changed(file: Path, digest: str) -> None:
+    if not file.is_file() or sha256(file) != digest:
+        raise DataError(
+            "it has changed or gone since it was read",
+            file=file.name,
+            remedy="run again",
+        )
 
 
 def _replace_paths(value: Any, moved: dict[str, str]) -> Any:
@@ -260,7 +290,7 @@ def write_timing(seal: Seal, seconds: dict[str, float]) -> None:
         Stage to seconds.
     """
     rounded = {stage: round(taken, 4) for stage, taken in seconds.items()}
-    (seal.path / TIMING).write_text(to_json({"seconds": rounded}), encoding="utf-8")
+    (seal.path / TIMING).write_text(to_json({"seconds": rounded}), encoding="utf-8", newline="\n")
 
 
 def read_manifest(bundle: Path) -> dict[str, Any]:
@@ -314,12 +344,34 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
                 raise ValueError
             if ".." in path.parts:
                 raise ValueError
+        _refuse_unsealed_paths(manifest)
+        for part in ("versions", "platform"):
+            if not all(isinstance(v, str) for v in manifest[part].values()):
+                raise ValueError
+        if not isinstance(manifest["command"], str):
+            raise ValueError
     except (TypeError, KeyError, ValueError, AttributeError):
         raise DataError(
-            "its list of files is malformed, or names files outside the folder",
+            "it is malformed, or names files outside the folder or outside the seal",
             file=MANIFEST,
             remedy="do not trust this bundle; get it again from its source",
         ) from None
+
+
+def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
+    """Refuse a configuration that reads what the seal does not hold."""
+    sealed = {item["name"] for item in manifest["inputs"]}
+    sealed |= {str(Path(name).parent) for name in sealed}
+    for path in _paths(manifest["configuration"]):
+        if path not in sealed:
+            raise ValueError
+
+
+def _paths(value: Any) -> Iterator[str]:
+    for key, item in value.items() if isinstance(value, dict) else ():
+        if key.endswith("path") and isinstance(item, str):
+            yield item
+        yield from _paths(item)
 
 
 def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:

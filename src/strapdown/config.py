@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
-__all__ = ["AttitudeSpec", "LogSpec", "ScenarioSpec", "SimulateSpec"]
+from strapdown.exceptions import ConfigError
+
+__all__ = ["AttitudeSpec", "LogSpec", "ScenarioSpec", "SimulateSpec", "specify"]
 
 
 class Spec(BaseModel):
@@ -20,9 +22,9 @@ class ScenarioSpec(Spec):
 
     kind: Literal["scenario"] = "scenario"
     name: str
-    rate_hz: float = 100.0
+    rate_hz: FiniteFloat = 100.0
     sampling: str = "instantaneous"
-    seed: int = 0
+    seed: int = Field(default=0, ge=0)
 
 
 class LogSpec(Spec):
@@ -36,7 +38,7 @@ class LogSpec(Spec):
     time_unit: str | None = None
     axes: str | None = None
     sampling: str | None = None
-    rate_hz: float | None = None
+    rate_hz: FiniteFloat | None = None
     repair: bool = False
 
 
@@ -50,8 +52,8 @@ class AttitudeSpec(Spec):
     references: tuple[str, ...] = ()
     truth_path: str | None = None
     gyro_bias_path: str | None = None
-    from_s: float | None = None
-    to_s: float | None = None
+    from_s: FiniteFloat | None = None
+    to_s: FiniteFloat | None = None
 
 
 class SimulateSpec(Spec):
@@ -59,3 +61,37 @@ class SimulateSpec(Spec):
 
     scenario: ScenarioSpec
     formats: tuple[str, ...] = ("csv",)
+
+
+S = TypeVar("S", bound=Spec)
+
+
+def specify(form: type[S], **values: Any) -> S:
+    """Make a specification, or say which value does not fit.
+
+    Parameters
+    ----------
+    form : type
+        One of the specifications here.
+    **values
+        Its fields.
+
+    Returns
+    -------
+    Spec
+
+    Raises
+    ------
+    ConfigError
+        A value is of the wrong kind or out of range.
+    """
+    try:
+        return form(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(
+            f"{first['input']!r} does not fit: {first['msg'].lower()}",
+            quantity=place,
+            remedy="give another value",
+        ) from None

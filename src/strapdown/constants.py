@@ -33,6 +33,9 @@ ACCEL_UNITS: dict[str, float] = {
     "m/s2": 1.0,
     "g": STANDARD_GRAVITY,
     "mg": 1e-3 * STANDARD_GRAVITY,
+    # Sensors that report gravity instead of specific force, as iOS does.
+    "-m/s2": -1.0,
+    "-g": -STANDARD_GRAVITY,
 }
 
 #: Factors to s.

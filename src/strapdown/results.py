@@ -128,11 +128,14 @@ class InputFiles:
         As it was given: a file, or a folder.
     files : tuple of Path
         Every file that was read.
+    digests : tuple of str
+        SHA-256 of each when it was read.
     """
 
     role: str
     path: Path
     files: tuple[Path, ...]
+    digests: tuple[str, ...]
 
 
 @dataclass(frozen=True)

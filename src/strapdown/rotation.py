@@ -41,6 +41,7 @@ __all__ = [
     "euler_from_quaternion",
     "euler_from_rotation_vector",
     "from_scipy",
+    "normalise",
     "quaternion_from_dcm",
     "quaternion_from_euler",
     "quaternion_from_rotation_vector",
@@ -450,6 +451,27 @@ def conjugate(q_ab: ArrayLike) -> Array:
     rows, leading = _unit(q_ab, "quaternion")
     q_ba: Array = rows * np.array([1.0, -1.0, -1.0, -1.0])
     return q_ba.reshape((*leading, 4))
+
+
+def normalise(q_ab: ArrayLike) -> Array:
+    """Scale quaternions to norm 1.
+
+    Parameters
+    ----------
+    q_ab : array_like, (..., 4)
+        Norm 1 within 1 %.
+
+    Returns
+    -------
+    ndarray, (..., 4)
+
+    Raises
+    ------
+    DataError
+        Wrong shape, a value that is not finite, or a norm that is not 1.
+    """
+    rows, leading = _unit(q_ab, "quaternion")
+    return rows.reshape((*leading, 4))
 
 
 def rotate(q_ab: ArrayLike, v_b: ArrayLike) -> Array:

@@ -16,9 +16,11 @@ from strapdown._kernels.increments import HEAD, OPTIONS, take_sample
 from strapdown._kernels.rotation import (
     dcm_coefficients_truncated,
     dcm_from_coefficients,
-    half_angle,
+    dcm_from_rotvec,
     half_angle_truncated,
+    quat_from_rotvec,
     quat_multiply,
+    quat_normalise,
     wrap_pi,
 )
 
@@ -77,11 +79,14 @@ def euler_note(state, cos_pitch):
 
 @njit(cache=True)
 def euler_finish(state, roll, pitch, heading):
+    before = math.cos(state[1])
     state[0] = wrap_pi(state[0] + roll)
     state[1] += pitch
     state[2] = wrap_pi(state[2] + heading)
     state[5] += 1.0
-    euler_note(state, math.cos(state[1]))
+    after = math.cos(state[1])
+    # A step from one side of the pole to the other went through it.
+    euler_note(state, 0.0 if before * after < 0.0 else after)
 
 
 @njit(cache=True)
@@ -138,13 +143,11 @@ def euler_update(record, time, rate):
 
 @njit(cache=True)
 def dcm_step(state, x, y, z, order, orthogonalise_every):
-    n2 = x * x + y * y + z * z
     if order == 0:
-        c, s = half_angle(0.25 * n2)
-        a, b = 2.0 * c * s, 2.0 * s * s
+        m = dcm_from_rotvec(x, y, z)
     else:
-        a, b = dcm_coefficients_truncated(n2, order)
-    m = dcm_from_coefficients(x, y, z, a, b)
+        a, b = dcm_coefficients_truncated(x * x + y * y + z * z, order)
+        m = dcm_from_coefficients(x, y, z, a, b)
     for i in range(0, 9, 3):
         p, q, r = state[i], state[i + 1], state[i + 2]
         state[i] = p * m[0] + q * m[3] + r * m[6]
@@ -210,11 +213,9 @@ def dcm_update(record, time, rate):
 @njit(cache=True)
 def quaternion_increment(x, y, z, order):
     """A (x) sigma_q of Alexiev (20); order 0 is the limit of the series."""
-    u = 0.25 * (x * x + y * y + z * z)
     if order == 0:
-        c, s = half_angle(u)
-    else:
-        c, s = half_angle_truncated(u, order)
+        return quat_from_rotvec(x, y, z)
+    c, s = half_angle_truncated(0.25 * (x * x + y * y + z * z), order)
     return c, s * x, s * y, s * z
 
 
@@ -222,8 +223,7 @@ def quaternion_increment(x, y, z, order):
 def quaternion_compose(w, x, y, z, dw, dx, dy, dz, normalise):
     w, x, y, z = quat_multiply(w, x, y, z, dw, dx, dy, dz)
     if normalise:
-        k = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
-        w, x, y, z = w * k, x * k, y * k, z * k
+        return quat_normalise(w, x, y, z)
     return w, x, y, z
 
 

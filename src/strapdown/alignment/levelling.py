@@ -25,6 +25,11 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
         Roll in (-180, 180], pitch in [-90, 90]. A tilt error of 0.1° for each 17 mm/s² of
         accelerometer bias.
 
+    Notes
+    -----
+    From ``f_b = C_bn (0, 0, -g)``, whose components are ``g sin(pitch)``,
+    ``-g cos(pitch) sin(roll)`` and ``-g cos(pitch) cos(roll)``.
+
     Raises
     ------
     DataError
@@ -40,6 +45,6 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
             remedy="state the unit with --accel-unit, use a log whose acceleration still has "
             "gravity in it, or give the initial attitude",
         )
-    roll = float(np.degrees(np.arctan2(-f[1], -f[2])))
+    roll = float(np.degrees(np.arctan2(0.0 - f[1], -f[2])))
     pitch = float(np.degrees(np.arctan2(f[0], np.hypot(f[1], f[2]))))
     return roll, pitch

@@ -59,7 +59,7 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
     ConfigError
         The name, an option or a value is not known; the message names the nearest.
     """
-    name, _, rest = text.strip().partition(":")
+    name, _, rest = text.strip().lower().partition(":")
     if name not in ALGORITHMS:
         raise ConfigError(
             f"'{name}' is no attitude algorithm",
@@ -138,7 +138,7 @@ def run_attitude(
     DivergenceError
         The algorithm left the range of floating point.
     """
-    unit = rotation.conjugate(rotation.conjugate(q_nb))
+    unit = rotation.normalise(q_nb)
     state = algorithm.begin(unit)
     first = algorithm.quaternions(state[None, : algorithm.width].copy())
     state, history = algorithm.advance(state, increments)

@@ -52,7 +52,7 @@ class AttitudeTracker:
                 quantity="sampling",
                 remedy=f"use {' or '.join(SAMPLINGS)}",
             )
-        unit = rotation.conjugate(rotation.conjugate(q_nb))
+        unit = rotation.normalise(q_nb)
         head = np.zeros(HEAD)
         head[MEAN] = float(sampling == "mean")
         options = algorithm.kernel_options()

@@ -96,7 +96,12 @@ def attitude(
         typer.Option(metavar="UNIT", help="rad/s, deg/s, …", rich_help_panel=_LOG),
     ] = None,
     accel_unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="m/s2, g, mg.", rich_help_panel=_LOG)
+        str | None,
+        typer.Option(
+            metavar="UNIT",
+            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS).",
+            rich_help_panel=_LOG,
+        ),
     ] = None,
     time_unit: Annotated[
         str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.", rich_help_panel=_LOG)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+import io
 import os
+import signal
 import sys
+from typing import NoReturn
 
 import typer
 
 from strapdown import __version__
 from strapdown.cli import attitude, demo, modules, simulate, verify
-from strapdown.exceptions import StrapdownError
+from strapdown.exceptions import Finding, StrapdownError
 
 EXIT_CODES = """
 Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood;
@@ -53,13 +57,40 @@ app.command("demo", epilog=demo.EPILOG)(demo.demo)
 
 def run() -> None:
     """Run the command line; errors that are foreseen become a message and an exit code."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # A terminal that cannot show a degree sign shows a question mark.
+            stream.reconfigure(errors="replace")
+    # A terminal that closes, or a scheduler that stops a job, leaves nothing behind either.
+    for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
+        signal.signal(number, lambda got, _: sys.exit(128 + got))
     try:
         app()
     except StrapdownError as error:
-        colour = sys.stderr.isatty()
-        typer.secho(f"error: {error}", err=True, fg=typer.colors.RED if colour else None)
-        sys.exit(error.exit_code)
-    except BrokenPipeError:
-        # The reader of our output has gone, as `| head` does; nothing is wrong here.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+        _fail(str(error), error.exit_code)
+    except OSError as error:
+        if error.errno == errno.EPIPE:
+            _reader_gone()
+        what = Finding(
+            error.strerror or str(error),
+            file=str(error.filename) if error.filename else None,
+            remedy="check the path and the free space, or name another folder with --out",
+        )
+        _fail(str(what), 4)
+    except SystemExit as end:
+        # Typer turns a closed pipe into an exit of 1 and hides the stream behind a wrapper.
+        if end.code == 1 and type(sys.stdout).__name__ == "PacifyFlushWrapper":
+            _reader_gone()
+        raise
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    colour = typer.colors.RED if sys.stderr.isatty() else None
+    typer.secho(f"error: {message}", err=True, fg=colour)
+    sys.exit(code)
+
+
+def _reader_gone() -> NoReturn:
+    """End quietly: the reader of our output has gone, as with ``| head``; nothing is wrong."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.__stdout__.fileno() if sys.__stdout__ else 1)
+    sys.exit(0)

@@ -22,13 +22,14 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeRun, Score
-from strapdown.tables import EULER, GYRO, references_table
+from strapdown.tables import EULER, THETA, references_table
 
-__all__ = ["in_words", "parse_reference", "score_references"]
+__all__ = ["in_words", "parse_reference", "references_from_words", "score_references"]
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
-_INSTANT = rf"(?:{_NUMBER}|start|end)"
+_INSTANT = rf"(?:{_NUMBER}(?:\s*s)?|start|end)"
 _AXIS_NAMES = {
     "x": ("x", 1.0),
     "y": ("y", 1.0),
@@ -82,7 +83,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     DataError
         An instant lies outside the log.
     """
-    plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text)).strip()
+    plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text.partition("#")[0])).strip()
     match = next((m for form in _FORMS if (m := form.fullmatch(plain))), None)
     if match is None:
         raise ConfigError(f"'{text}' is not understood", quantity="reference", remedy=_HOW)
@@ -90,8 +91,23 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     row: dict[str, object] = {"time": _instant(said["at"], start, end, text)}
     if said.get("sd"):
         row["sd"] = float(said["sd"])
+        if not float(said["sd"]) > 0.0:
+            raise ConfigError(
+                f"'{text}' has a standard deviation that is not positive",
+                quantity="reference",
+                remedy="leave sd out, or give degrees",
+            )
     if "since" in said:
         row["since"] = _instant(said["since"], start, end, text)
+        since, at = row["since"], row["time"]
+        assert isinstance(since, float) and isinstance(at, float)
+        # An interval whose ends are words is as long as the log, which is not known here yet.
+        if since >= at and np.isfinite([since, at]).all():
+            raise ConfigError(
+                f"'{text}' compares {at:g} s with {since:g} s, which is not before it",
+                quantity="reference",
+                remedy="name the earlier instant second",
+            )
     if "turns" in said:
         axis, sign = _axis(said["axis"], text)
         row |= {"kind": "turns", "axis": axis, "turns": sign * float(said["turns"])}
@@ -105,9 +121,9 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
 def _instant(word: str, start: float, end: float, text: str) -> float:
     if word.lower() in ("start", "end"):
         return start if word.lower() == "start" else end
-    value = float(word)
-    # Printed stamps are rounded; an instant that is meant as the last sample counts as it.
-    slack = 1e-6 * (end - start)
+    value = float(word.lower().rstrip("s "))
+    # Stamps are printed to a millisecond; one that is meant as the last sample counts as it.
+    slack = 1e-3
     if not start - slack <= value <= end + slack:
         raise DataError(
             f"'{text}' names {value:g} s, and the log runs from {start:.9g} to {end:.9g} s",
@@ -214,11 +230,9 @@ def score_references(
 
 def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:
     """Integral of one gyro between two instants, deg."""
+    increments = increments_from_imu(imu)
+    angle = np.concatenate([[0.0], np.cumsum(increments[THETA[axis]].to_numpy())])
     time = imu.index.to_numpy(dtype=np.float64)
-    rate = imu[GYRO[axis]].to_numpy(dtype=np.float64)
-    steps = np.diff(time)
-    mean = rate[1:] if imu.attrs["sampling"] == "mean" else 0.5 * (rate[1:] + rate[:-1])
-    angle = np.concatenate([[0.0], np.cumsum(mean * steps)])
     return float(np.degrees(np.interp(until, time, angle) - np.interp(since, time, angle)))
 
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.exceptions import DataError, Finding
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog
+from strapdown.tables import SAMPLINGS
 
 RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
 # What a small file may unfold to; a longer log is honest about its size.
@@ -72,28 +75,47 @@ def raw_log(
     columns: dict[str, NDArray[Any]] = {}
     for name, array in arrays.items():
         columns |= _columns(name, np.squeeze(array))
-    lengths = [c.size for c in columns.values()]
-    if not lengths:
+    if not columns:
         raise DataError(
-            f"no array of numbers in it; it holds: {', '.join(arrays) or 'nothing'}",
+            f"no array of numbers in it; it holds: {', '.join([*arrays, *meta]) or 'nothing'}",
             file=path.name,
             remedy="export the log as arrays of one row a sample",
         )
-    samples = _samples(columns, lengths)
+    samples = _samples(columns)
+    findings = _left_out(columns, samples, path.name)
     columns = {n: c for n, c in columns.items() if c.size == samples}
+    sampling, axes = _text(meta.get("sampling")), _text(meta.get("axes"))
     return RawLog(
         name=path.name,
         files=(path,),
         columns=columns,
         units={n: units[b] for n in columns if (b := n.partition("[")[0]) in units},
         rate=_rate(meta),
-        sampling=_text(meta.get("sampling")),
-        axes="x,y,z" if _text(meta.get("axes")) == "forward-right-down" else None,
+        sampling=sampling if sampling in SAMPLINGS else None,
+        axes="x,y,z" if axes == "forward-right-down" else None,
+        findings=findings,
     )
 
 
+def _left_out(columns: dict[str, NDArray[Any]], samples: int, file: str) -> list[Finding]:
+    """Name what has another length than the gyro; stamps of another length are no stamps."""
+    other = {n: c.size for n, c in columns.items() if c.size != samples}
+    for name, size in other.items():
+        if read_name(name).quantity == "time":
+            raise DataError(
+                f"'{name}' has {size} values, and the gyro {samples} samples",
+                file=file,
+                quantity="time",
+                remedy="give each sample its stamp",
+            )
+    if not other:
+        return []
+    listed = ", ".join(f"{name} ({size} values)" for name, size in other.items())
+    return [Finding(f"left out, because the gyro has {samples} samples: {listed}", file=file)]
+
+
 def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
-    if array.dtype.kind not in "iufb" or array.ndim not in (1, 2) or array.size < 2:
+    if array.dtype.kind not in "iufbM" or array.ndim not in (1, 2) or array.size < 2:
         return {}
     if array.ndim == 1:
         return {name: array}
@@ -104,19 +126,24 @@ def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
     return {f"{name}[{k}]": np.ascontiguousarray(rows[:, k]) for k in range(rows.shape[1])}
 
 
-def _samples(columns: dict[str, NDArray[Any]], lengths: list[int]) -> int:
+def _samples(columns: dict[str, NDArray[Any]]) -> int:
     """Length of the gyro's arrays, or else the most common length."""
-    for name, column in columns.items():
-        if str(read_name(name).quantity).startswith("gyro"):
-            return int(column.size)
-    return max(set(lengths), key=lengths.count)
+    lengths = [c.size for n, c in columns.items() if str(read_name(n).quantity).startswith("gyro")]
+    lengths = lengths or [c.size for c in columns.values()]
+    return int(max(set(lengths), key=lengths.count))
 
 
 def _rate(meta: dict[str, Any]) -> float | None:
+    """A sampling rate that the file states, as a number or as text with its unit."""
     for key in RATES:
-        if key in meta:
-            rate = float(np.asarray(meta[key]).reshape(-1)[0])
-            return rate if np.isfinite(rate) and rate > 0 else None
+        text = _text(meta.get(key)) or ""
+        match = re.fullmatch(r"\s*([\d.eE+-]+)\s*(Hz)?\s*", text, re.I)
+        try:
+            rate = float(match.group(1)) if match else math.nan
+        except ValueError:
+            continue
+        if math.isfinite(rate) and rate > 0:
+            return rate
     return None
 
 

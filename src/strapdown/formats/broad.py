@@ -11,6 +11,7 @@ from strapdown import rotation
 from strapdown.exceptions import DataError
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
+from strapdown.formats.assemble_truth import LOST
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 
 # East-north-up to north-east-down: half a turn about the diagonal between north and east.
@@ -49,25 +50,21 @@ def read(path: Path) -> RawLog:
         The file is damaged, or a dataset has another length than the gyro's.
     """
     arrays, _, meta = hdf5.read_arrays(path)
-    raw = raw_log(path, {k: arrays[k] for k in ("imu_gyr", "imu_acc")}, {}, meta)
-    samples = len(arrays["imu_gyr"])
-    movement = arrays.get("movement", np.ones(samples, dtype=bool)).astype(bool)
-    q_enu = arrays["opt_quat"]
-    if q_enu.shape != (samples, 4) or movement.shape != (samples,):
+    shapes = {name: arrays[name].shape for name in ("imu_gyr", "imu_acc", "opt_quat")}
+    samples = max((s[0] for s in shapes.values() if s), default=0)
+    movement = np.asarray(arrays.get("movement", np.ones(samples, dtype=bool))).astype(bool)
+    wanted = {"imu_gyr": (samples, 3), "imu_acc": (samples, 3), "opt_quat": (samples, 4)}
+    if samples < 2 or shapes != wanted or movement.shape != (samples,):
         raise DataError(
-            f"opt_quat has shape {q_enu.shape} and movement {movement.shape}, for {samples} "
-            "samples of the gyro",
+            f"imu_gyr, imu_acc, opt_quat have the shapes {', '.join(map(str, shapes.values()))} "
+            f"and movement {movement.shape}",
             file=path.name,
             remedy="get the trial again from its source",
         )
-    if raw.rate is None:
-        raise DataError(
-            "the attribute sampling_rate is missing",
-            file=path.name,
-            quantity="time",
-            remedy="state it with --rate",
-        )
-    known = np.isfinite(q_enu).all(axis=1)
+    raw = raw_log(path, {k: arrays[k] for k in ("imu_gyr", "imu_acc")}, {}, meta)
+    q_enu = arrays["opt_quat"].astype(np.float64)
+    # Zeros stand where the markers were lost, as NaN does.
+    known = np.isfinite(q_enu).all(axis=1) & (np.abs(q_enu).max(axis=1) > LOST)
     q_ns = np.full((samples, 4), np.nan)
     q_ns[known] = rotation.compose(_Q_NED_ENU, q_enu[known])
     return dataclasses.replace(

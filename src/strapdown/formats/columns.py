@@ -66,6 +66,20 @@ TIMES = [
     "epoch",
     "stamp",
 ]
+# Names of clocks that say their unit.
+CLOCKS = {
+    "seconds": "s",
+    "secs": "s",
+    "sec": "s",
+    "secondselapsed": "s",
+    "elapsedseconds": "s",
+    "millis": "ms",
+    "milliseconds": "ms",
+    "micros": "us",
+    "microseconds": "us",
+    "nanos": "ns",
+    "nanoseconds": "ns",
+}
 QUATERNIONS = {
     "q_w": ["qw", "quatw", "quaternionw", "q0"],
     "q_x": ["qx", "quatx", "quaternionx", "q1"],
@@ -103,7 +117,7 @@ _SPELLINGS = {
     "rad": "rad radian radians",
 }
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
-_INDEXED = re.compile(r".*\[\d+\]")
+_INDEXED = re.compile(r"(.*)\[(\d+)\]")
 _AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
@@ -138,21 +152,36 @@ def read_name(name: str) -> ColumnName:
     ColumnName
         With None for what the name does not say.
     """
-    text, _, index = (
-        name.strip().partition("[") if _INDEXED.fullmatch(name.strip()) else (name, "", "")
-    )
-    text = text.strip()
+    text, index = name.strip(), ""
+    if match := _INDEXED.fullmatch(text):
+        text, index = match.groups()
     bracket = _BRACKETS.search(text)
     unit = UNIT_OF.get(bracket.group(1).lower().replace(" ", "")) if bracket else None
     if bracket:
         text = text[: bracket.start()]
-    words = [w for w in re.split(r"[\s_\-./:]+", text.lower()) if w]
+    said = ColumnName(None, unit)
+    # Of group/sub/name the last part says most, unless the whole is a name itself.
+    parts = re.split(r"[/.]", text)
+    for start in range(len(parts)):
+        said = _read_words(" ".join(parts[start:]), unit)
+        if said.quantity:
+            break
+    quantity = said.quantity
+    if quantity in TRIADS and index in _AXES_BY_INDEX:
+        quantity = f"{quantity}_{_AXES_BY_INDEX[index]}"
+    if quantity == "time" and (
+        (bracket and unit is None) or (said.unit is not None and said.unit not in TIME_UNITS)
+    ):
+        return ColumnName(None, said.unit)
+    return ColumnName(quantity, said.unit)
+
+
+def _read_words(text: str, unit: str | None) -> ColumnName:
+    words = [w for w in re.split(r"[\s_\-/:]+", text.lower()) if w]
     if unit is None:
         words, unit = _split_unit(words)
-    quantity = _quantity("".join(words))
-    if quantity in TRIADS and index[:1] in _AXES_BY_INDEX:
-        quantity = f"{quantity}_{_AXES_BY_INDEX[index[0]]}"
-    return ColumnName(quantity, unit)
+    word = "".join(words)
+    return ColumnName(_quantity(word), unit or CLOCKS.get(word))
 
 
 def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
@@ -166,7 +195,7 @@ def _split_unit(words: list[str]) -> tuple[list[str], str | None]:
 
 
 def _quantity(word: str) -> str | None:
-    if word in TIMES:
+    if word in TIMES or word in CLOCKS:
         return "time"
     for table in (QUATERNIONS, EULERS):
         for quantity, names in table.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import codecs
+import itertools
 import re
 from pathlib import Path
 from typing import Any
@@ -10,12 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
+from strapdown.formats.columns import UNIT_OF
 from strapdown.formats.recording import RawLog
+from strapdown.tables import SAMPLINGS
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%")
 Columns = list[NDArray[Any]]
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|nan|[+-]?inf(inity)?", re.I)
+_META = re.compile(r"[#%]\s*(\w+)\s*:\s*(.+?)\s*$")
+_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
+_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:.*")
+_HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
+# What programs write for a value that is not there.
+NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 
 
 def detect(path: Path) -> bool:
@@ -41,66 +50,86 @@ def read(path: Path) -> RawLog:
     DataError
         The file is empty, holds a header alone, or is no text.
     """
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
+    text, findings = _decoded(path)
+    numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
+    comments = [line for _, line in itertools.takewhile(_is_comment, numbered)]
+    numbered = numbered[len(comments) :]
+    if not numbered:
         raise DataError(
-            f"no text: byte {error.start} is not UTF-8",
-            file=path.name,
-            remedy="give the file its own ending (.mat, .h5, .npz), or save it as UTF-8",
-        ) from None
-    lines = text.splitlines()
-    comments = 0
-    while comments < len(lines) and (
-        not lines[comments].strip() or lines[comments].lstrip().startswith(COMMENTS)
-    ):
-        comments += 1
-    if comments == len(lines):
-        raise DataError(
-            "the file is empty" if not text.strip() else "the file holds comments alone",
+            "the file holds comments alone" if comments else "the file is empty",
             file=path.name,
             remedy="check that the recording was saved and copied whole",
         )
-    separator = _separator(lines[comments])
-    fields = _split(lines[comments], separator)
-    header = any(not _NUMBER.fullmatch(f.strip()) for f in fields if f.strip())
-    first = comments + (1 if header else 0)
-    while len(lines) > first and not lines[-1].strip():
-        lines.pop()
-    if len(lines) <= first:
-        raise DataError(
-            "a header, and no data under it",
-            file=path.name,
-            row=comments + 1,
-            remedy="check that the recording was saved and copied whole",
-        )
-    names = [f.strip().strip('"') for f in fields] if header else _above(lines[:comments], fields)
-    findings = _drop_cut_line(lines, first, len(names), separator, path.name)
-    _check_widths(lines, first, len(names), separator, path.name)
-    columns = _parse(lines, first, len(names), separator)
-    meta: dict[str, str] = {}
-    for line in lines[:comments]:
-        if match := re.match(r"[#%]\s*(\w+)\s*:\s*(.+?)\s*$", line):
-            meta[match.group(1)] = match.group(2)
+    separator = _separator(numbered[0][1])
+    fields = _fields(numbered[0][1], separator)
+    names, units = _above(comments, fields), {}
+    if not all(_is_data(f) for f in fields):
+        head = numbered.pop(0)
+        names = fields[:-1] if len(fields) > 1 and not fields[-1] else fields
+        if numbered and (below := _units(numbered[0][1], separator, len(names))):
+            numbered.pop(0)
+            units = {n: u for n, u in zip(_unique(names), below, strict=True) if u}
+        if not numbered:
+            raise DataError(
+                "a header, and no data under it",
+                file=path.name,
+                row=head[0],
+                remedy="check that the recording was saved and copied whole",
+            )
+    rows, lines = _whole_lines(numbered, len(names), separator, text, path.name, findings)
+    columns = _parse(lines, len(names), separator)
+    meta = {m[1]: m[2] for c in comments if (m := _META.match(c))}
+    sampling, axes = meta.get("sampling"), meta.get("axes")
     return RawLog(
         name=path.name,
         files=(path,),
         columns=dict(zip(_unique(names), columns, strict=True)),
-        first_row=first + 1,
-        sampling=meta.get("sampling"),
-        axes="x,y,z" if meta.get("axes") == "forward-right-down" else None,
+        rows=np.array(rows),
+        units=units,
+        sampling=sampling if sampling in SAMPLINGS else None,
+        axes="x,y,z" if axes == "forward-right-down" else None,
         findings=findings,
     )
 
 
+def _decoded(path: Path) -> tuple[str, list[Finding]]:
+    data = path.read_bytes()
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return data.decode("utf-16", "replace"), []
+    if b"\0" in data[:4096]:
+        raise DataError(
+            "no text: it holds zero bytes",
+            file=path.name,
+            remedy="give the file its own ending (.mat, .h5, .npz)",
+        )
+    try:
+        return data.decode("utf-8-sig"), []
+    except UnicodeDecodeError as error:
+        what = f"byte {error.start} is not UTF-8; read as Windows-1252"
+        return data.decode("cp1252", "replace"), [Finding(what, file=path.name)]
+
+
+def _is_comment(numbered: tuple[int, str]) -> bool:
+    return numbered[1].lstrip().startswith(COMMENTS)
+
+
+def _is_data(field: str) -> bool:
+    return field in NULLS or any(p.fullmatch(field) for p in (_NUMBER, _DATE, _HEX))
+
+
+def _units(line: str, separator: str | None, width: int) -> list[str] | None:
+    """Units of a second header line, where every field of it is one."""
+    fields = [f.strip("[]() ") for f in _fields(line, separator)][:width]
+    known = [f.lower() in UNIT_OF for f in fields if f]
+    return fields if len(fields) == width and known and all(known) else None
+
+
 def _above(comments: list[str], fields: list[str]) -> list[str]:
     """Names of columns without a header: the last comment, where it is one; else numbers."""
-    for line in reversed(comments):
-        text = line.strip().lstrip("".join(COMMENTS)).strip()
-        names = [f.strip() for f in _split(text, _separator(text))]
-        if len(names) == len(fields) and not any(_NUMBER.fullmatch(n) for n in names):
-            return names
-        break
+    text = comments[-1].strip().lstrip("".join(COMMENTS)).strip() if comments else ""
+    names = _fields(text, _separator(text))
+    if len(names) == len(fields) and not any(_is_data(n) for n in names):
+        return names
     return [f"column {k + 1}" for k in range(len(fields))]
 
 
@@ -121,86 +150,121 @@ def _separator(line: str) -> str | None:
     return None
 
 
-def _split(line: str, separator: str | None) -> list[str]:
+def _fields(line: str, separator: str | None) -> list[str]:
     if separator is not None and '"' in line:
         import csv
 
-        return next(csv.reader([line], delimiter=separator))
-    return line.split(separator)
+        return [f.strip() for f in next(csv.reader([line], delimiter=separator))]
+    return [f.strip() for f in line.split(separator)]
 
 
-def _drop_cut_line(
-    lines: list[str], first: int, width: int, separator: str | None, name: str
-) -> list[Finding]:
-    """Drop a last line that was cut short; with it alone there would be no data."""
-    last = _split(lines[-1], separator)
-    if len(last) >= width or len(lines) - first < 2:
-        return []
-    row = len(lines)
-    lines.pop()
-    return [
-        Finding(
-            f"the last line is cut: {len(last)} of {width} fields. It was left out",
-            file=name,
-            row=row,
-            remedy="if more is missing, copy the file again",
-        )
-    ]
-
-
-def _check_widths(
-    lines: list[str], first: int, width: int, separator: str | None, name: str
-) -> None:
-    if separator is None:
-        counts = (len(line.split()) for line in lines[first:])
-    else:
-        counts = (
-            len(_split(line, separator)) if '"' in line else line.count(separator) + 1
-            for line in lines[first:]
-        )
-    for k, count in enumerate(counts):
+def _whole_lines(
+    numbered: list[tuple[int, str]],
+    width: int,
+    separator: str | None,
+    text: str,
+    name: str,
+    findings: list[Finding],
+) -> tuple[list[int], list[str]]:
+    """Return rows and lines of one width; a last line that was cut is left out."""
+    rows, lines = [], []
+    ended = text.endswith(("\n", "\r"))
+    for k, (row, line) in enumerate(numbered):
+        last = k == len(numbered) - 1
+        if last and k and _was_cut(line, numbered[max(0, k - 20) : k], width, separator, ended):
+            findings.append(
+                Finding(
+                    "the last line is cut; it was left out",
+                    file=name,
+                    row=row,
+                    remedy="if more is missing, copy the file again",
+                )
+            )
+            break
+        count = _count(line, separator)
+        if count == width + 1 and separator and line.rstrip().endswith(separator):
+            line, count = line.rstrip()[:-1], width
         if count != width:
             raise DataError(
                 f"{count} fields, where the first line has {width}",
                 file=name,
-                row=first + k + 1,
+                row=row,
                 remedy="correct or delete that row",
             )
+        rows.append(row)
+        lines.append(line)
+    return rows, lines
 
 
-def _parse(lines: list[str], first: int, count: int, separator: str | None) -> Columns:
+def _count(line: str, separator: str | None) -> int:
+    if separator is None or '"' in line:
+        return len(_fields(line, separator))
+    return line.count(separator) + 1
+
+
+def _was_cut(
+    line: str, before: list[tuple[int, str]], width: int, separator: str | None, ended: bool
+) -> bool:
+    """Tell whether the last line stops in the middle of a field, or before the last one."""
+    fields = _fields(line, separator)
+    if len(fields) < width:
+        return True
+    if ended or len(fields) != width:
+        return False
+    ends = [_fields(other, separator)[-1] for _, other in before]
+    if not all(_NUMBER.fullmatch(e) for e in ends):
+        return False
+    # Without a line end the last number may have lost digits; where all others have the same
+    # number of decimals, that shows.
+    decimals = {len(e.partition(".")[2]) for e in ends}
+    short = len(decimals) == 1 and len(fields[-1].partition(".")[2]) < decimals.pop()
+    return not _NUMBER.fullmatch(fields[-1]) or short
+
+
+def _parse(lines: list[str], count: int, separator: str | None) -> Columns:
     """Parse the lines under the header, each number to the double nearest to it."""
     import pyarrow as pa
     import pyarrow.csv as pa_csv
 
-    body = lines[first:]
-    decimal = "," if separator != "," and any("," in line for line in body[:5]) else "."
+    decimal = "," if separator != "," and _comma_is_decimal(lines, separator) else "."
     if separator is None:
-        body = ["\t".join(line.split()) for line in body]
+        lines = ["\t".join(line.split()) for line in lines]
+    # Arrow reads 0xFFF0 as a number; what a sensor meant by it is not known.
+    odd = next((line for line in lines if "0x" in line or "0X" in line), "")
+    hexadecimal = [k for k, f in enumerate(_fields(odd, separator)) if _HEX.fullmatch(f)]
     table = pa_csv.read_csv(
-        pa.BufferReader("\n".join(body).encode()),
+        pa.BufferReader("\n".join(lines).encode()),
         read_options=pa_csv.ReadOptions(
             column_names=[str(k) for k in range(count)], use_threads=False
         ),
         parse_options=pa_csv.ParseOptions(delimiter=separator or "\t", ignore_empty_lines=False),
         convert_options=pa_csv.ConvertOptions(
             decimal_point=decimal,
-            null_values=["", "nan", "NaN", "NAN", "-nan"],
+            null_values=list(NULLS),
             strings_can_be_null=True,
-            timestamp_parsers=[],
+            column_types={str(k): pa.string() for k in hexadecimal},
         ),
     )
     return [_array(table.column(k)) for k in range(count)]
 
 
+def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
+    line = next((line for line in lines if "," in line), "")
+    numbers = [f for f in _fields(line, separator) if _NUMBER.fullmatch(f)]
+    return any("," in n for n in numbers) and not any("." in n for n in numbers)
+
+
 def _array(column: Any) -> NDArray[Any]:
-    """Numbers as numbers, with NaN for what is missing; anything else as text."""
+    """Numbers as numbers with NaN for what is missing, dates as dates, the rest as text."""
     kind = str(column.type)
     if kind in ("int64", "double"):
         values: NDArray[Any] = column.to_numpy()
         return values
     if kind == "null":
         return np.full(len(column), np.nan)
+    if kind.startswith("timestamp") and not column.null_count:
+        dates: NDArray[Any] = column.cast("timestamp[ns]").to_numpy()
+        return dates
     return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
 
 

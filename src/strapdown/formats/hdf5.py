@@ -82,11 +82,15 @@ def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str], di
                         meta.setdefault(name, values[()])
                     else:
                         arrays[name] = values
-                    if "unit" in item.attrs:
-                        units[name] = str(item.attrs["unit"])
+                    for key in ("unit", "units"):
+                        if key in item.attrs:
+                            said = item.attrs[key]
+                            units[name] = said.decode() if isinstance(said, bytes) else str(said)
 
             file.visititems(visit)
-    except (OSError, RuntimeError, KeyError, ValueError, MemoryError) as error:
+    except DataError:
+        raise
+    except Exception as error:  # a damaged file can break the library anywhere
         raise DataError(
             f"it cannot be read as HDF5: {error}",
             file=path.name,

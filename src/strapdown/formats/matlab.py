@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -63,33 +62,36 @@ def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         As `read`.
     """
     from scipy.io import loadmat, whosmat
-    from scipy.io.matlab import MatReadError
 
     stored = path.stat().st_size
     try:
         for name, shape, _ in whosmat(path):
             refuse_lie(8 * int(np.prod(shape, dtype=object)), stored, str(name), path.name)
         content = loadmat(path)
-    except (
-        MatReadError,
-        OSError,
-        ValueError,
-        TypeError,
-        KeyError,
-        IndexError,
-        EOFError,
-        MemoryError,
-        NotImplementedError,
-        zlib.error,
-    ) as error:
+    except DataError:
+        raise
+    except Exception as error:  # a damaged file can break the parser anywhere
         raise DataError(
             f"it cannot be read as a MATLAB file: {error or type(error).__name__}",
             file=path.name,
             remedy="copy it again, or save it from MATLAB with -v7 or -v7.3",
         ) from None
-    named = {k: v for k, v in content.items() if not k.startswith("__")}
+    named: dict[str, NDArray[Any]] = {}
+    for name, value in content.items():
+        if not name.startswith("__"):
+            named |= _unfolded(name, value)
     arrays = {k: v for k, v in named.items() if v.dtype.kind in "iufb" and v.size > 1}
-    return arrays, {k: v for k, v in named.items() if k not in arrays and v.size == 1}
+    return arrays, {k: v for k, v in named.items() if k not in arrays}
+
+
+def _unfolded(name: str, value: Any) -> dict[str, NDArray[Any]]:
+    """A value under its name; the fields of a structure under name.field."""
+    if not isinstance(value, np.ndarray) or value.dtype.names is None or value.size != 1:
+        return {name: np.asarray(value)}
+    found: dict[str, NDArray[Any]] = {}
+    for field in value.dtype.names:
+        found |= _unfolded(f"{name}.{field}", value[field].item())
+    return found
 
 
 def write(path: Path, arrays: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:

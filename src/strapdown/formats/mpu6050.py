@@ -21,8 +21,8 @@ GYRO_FILE = "mpu6050_gyroscope.mat"
 ACCEL_FILE = "mpu6050_accelerometer.mat"
 # Lying with z up the board reads +1 g on z, and with its x mark up it reads -1 g on x: forward
 # is -x. The triads as read are right-handed: of the eight choices of sign for the gyro, (+, +, +)
-# alone predicts the direction of gravity that the accelerometer measures through all three
-# recorded turns (a test holds this). Right is therefore +y.
+# predicts the direction of gravity that the accelerometer measures best in each of the three
+# recorded turns, and by far in the one about y (a test holds this). Right is therefore +y.
 AXES = "-x,y,-z"
 
 
@@ -60,21 +60,9 @@ def read(path: Path) -> RawLog:
     if (path / ACCEL_FILE).is_file():
         files.append(path / ACCEL_FILE)
         accel = _buffer(path / ACCEL_FILE, "accelBuffer", findings)
-        if not np.array_equal(accel[:, 0], gyro[:, 0]):
-            order = np.argsort(accel[:, 0], kind="stable")
-            accel = np.column_stack(
-                [gyro[:, 0]]
-                + [np.interp(gyro[:, 0], accel[order, 0], accel[order, k]) for k in (1, 2, 3)]
-            )
-            findings.append(
-                Finding(
-                    "interpolated to the stamps of the gyro, which are not its own",
-                    file=ACCEL_FILE,
-                    quantity="accel",
-                )
-            )
-        columns |= {f"accel[{k}]": accel[:, k + 1] for k in range(3)}
-        stated |= {f"accel[{k}]": (f"accel_{'xyz'[k]}", "g") for k in range(3)}
+        if len(accel) > 1:
+            columns |= _accel_columns(accel, gyro[:, 0], findings)
+            stated |= {f"accel[{k}]": (f"accel_{'xyz'[k]}", "g") for k in range(3)}
     return RawLog(
         name=path.resolve().name,
         files=tuple(files),
@@ -84,6 +72,25 @@ def read(path: Path) -> RawLog:
         axes=AXES,
         findings=findings,
     )
+
+
+def _accel_columns(
+    accel: NDArray[Any], time: NDArray[Any], findings: list[Finding]
+) -> dict[str, NDArray[Any]]:
+    """The accelerometer at the stamps of the gyro; NaN where it has a hole of its own."""
+    if not np.array_equal(accel[:, 0], time):
+        order = np.argsort(accel[:, 0], kind="stable")
+        accel = np.column_stack(
+            [time] + [np.interp(time, accel[order, 0], accel[order, k]) for k in (1, 2, 3)]
+        )
+        findings.append(
+            Finding(
+                "interpolated to the stamps of the gyro, which are not its own",
+                file=ACCEL_FILE,
+                quantity="accel",
+            )
+        )
+    return {f"accel[{k}]": accel[:, k + 1] for k in range(3)}
 
 
 def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:

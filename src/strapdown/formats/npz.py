@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -44,16 +43,11 @@ def read(path: Path) -> RawLog:
                 if info.filename.endswith(".npy"):
                     array = _member(archive, info, path.name)
                     (meta if array.ndim == 0 else arrays)[info.filename[:-4]] = array
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        EOFError,
-        OSError,
-        ValueError,
-        NotImplementedError,
-    ) as error:
+    except DataError:
+        raise
+    except Exception as error:  # a damaged archive can break any of the decoders it goes through
         raise DataError(
-            f"the archive cannot be read: {error}",
+            f"the archive cannot be read: {error or type(error).__name__}",
             file=path.name,
             remedy="copy it again; it must come from numpy.savez, with numbers alone",
         ) from None

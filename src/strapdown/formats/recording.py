@@ -15,7 +15,7 @@ from strapdown.results import Reading
 
 Array = NDArray[np.float64]
 
-__all__ = ["RawLog", "ReadOptions", "Recording", "TruthInSensorAxes"]
+__all__ = ["Origin", "RawLog", "ReadOptions", "Recording", "TruthInSensorAxes"]
 
 
 @dataclass(frozen=True)
@@ -78,8 +78,9 @@ class RawLog:
         Every file that was read.
     columns : dict of str to ndarray
         One-dimensional; not numbers where the file holds text.
-    first_row : int
-        Row of the file in which the first sample stands, counted from 1.
+    rows : ndarray of int, or None
+        Row of the file in which each sample stands, counted from 1; None where sample k stands
+        in row k + 1.
     stated : dict of str to (str, str)
         For a known recording: column to (quantity, unit).
     units : dict of str to str
@@ -95,7 +96,7 @@ class RawLog:
     name: str
     files: tuple[Path, ...]
     columns: dict[str, NDArray[Any]]
-    first_row: int = 1
+    rows: NDArray[np.int64] | None = None
     stated: dict[str, tuple[str, str]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
@@ -103,6 +104,24 @@ class RawLog:
     axes: str | None = None
     truth: TruthInSensorAxes | None = None
     findings: list[Finding] = field(default_factory=list)
+
+    def row(self, sample: int) -> int:
+        """Row of the file, counted from 1, in which a sample stands."""
+        return sample + 1 if self.rows is None else int(self.rows[sample])
+
+
+@dataclass(frozen=True)
+class Origin:
+    """The raw stamp that became time zero; zero itself where time was left as it is.
+
+    Attributes
+    ----------
+    stamp : int or float
+    unit : str
+    """
+
+    stamp: int | float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -113,6 +132,8 @@ class Recording:
     ----------
     name : str
     files : tuple of Path
+    origin : Origin
+        Where its time counts from.
     imu : DataFrame
         Imu table: body axes forward-right-down, SI.
     truth : DataFrame or None
@@ -127,6 +148,7 @@ class Recording:
 
     name: str
     files: tuple[Path, ...]
+    origin: Origin
     imu: pd.DataFrame
     truth: pd.DataFrame | None
     scored: NDArray[np.bool_] | None

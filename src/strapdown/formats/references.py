@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from strapdown.evaluation.reference_points import parse_reference
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.formats import read_raw
-from strapdown.formats.assemble import assemble_attitude
-from strapdown.formats.csv import SUFFIXES
-from strapdown.formats.recording import ReadOptions
+from strapdown.formats import csv, read_raw
+from strapdown.formats.assemble_truth import truth_of_file
+from strapdown.formats.recording import Origin, ReadOptions
 
 __all__ = ["read_reference_words", "read_truth"]
+
+# What tells a sentence from the header of a table that has a column named roll.
+SENTENCE = re.compile(r"same[ -]as|turns?\s+about|^\S+\s*:?\s+roll[ =]+[-+\d.]", re.I)
 
 
 def read_reference_words(path: Path) -> list[str] | None:
@@ -41,7 +45,7 @@ def read_reference_words(path: Path) -> list[str] | None:
     """
     if path.suffix.lower() == ".toml":
         return _understood(list(enumerate(_from_toml(path), start=1)), path, "sentence")
-    if path.suffix.lower() not in SUFFIXES:
+    if path.suffix.lower() not in csv.SUFFIXES:
         return None
     numbered = [
         (number, line.strip())
@@ -53,19 +57,25 @@ def read_reference_words(path: Path) -> list[str] | None:
     lines = [line for _, line in numbered]
     if lines and "kind" in [f.strip() for f in lines[0].split(",")]:
         return _from_csv(path)
-    if lines and any(f" {word} " in f" {lines[0]} " for word in ("same", "roll", "turns", "turn")):
+    if lines and SENTENCE.search(lines[0]):
         return _understood(numbered, path, "line")
     return None
 
 
 def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[str]:
     """Return the sentences, or say which of them is not understood."""
+    if not numbered:
+        raise DataError(
+            "an empty list of reference points",
+            file=path.name,
+            remedy="write one sentence at least, or leave the file out",
+        )
     for number, text in numbered:
         try:
             parse_reference(text, -math.inf, math.inf)
         except ConfigError as error:
             raise DataError(
-                f"{what} {number}: {error.finding.what}",
+                error.finding.what if what == "line" else f"{what} {number}: {error.finding.what}",
                 file=path.name,
                 row=number if what == "line" else None,
                 quantity="reference",
@@ -90,12 +100,13 @@ def _from_toml(path: Path) -> list[str]:
 
 
 def _from_csv(path: Path) -> list[str]:
-    table = pd.read_csv(path, comment="#", skipinitialspace=True)
+    raw = csv.read(path)
     words = []
-    for number, row in table.iterrows():
-        kind, file_row = str(row["kind"]).strip(), int(str(number)) + 2
+    for sample in range(len(raw.columns["kind"])):
+        row = {name: column[sample] for name, column in raw.columns.items()}
+        kind, file_row = str(row["kind"]).strip(), raw.row(sample)
 
-        def value(name: str, row: pd.Series = row, file_row: int = file_row) -> str:
+        def value(name: str, row: dict[str, Any] = row, file_row: int = file_row) -> str:
             if name not in row or pd.isna(row[name]) or not str(row[name]).strip():
                 raise DataError(
                     f"a reference of kind '{row['kind']}' needs it, and it is missing",
@@ -131,7 +142,9 @@ def _from_csv(path: Path) -> list[str]:
     return words
 
 
-def read_truth(path: Path, options: ReadOptions | None = None) -> pd.DataFrame:
+def read_truth(
+    path: Path, options: ReadOptions | None = None, origin: Origin | None = None
+) -> pd.DataFrame:
     """Read an attitude truth.
 
     Parameters
@@ -140,7 +153,9 @@ def read_truth(path: Path, options: ReadOptions | None = None) -> pd.DataFrame:
         Any readable format with a time and either ``q_w q_x q_y q_z`` (body to
         north-east-down) or ``roll pitch heading``.
     options : ReadOptions, optional
-        For columns and the unit of time.
+        For the unit of time, where the file states none.
+    origin : Origin, optional
+        What the time of the log counts from; zero if not given.
 
     Returns
     -------
@@ -152,7 +167,7 @@ def read_truth(path: Path, options: ReadOptions | None = None) -> pd.DataFrame:
     DataError
         There is no attitude in it, or it cannot be read.
     """
-    truth = assemble_attitude(read_raw(path), options or ReadOptions())
+    truth = truth_of_file(read_raw(path), options or ReadOptions(), origin or Origin(0, "s"))
     if truth is None or not np.isfinite(truth.to_numpy()).all():
         raise DataError(
             "no attitude in it",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError, Finding
+from strapdown.formats.recording import Origin
 
 Array = NDArray[np.float64]
 
@@ -35,6 +37,8 @@ class Stamps:
         What the unit was concluded from.
     keep : ndarray of bool, (n,)
         Rows that are left when those with faulty stamps are dropped.
+    origin : Origin
+        The raw stamp that is time zero.
     findings : list of Finding
     """
 
@@ -42,6 +46,7 @@ class Stamps:
     unit: str
     why: str
     keep: NDArray[np.bool_]
+    origin: Origin
     findings: list[Finding]
 
 
@@ -51,8 +56,9 @@ def read_stamps(
     why: str,
     *,
     file: str,
-    first_row: int,
+    row: Callable[[int], int],
     repair: bool,
+    origin: Origin | None = None,
 ) -> Stamps:
     """Turn raw stamps into increasing seconds.
 
@@ -66,10 +72,13 @@ def read_stamps(
         How it is known.
     file : str
         For messages.
-    first_row : int
-        Row of the file of the first stamp.
+    row : callable
+        Row of the file in which a stamp stands.
     repair : bool
         Drop repeated and reversed stamps and undo the wrapping of a counter.
+    origin : Origin, optional
+        Count from here, as another log does; if not given, from zero, or from the first stamp
+        where zero is far away.
 
     Returns
     -------
@@ -81,55 +90,83 @@ def read_stamps(
         The unit is neither stated nor evident, or time does not advance.
     """
     findings: list[Finding] = []
-    ticks = raw - raw[0]  # exact for integers, before a factor can round them
+    # Small and unsigned integers would overflow where stamps go back.
+    stamps = raw.astype(np.int64) if raw.dtype.kind in "iub" else raw.astype(np.float64)
+    ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor can round them
     if not repair:
-        _refuse_backward(raw, ticks.astype(np.float64), file, first_row)
-    keep, ticks = _repaired(raw, ticks.astype(np.float64), file, findings)
+        _refuse_backward(stamps, ticks, file, row)
+    keep, ticks = _repaired(stamps, ticks, file, findings)
     if unit is None:
         unit, why = _evident_unit(ticks[keep], file)
-    factor = TIME_UNITS[unit]
-    origin = float(raw[0]) * factor
-    if abs(origin) > EPOCH:
+    elif (usual := _mean_step(ticks[keep]) * TIME_UNITS[unit]) > 0 and not (
+        PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
+    ):
         findings.append(
             Finding(
-                f"stamps count from a distant origin; time here counts from the first of them, "
-                f"{raw[0]} {unit}",
+                f"in {unit}, as stated, it has {1.0 / usual:.3g} samples a second",
                 file=file,
                 quantity="time",
+                remedy="if that cannot be, state another unit with --time-unit",
             )
         )
-        origin = 0.0
-    return Stamps(origin + ticks * factor, unit, why, keep, findings)
+    factor = TIME_UNITS[unit]
+    first = stamps[0].item()
+    if origin is None:
+        far = abs(first) * factor > EPOCH
+        origin = Origin(first if far else 0, unit)
+        if far:
+            findings.append(
+                Finding(
+                    "stamps count from a distant origin; time here counts from the first of them, "
+                    f"{first} {unit}",
+                    file=file,
+                    quantity="time",
+                )
+            )
+    return Stamps(_since(first, unit, origin) + ticks * factor, unit, why, keep, origin, findings)
 
 
-def _refuse_backward(raw: NDArray[Any], ticks: Array, file: str, first_row: int) -> None:
+def _since(stamp: float, unit: str, origin: Origin) -> float:
+    """Seconds from an origin to a stamp; exact where both count whole ticks of one unit."""
+    if unit == origin.unit:
+        return (stamp - origin.stamp) * TIME_UNITS[unit]
+    return stamp * TIME_UNITS[unit] - origin.stamp * TIME_UNITS[origin.unit]
+
+
+def _mean_step(ticks: Array) -> float:
+    # Logs that arrive in bursts have a median far from the mean step.
+    return float((ticks[-1] - ticks[0]) / (ticks.size - 1)) if ticks.size > 1 else 0.0
+
+
+def _refuse_backward(
+    stamps: NDArray[Any], ticks: Array, file: str, row: Callable[[int], int]
+) -> None:
     steps = np.diff(ticks)
     bad = np.flatnonzero(steps <= 0)
     if not bad.size:
         return
     k = int(bad[0])
-    row = first_row + k + 1
+    here, then = stamps[k], stamps[k + 1]
     if steps[k] == 0:
         raise DataError(
-            f"the stamp {raw[k + 1]} repeats that of the row before ({_times(bad.size)} in all)",
+            f"the stamp {then} repeats that of the row before ({_times(bad.size)} in all)",
             file=file,
-            row=row,
+            row=row(k + 1),
             quantity="time",
             remedy="--repair keeps the first row of each stamp and says how many it dropped",
         )
-    if bits := _wrap_bits(ticks, k, raw):
+    if bits := _wrap_bits(stamps[k], steps[k], _usual_step(steps)):
         raise DataError(
-            f"time falls from {raw[k]} to {raw[k + 1]}, as a counter of {bits} bits does when it "
-            "wraps",
+            f"time falls from {here} to {then}, as a counter of {bits} bits does when it wraps",
             file=file,
-            row=row,
+            row=row(k + 1),
             quantity="time",
             remedy="--repair adds the counter's range from there on",
         )
     raise DataError(
-        f"time goes back from {raw[k]} to {raw[k + 1]} ({_times(bad.size)} in all)",
+        f"time goes back from {here} to {then} ({_times(bad.size)} in all)",
         file=file,
-        row=row,
+        row=row(k + 1),
         quantity="time",
         remedy="--repair drops the rows that are not later than every row before them; if two "
         "logs were joined, split them",
@@ -140,32 +177,30 @@ def _times(count: int) -> str:
     return "once" if count == 1 else f"{count} times"
 
 
-def _usual_step(ticks: Array) -> float:
-    steps = np.diff(ticks)
+def _usual_step(steps: Array) -> float:
     forward = steps[steps > 0]
     return float(np.median(forward)) if forward.size else 0.0
 
 
-def _wrap_bits(ticks: Array, k: int, raw: NDArray[Any]) -> int | None:
-    """Return the width of the counter that wrapped between sample k and the next, if one did."""
-    step = float(ticks[k + 1] - ticks[k])
-    usual = _usual_step(ticks)
+def _wrap_bits(before: float, step: float, usual: float) -> int | None:
+    """Width of the counter that wrapped in this step, if one did."""
     for bits in COUNTER_BITS:
-        if 0.0 < step + 2.0**bits <= 50.0 * usual and float(raw[k]) < 2.0**bits:
+        if 0.0 < step + 2.0**bits <= 50.0 * usual and 0 <= float(before) < 2.0**bits:
             return bits
     return None
 
 
 def _repaired(
-    raw: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
+    stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
-    ticks = ticks.copy()
-    wraps = 0
-    for k in np.flatnonzero(np.diff(ticks) < 0):
-        if bits := _wrap_bits(ticks, int(k), raw):
-            ticks[k + 1 :] += 2.0**bits
-            wraps += 1
-    if wraps:
+    steps = np.diff(ticks)
+    usual = _usual_step(steps)
+    added = np.zeros(ticks.size)
+    for k in np.flatnonzero(steps < 0):
+        if bits := _wrap_bits(stamps[k], steps[k], usual):
+            added[k + 1] = 2.0**bits
+    if wraps := int(np.count_nonzero(added)):
+        ticks = ticks + np.cumsum(added)
         findings.append(
             Finding(f"the counter wrapped {_times(wraps)}; undone", file=file, quantity="time")
         )
@@ -184,24 +219,21 @@ def _repaired(
 
 
 def _evident_unit(ticks: Array, file: str) -> tuple[str, str]:
-    steps = np.diff(ticks)
-    # Logs that arrive in bursts have a median far from the mean step.
-    usual = float(steps.mean()) if steps.size else 0.0
+    usual = _mean_step(ticks)
     if PLAUSIBLE_STEP[0] <= usual <= PLAUSIBLE_STEP[1]:
         return "s", f"no unit stated; read as seconds, {1.0 / usual:.4g} Hz on average"
     fitting = [
         u for u, f in TIME_UNITS.items() if PLAUSIBLE_STEP[0] <= usual * f <= PLAUSIBLE_STEP[1]
     ]
-    told = (
-        "; ".join(
-            f"--time-unit {u} makes it {1.0 / (usual * TIME_UNITS[u]):.4g} Hz" for u in fitting
-        )
-        or "state it with --time-unit, or check that this is the time column"
+    told = "; ".join(
+        f"--time-unit {u} makes it {1.0 / (usual * TIME_UNITS[u]):.4g} Hz"
+        for u in dict.fromkeys([*fitting, *(["s"] if 1e-7 < usual < 20.0 else [])])
+        if usual > 0
     )
     raise DataError(
         f"no unit stated, and a mean step of {usual:.6g} is no step in seconds that an inertial "
         "log would have",
         file=file,
         quantity="time",
-        remedy=told,
+        remedy=told or "check that this is the time column",
     )

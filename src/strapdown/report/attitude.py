@@ -22,13 +22,13 @@ from strapdown.tables import EULER, QUATERNION
 __all__ = ["attitude_json", "attitude_page", "write_attitude"]
 
 
-def write_attitude(bench: AttitudeBench, out: Path, *, force: bool = False) -> Seal:
+def write_attitude(bench: AttitudeBench, out: str | Path, *, force: bool = False) -> Seal:
     """Write a bench as a sealed bundle.
 
     Parameters
     ----------
     bench : AttitudeBench
-    out : Path
+    out : str or Path
         Folder to make.
     force : bool
         Replace a bundle that is there.
@@ -41,23 +41,27 @@ def write_attitude(bench: AttitudeBench, out: Path, *, force: bool = False) -> S
     ------
     ConfigError
         `out` exists and may not be replaced.
+    DataError
+        An input has changed since it was read.
     """
     seals: list[Seal] = []
     with write_bundle(
-        out,
+        Path(out),
         command="attitude",
         configuration=bench.specification,
         inputs=bench.inputs,
         force=force,
         seals=seals,
     ) as folder:
-        (folder / "attitude.json").write_text(to_json(attitude_json(bench)), encoding="utf-8")
+        (folder / "attitude.json").write_text(
+            to_json(attitude_json(bench)), encoding="utf-8", newline="\n"
+        )
         _write_csv(bench, folder / "attitude.csv")
         (folder / "figures").mkdir()
         drawn = charts(bench)
         for chart in drawn:
             draw(chart, folder / "figures" / f"{chart.slug}.svg")
-        (folder / "report.html").write_text(attitude_page(bench), encoding="utf-8")
+        (folder / "report.html").write_text(attitude_page(bench), encoding="utf-8", newline="\n")
     return seals[0]
 
 

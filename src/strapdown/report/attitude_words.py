@@ -135,10 +135,9 @@ def condition(diagnostics: dict[str, float]) -> str:
     """What an algorithm says of itself, in words."""
     parts = []
     if "closest_to_pole_deg" in diagnostics:
-        parts.append(
-            f"±90° pitch {degrees(diagnostics['closest_to_pole_deg'])} off at "
-            f"{seconds(diagnostics['closest_to_pole_time_s'])}"
-        )
+        near = diagnostics["closest_to_pole_deg"]
+        how = f"±90° pitch {degrees(near)} off" if near else "through ±90° pitch"
+        parts.append(f"{how} at {seconds(diagnostics['closest_to_pole_time_s'])}")
     if "orthogonality_loss" in diagnostics:
         parts.append(f"|CᵀC − I| = {diagnostics['orthogonality_loss']:.1e}")
     if "norm_error" in diagnostics:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
-from strapdown.config import ScenarioSpec, SimulateSpec
+from strapdown.config import ScenarioSpec, SimulateSpec, specify
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
 from strapdown.simulation import find_scenario
@@ -22,7 +22,7 @@ def simulate(
     rate: float = 100.0,
     sampling: str = "instantaneous",
     seed: int = 0,
-    formats: Sequence[str] = ("csv",),
+    formats: str | Sequence[str] = ("csv",),
     force: bool = False,
 ) -> Seal:
     """Write the gyro log of a scenario and its exact attitude.
@@ -55,10 +55,14 @@ def simulate(
         The scenario, the rate, the sampling or a format is unknown, or `out` may not be
         written.
     """
-    scenario = ScenarioSpec(name=name, rate_hz=rate, sampling=sampling, seed=seed)
-    return write_simulation(
-        SimulateSpec(scenario=scenario, formats=tuple(formats)), Path(out), force=force
+    scenario = specify(
+        ScenarioSpec, name=name.lower(), rate_hz=rate, sampling=sampling.lower(), seed=seed
     )
+    wanted = [formats] if isinstance(formats, str) else list(formats)
+    if not wanted:
+        raise ConfigError("none is named", quantity="--format", remedy="name csv, npz, h5 or mat")
+    spec = specify(SimulateSpec, scenario=scenario, formats=tuple(f.lower() for f in wanted))
+    return write_simulation(spec, Path(out), force=force)
 
 
 def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> Seal:
@@ -118,5 +122,5 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
                 "heading_deg": float(final["heading"]),
             },
         }
-        (folder / "scenario.json").write_text(to_json(description), encoding="utf-8")
+        (folder / "scenario.json").write_text(to_json(description), encoding="utf-8", newline="\n")
     return seals[0]

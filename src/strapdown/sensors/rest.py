@@ -25,8 +25,9 @@ QUIET_FACTOR = 3.0
 # rest does not have its least busy moment taken for one.
 MAX_GYRO_SD = 0.03  # rad/s, of the three axes together
 MAX_ACCEL_SD = 0.3  # m/s²
-MAX_MEAN_RATE = 0.2  # rad/s: the turn-on bias of a cheap gyro is under 20 deg/s = 0.35 rad/s at
-# its data sheet's limit, and a few deg/s in use
+# The zero-rate output of a cheap gyro may be 20 deg/s off (MPU-6050 data sheet, revision 3.4,
+# section 6.1).
+MAX_MEAN_RATE = 0.36  # rad/s
 SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
 # A sensor without noise (a simulation) is at rest where it reads a constant, to rounding.
 ROUNDING = 1e-9  # rad/s
@@ -69,9 +70,17 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
 
 def _windows(time: Array) -> tuple[Indices, Indices]:
     """First and one-past-last sample of windows that overlap by half."""
-    grid = np.arange(time[0], time[-1] - WINDOW, 0.5 * WINDOW)
-    starts = np.append(np.searchsorted(time, grid), np.searchsorted(time, time[-1] - WINDOW))
-    ends = np.append(np.searchsorted(time, grid + WINDOW), time.size)
+    first: list[Indices] = [np.empty(0, dtype=np.int64)]
+    past: list[Indices] = [np.empty(0, dtype=np.int64)]
+    # Piece by piece: a grid across a clock that was set would have no end.
+    holes = np.flatnonzero(np.diff(time) > WINDOW) + 1
+    for piece in np.split(np.arange(time.size), holes):
+        end = time[piece[-1]]
+        grid = np.arange(time[piece[0]], end - WINDOW, 0.5 * WINDOW)
+        last = max(int(np.searchsorted(time, end - WINDOW)), int(piece[0]))
+        first += [np.searchsorted(time, grid), np.array([last])]
+        past += [np.searchsorted(time, grid + WINDOW), piece[-1:] + 1]
+    starts, ends = np.concatenate(first), np.concatenate(past)
     enough = ends - starts >= LEAST_SAMPLES
     return starts[enough].astype(np.int64), ends[enough].astype(np.int64)
 

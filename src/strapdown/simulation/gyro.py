@@ -11,6 +11,9 @@ from strapdown.exceptions import ConfigError
 from strapdown.simulation.motion import Array, PulseMotion
 from strapdown.tables import SAMPLINGS, attitude_table, imu_table
 
+# What a few gigabytes of memory hold with everything that is made of them.
+MOST_SAMPLES = 5_000_000
+
 Triad = tuple[float, float, float]
 
 
@@ -83,11 +86,11 @@ def simulate_gyro(
         )
     # The last sample still belongs where rounding puts the product just under a whole number.
     count = int(np.floor(rate * motion.duration * (1.0 + 1e-12))) + 1
-    if count > 50_000_000:
+    if count > MOST_SAMPLES:
         raise ConfigError(
             f"{rate:g} Hz gives {count} samples in {motion.duration:g} s",
             quantity="rate",
-            remedy="use a rate of at most a few MHz",
+            remedy=f"use at most {MOST_SAMPLES / motion.duration:.3g} Hz",
         )
     time = np.arange(count) / rate
     gyro = (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,20 +15,21 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.attitude import Quaternion, make_algorithm, run_attitude
-from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
+from strapdown.bundle import sha256
+from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec, specify
 from strapdown.constants import GYRO_UNITS
 from strapdown.evaluation.differences import attitude_at, error_angles, largest_differences
 from strapdown.evaluation.reference_points import references_from_words, score_references
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.columns import parse_unit
-from strapdown.formats.recording import ReadOptions
+from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_reference_words, read_truth
 from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeBench, AttitudeRun, InputFiles, Reading, RestStretch, Score
 from strapdown.sensors.rest import find_rests
 from strapdown.simulation import SCENARIOS, GyroErrors, find_scenario, simulate_gyro
-from strapdown.tables import GYRO, QUATERNION, THETA
+from strapdown.tables import GYRO, QUATERNION, THETA, find_gaps
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -50,7 +51,8 @@ class _Source:
     """A log or a scenario, read."""
 
     name: str
-    description: str
+    what: str
+    origin: Origin
     imu: pd.DataFrame
     truth: pd.DataFrame | None
     scored: NDArray[np.bool_] | None
@@ -127,72 +129,87 @@ def bench_attitude(
     -----
     Alexiev (2021). The Earth's rotation is neglected, as in the paper: 15 deg/h.
     """
-    words, truth_path = _references(reference)
-    bias_path = gyro_bias if _is_path(gyro_bias) else None
-    return run_bench(
-        AttitudeSpec(
-            source=_source_spec(
-                source,
-                rate,
-                sampling,
-                seed,
-                columns,
-                gyro_unit,
-                accel_unit,
-                time_unit,
-                axes,
-                repair,
-            ),
-            algorithms=tuple(algorithms),
-            initial=initial,
-            gyro_bias="log" if bias_path else gyro_bias,
-            references=words,
-            truth_path=truth_path,
-            gyro_bias_path=bias_path,
-            from_s=from_s,
-            to_s=to_s,
+    words, truth_path = _references(_as_texts(reference))
+    bias = _as_text(gyro_bias)
+    bias_path = str(Path(bias)) if _exists(bias) else None
+    spec = specify(
+        AttitudeSpec,
+        source=_source_spec(
+            str(source),
+            rate,
+            seed,
+            {
+                "columns": columns or None,
+                "gyro_unit": gyro_unit,
+                "accel_unit": accel_unit,
+                "time_unit": time_unit,
+                "axes": axes,
+                "repair": repair or None,
+            },
+            sampling,
         ),
-        progress,
+        algorithms=tuple(_as_texts(algorithms)),
+        initial=_as_text(initial),
+        gyro_bias="log" if bias_path else bias,
+        references=words,
+        truth_path=truth_path,
+        gyro_bias_path=bias_path,
+        from_s=from_s,
+        to_s=to_s,
     )
+    return run_bench(spec, progress)
+
+
+def _as_text(value: object) -> str:
+    """A text as it is; three numbers as the text that means them."""
+    if isinstance(value, str | Path):
+        return str(value).strip()
+    return ",".join(str(v) for v in np.asarray(value).ravel().tolist())
+
+
+def _as_texts(values: object) -> list[str]:
+    """One text or many, or none."""
+    if values is None:
+        return []
+    if isinstance(values, str | Path):
+        return [str(values)]
+    return [str(v) for v in values] if isinstance(values, Iterable) else [str(values)]
 
 
 def _source_spec(
-    source: str | Path,
-    rate: float | None,
-    sampling: str | None,
-    seed: int,
-    columns: dict[str, str] | None,
-    gyro_unit: str | None,
-    accel_unit: str | None,
-    time_unit: str | None,
-    axes: str | None,
-    repair: bool,
+    text: str, rate: float | None, seed: int, reading: dict[str, Any], sampling: str | None
 ) -> ScenarioSpec | LogSpec:
-    text = str(source)
-    if text in SCENARIOS:
-        return ScenarioSpec(
-            name=text,
+    name = text.strip().lower()
+    if not name:
+        raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+    if name in SCENARIOS:
+        if given := [key for key, value in reading.items() if value is not None]:
+            raise ConfigError(
+                f"{', '.join(given)}: a scenario is not read from a file",
+                quantity=name,
+                remedy="leave that out",
+            )
+        return specify(
+            ScenarioSpec,
+            name=name,
             rate_hz=100.0 if rate is None else rate,
-            sampling=sampling or "instantaneous",
+            sampling=(sampling or "instantaneous").lower(),
             seed=seed,
         )
-    if not Path(text).exists() and not Path(text).suffix and len(Path(text).parts) == 1:
-        find_scenario(text)  # says which names there are
-    return LogSpec(
-        path=text,
-        columns=columns or {},
-        gyro_unit=gyro_unit,
-        accel_unit=accel_unit,
-        time_unit=time_unit,
-        axes=axes,
-        sampling=sampling,
-        rate_hz=rate,
-        repair=repair,
-    )
+    if not _exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
+        find_scenario(name)  # says which names there are
+    said = {key: value for key, value in reading.items() if value is not None}
+    return specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)
 
 
-def _is_path(text: str) -> bool:
-    return text not in ("none", "rest") and Path(text).exists()
+def _exists(text: str) -> bool:
+    """Tell whether a text is the path of something; sentences and odd characters are not."""
+    if text in ("", "none", "rest"):
+        return False
+    try:
+        return Path(text).exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
@@ -201,7 +218,7 @@ def _references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
     truth: str | None = None
     for item in items:
         path = Path(item)
-        if not path.exists():
+        if not _exists(item):
             if " " not in item.strip() and path.suffix:
                 raise ConfigError(
                     "there is no such file",
@@ -210,10 +227,17 @@ def _references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
                     remedy="check the path, or say it in words: 'end same as start'",
                 )
             words.append(item)
+        elif path.is_dir():
+            raise ConfigError(
+                "it is a folder",
+                file=item,
+                quantity="reference",
+                remedy="name one file",
+            )
         elif (listed := read_reference_words(path)) is not None:
             words += listed
         elif truth is None:
-            truth = item
+            truth = str(path)
         else:
             raise ConfigError(
                 f"two attitude truths were given: {truth} and {item}",
@@ -253,8 +277,10 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
             remedy="name each once, or give it different options",
         )
     progress("reading", 0.0)
-    source = _with_truth(_read(spec), spec)
-    source = replace(source, imu=_window(source.imu, spec.from_s, spec.to_s, source.name))
+    source = _read(spec)
+    whole = source.imu
+    source = replace(source, imu=_window(whole, spec.from_s, spec.to_s, source.name))
+    source = _with_truth(source, spec)
     rests = find_rests(source.imu)
     bias, bias_input = _gyro_bias(spec, source, rests)
     findings = list(source.findings)
@@ -262,7 +288,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     if bias["rad_per_s"] is not None:
         imu = imu.copy()
         imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias["rad_per_s"])
-    q_nb, initial, begin = _initial(spec.initial, source, rests)
+    q_nb, initial, begin = _initial(spec.initial, source, rests, findings)
     imu = imu[imu.index >= begin]
     if len(imu) < 2:
         raise DataError(
@@ -289,7 +315,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
         truth, scored = truth[inside], scored[inside]
     return AttitudeBench(
         source=source.name,
-        description=source.description,
+        description=_describe(source.imu, source.what, whole),
         specification=spec.model_dump(mode="json"),
         imu=imu,
         runs=tuple(runs),
@@ -357,10 +383,11 @@ def _read(spec: AttitudeSpec) -> _Source:
     if isinstance(spec.source, ScenarioSpec):
         return _scenario(spec.source)
     recording = read_log(spec.source.path, read_options(spec.source))
-    inputs = (InputFiles("log", Path(spec.source.path), recording.files),)
+    inputs = (_input("log", spec.source.path, recording.files),)
     return _Source(
         recording.name,
-        _describe(recording.imu, "recorded log"),
+        "recorded log",
+        recording.origin,
         recording.imu,
         recording.truth,
         recording.scored,
@@ -369,6 +396,10 @@ def _read(spec: AttitudeSpec) -> _Source:
         inputs,
         None,
     )
+
+
+def _input(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
+    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
 
 
 def _scenario(spec: ScenarioSpec) -> _Source:
@@ -381,7 +412,8 @@ def _scenario(spec: ScenarioSpec) -> _Source:
     lost = error_angles(exact.attitude, truth)
     return _Source(
         spec.name,
-        _describe(imu, f"simulated: {scenario.title} (Alexiev 2021, {scenario.origin})"),
+        f"simulated: {scenario.title} (Alexiev 2021, {scenario.origin})",
+        Origin(0, "s"),
         imu,
         truth,
         np.ones(len(truth), dtype=bool),
@@ -392,21 +424,35 @@ def _scenario(spec: ScenarioSpec) -> _Source:
     )
 
 
-def _describe(imu: pd.DataFrame, what: str) -> str:
+def _describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
     length = float(imu.index[-1] - imu.index[0])
     rate = (len(imu) - 1) / length
     kind = {
         "instantaneous": "rates at the instant of each stamp",
         "mean": "mean rates over the interval that ends at each stamp",
     }[imu.attrs["sampling"]]
-    return f"{what}; {len(imu)} samples in {length:.4g} s, {rate:.4g} Hz on average; {kind}"
+    text = f"{what}; {len(imu)} samples in {length:.4g} s, {rate:.4g} Hz on average; {kind}"
+    if len(imu) < len(whole):
+        text += (
+            f"; the part from {imu.index[0]:.6g} to {imu.index[-1]:.6g} s of one from "
+            f"{whole.index[0]:.6g} to {whole.index[-1]:.6g} s"
+        )
+    return text
 
 
 def _with_truth(source: _Source, spec: AttitudeSpec) -> _Source:
+    """The source with the truth that was given, on its own clock and within its window."""
     if spec.truth_path is None:
-        return source
+        if source.truth is None or source.scored is None:
+            return source
+        start, end = source.imu.index[0], source.imu.index[-1]
+        inside = np.asarray((source.truth.index >= start) & (source.truth.index <= end))
+        if not inside.any():
+            return replace(source, truth=None, scored=None)
+        return replace(source, truth=source.truth[inside], scored=source.scored[inside])
     path = Path(spec.truth_path)
-    truth = read_truth(path)
+    options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+    truth = read_truth(path, options, source.origin)
     inside = np.asarray(
         (truth.index >= source.imu.index[0]) & (truth.index <= source.imu.index[-1])
     )
@@ -424,7 +470,7 @@ def _with_truth(source: _Source, spec: AttitudeSpec) -> _Source:
         source,
         truth=truth[inside],
         scored=np.ones(int(inside.sum()), dtype=bool),
-        inputs=(*source.inputs, InputFiles("truth", path, (path,))),
+        inputs=(*source.inputs, _input("truth", spec.truth_path, (path,))),
     )
 
 
@@ -461,13 +507,14 @@ def _gyro_bias(
                 remedy="give a log of the sensor lying still, or the bias itself",
             )
         longest = max(found, key=lambda r: r.end - r.start)
-        files = InputFiles("gyro-bias", Path(spec.gyro_bias_path), other.files)
+        files = _input("gyro-bias", spec.gyro_bias_path, other.files)
         return _bias_of(longest, f"{longest.end - longest.start:.4g} s of rest in {other.name}"), (
             files,
         )
-    if spec.gyro_bias == "none":
+    choice = spec.gyro_bias.lower()
+    if choice == "none":
         return {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
-    if spec.gyro_bias == "rest":
+    if choice == "rest":
         if not rests:
             raise DataError(
                 "no stationary stretch of a second or more was found",
@@ -488,11 +535,13 @@ def _bias_of(rest: RestStretch, where: str) -> dict[str, Any]:
 
 
 def _stated_bias(text: str) -> tuple[list[float], str]:
-    match = re.fullmatch(r"\s*([^,]+),([^,]+),([^,\s]+)\s*(.*?)\s*", text)
+    match = re.fullmatch(r"([^,]+),([^,]+),\s*([+-]?[\d.]+(?:e[+-]?\d+)?)\s*(\D.*)?", text, re.I)
     try:
         if match is None:
             raise ValueError
         numbers = [float(match.group(k)) for k in (1, 2, 3)]
+        if not np.isfinite(numbers).all():
+            raise ValueError
     except ValueError:
         raise ConfigError(
             f"'{text}' is no bias",
@@ -500,11 +549,11 @@ def _stated_bias(text: str) -> tuple[list[float], str]:
             remedy="give none, rest, three numbers and a unit about the body's forward, right and "
             "down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
         ) from None
-    return numbers, parse_unit(match.group(4) or "rad/s", "gyro")
+    return numbers, parse_unit((match.group(4) or "rad/s").strip(), "gyro")
 
 
 def _initial(
-    text: str, source: _Source, rests: tuple[RestStretch, ...]
+    text: str, source: _Source, rests: tuple[RestStretch, ...], findings: list[Finding]
 ) -> tuple[Array, dict[str, Any], float]:
     """Attitude at the start of the run, in words, and where the run starts."""
     start = float(source.imu.index[0])
@@ -525,7 +574,7 @@ def _initial(
     if choice == "truth":
         q_nb, begin = _first_truth(source, start)
     elif choice == "level":
-        q_nb, begin = _levelled(source, rests, at_rest), start
+        q_nb, begin = _levelled(source, rests, at_rest, findings), start
     elif choice == "zero":
         q_nb, begin = np.array([1.0, 0.0, 0.0, 0.0]), start
     else:
@@ -549,13 +598,29 @@ def _first_truth(source: _Source, start: float) -> tuple[Array, float]:
             quantity="--initial",
             remedy="give --reference TRUTH.csv, or use level, zero or 'roll,pitch,heading'",
         )
-    stamps = source.imu.index.to_numpy()
-    first = max(start, float(source.truth.index[0]))
-    begin = float(stamps[min(int(np.searchsorted(stamps, first)), len(stamps) - 1)])
+    stamps = source.imu.index.to_numpy(dtype=np.float64)
+    known = source.truth.index.to_numpy(dtype=np.float64)
+    before = np.searchsorted(known, stamps, side="right") - 1
+    after = np.minimum(np.searchsorted(known, stamps), known.size - 1)
+    apart = np.where(before >= 0, known[after] - known[before], np.inf)
+    # Across a hole in the truth nothing is known; a sample needs it at hand on both sides.
+    usual = 3.0 * float(np.median(np.diff(known))) if known.size > 1 else 0.0
+    good = np.flatnonzero((apart >= 0.0) & (apart <= usual))
+    if not good.size:
+        raise ConfigError(
+            f"the truth is nowhere known at a sample between {stamps[0]:.9g} and "
+            f"{stamps[-1]:.9g} s",
+            file=source.name,
+            quantity="--initial",
+            remedy="use level, zero or 'roll,pitch,heading', or another window",
+        )
+    begin = float(stamps[good[0]])
     return attitude_at(source.truth, [begin])[0], begin
 
 
-def _levelled(source: _Source, rests: tuple[RestStretch, ...], at_rest: bool) -> Array:
+def _levelled(
+    source: _Source, rests: tuple[RestStretch, ...], at_rest: bool, findings: list[Finding]
+) -> Array:
     if not at_rest:
         raise ConfigError(
             "levelling needs an accelerometer and a log that begins at rest",
@@ -565,6 +630,16 @@ def _levelled(source: _Source, rests: tuple[RestStretch, ...], at_rest: bool) ->
         )
     assert rests[0].accel_mean is not None
     roll, pitch = level(rests[0].accel_mean)
+    if abs(roll) > 90.0:
+        findings.append(
+            Finding(
+                f"levelled upside down (roll {roll:.1f}°)",
+                file=source.name,
+                quantity="accel",
+                remedy="if it lay the right way up, its acceleration has the other sign, as on "
+                "iOS: state the unit as --accel-unit -g or -m/s2",
+            )
+        )
     return rotation.quaternion_from_euler([roll, pitch, 0.0])
 
 
@@ -573,7 +648,7 @@ def _three_angles(text: str) -> list[float]:
         angles = [float(part) for part in text.split(",")]
     except ValueError:
         angles = []
-    if len(angles) != 3 or not np.isfinite(angles).all():
+    if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
         raise ConfigError(
             f"'{text}' is no attitude",
             quantity="--initial",
@@ -583,6 +658,11 @@ def _three_angles(text: str) -> list[float]:
 
 
 # --- judging ----------------------------------------------------------------------------
+
+
+def _how_near(run: AttitudeRun) -> str:
+    near = run.diagnostics["closest_to_pole_deg"]
+    return f"came within {near:.3g}° of" if near else "passed through"
 
 
 def passed_pole(run: AttitudeRun) -> bool:
@@ -649,7 +729,7 @@ def _judge(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
         if passed_pole(run):
             findings.append(
                 Finding(
-                    f"came within {run.diagnostics['closest_to_pole_deg']:.3g}° of ±90° pitch at "
+                    f"{_how_near(run)} ±90° pitch at "
                     f"{run.diagnostics['closest_to_pole_time_s']:.6g} s, where its equations "
                     "divide by zero; what it says from there on is not to be trusted",
                     quantity=run.algorithm,
@@ -658,7 +738,7 @@ def _judge(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Finding]:
             )
     turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))
     # Gaps have been reported when the log was read.
-    turn[increments["dt"].to_numpy() > 3.0 * float(increments["dt"].quantile(0.95))] = 0.0
+    turn[[gap.sample - 1 for gap in find_gaps(runs[0].attitude.index)]] = 0.0
     largest = int(turn.argmax())
     if turn[largest] > LARGE_STEP:
         findings.append(

@@ -1,0 +1,186 @@
+"""Attitude truth: that which comes with a log, and that of a file of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats.columns import EULERS, QUATERNIONS, parse_unit
+from strapdown.formats.find_columns import Column, find_columns
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.recording import Origin, RawLog, ReadOptions
+from strapdown.formats.stamps import read_stamps
+from strapdown.results import Reading
+from strapdown.tables import attitude_table
+
+Array = NDArray[np.float64]
+Turn = tuple[list[int], list[float]]
+
+AS_THEY_ARE: Turn = ([0, 1, 2], [1.0, 1.0, 1.0])
+
+# Optical systems write a quaternion of zeros where they lost their markers.
+LOST = 1e-6
+
+
+def truth_of_log(
+    raw: RawLog,
+    found: dict[str, Column],
+    time: Array,
+    kept: NDArray[np.int64],
+    axes: Turn,
+    readings: list[Reading],
+    findings: list[Finding],
+) -> tuple[pd.DataFrame | None, NDArray[np.bool_] | None]:
+    """Truth that comes with a log, turned to the body axes that the log is read in.
+
+    Parameters
+    ----------
+    raw : RawLog
+    found : dict of str to Column
+    time : ndarray, (n,), s
+        Stamps of the rows that are used.
+    kept : ndarray of int, (n,)
+        Those rows.
+    axes : tuple
+        Sensor axis of each body axis, and its sign.
+    readings, findings : list
+        What it was taken from, and what should be known, are appended.
+
+    Returns
+    -------
+    truth : DataFrame or None
+    scored : ndarray of bool, or None
+        Which rows of `truth` count.
+
+    Raises
+    ------
+    ConfigError
+        The axes are a mirror image, for which there is no attitude.
+    """
+    if raw.truth is not None:
+        q_ns, scored = raw.truth.q_ns[kept], raw.truth.scored[kept]
+    else:
+        # Unless the file says what its axes are, an attitude in it has unknown frames.
+        q, names = _quaternions(raw, found) if raw.axes else (None, [])
+        if q is None:
+            _mention(raw, found, findings)
+            return None, None
+        if not _known(q[kept]).any():
+            return None, None
+        for name in names:
+            column = found[name]
+            values = numbers(raw, column, name)[kept]
+            first = float(values[np.argmax(np.isfinite(values))])
+            readings.append(Reading(column.source, name, column.unit or "", column.why, first))
+        q_ns, scored = q[kept], np.ones(kept.size, dtype=bool)
+    known = _known(q_ns)
+    if not known.any():
+        return None, None
+    q_nb = q_ns[known]
+    if axes != AS_THEY_ARE:
+        q_nb = rotation.compose(q_nb, _sensor_from_body(raw, axes))
+    return attitude_table(time[known], q_nb, raw.name), scored[known]
+
+
+def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataFrame | None:
+    """Truth of a file of its own, on the clock of a log.
+
+    Parameters
+    ----------
+    raw : RawLog
+    options : ReadOptions
+        Its unit of time is used where the file states none.
+    origin : Origin
+        What the log's time counts from.
+
+    Returns
+    -------
+    DataFrame or None
+        An Attitude table of the rows in which it is known; None where there is none.
+
+    Raises
+    ------
+    DataError
+        Time cannot be used.
+    """
+    found = find_columns(raw, ReadOptions())
+    q, _ = _quaternions(raw, found)
+    if q is None or "time" not in found:
+        return None
+    ticks, dated = ticks_of(raw, found["time"])
+    rows = np.flatnonzero(_known(q) & np.isfinite(ticks.astype(np.float64)))
+    if not rows.size:
+        return None
+    unit = "ns" if dated else found["time"].unit or options.time_unit
+    stamps = read_stamps(
+        ticks[rows],
+        parse_unit(unit, "time") if unit else None,
+        "",
+        file=raw.name,
+        row=lambda k: raw.row(int(rows[k])),
+        repair=options.repair,
+        origin=origin,
+    )
+    return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
+
+
+def _known(q: Array) -> NDArray[np.bool_]:
+    known: NDArray[np.bool_] = np.isfinite(q).all(axis=1) & (np.abs(q).max(axis=1) > LOST)
+    return known
+
+
+def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, list[str]]:
+    """Attitude of each row, NaN where unknown, and the columns it came from."""
+    if all(n in found for n in QUATERNIONS):
+        parts = [numbers(raw, found[n], n).astype(np.float64) for n in QUATERNIONS]
+        return np.column_stack(parts), list(QUATERNIONS)
+    if not all(n in found for n in EULERS):
+        return None, []
+    angles = np.column_stack([numbers(raw, found[n], n) for n in EULERS]).astype(np.float64)
+    units = {found[n].unit for n in EULERS}
+    if units == {"rad"}:
+        angles = np.degrees(angles)
+    elif units != {"deg"}:
+        raise DataError(
+            "the unit of the angles is not stated",
+            file=raw.name,
+            quantity=", ".join(EULERS),
+            remedy="name them with it, as in roll_deg, pitch_deg, heading_deg",
+        )
+    finite = np.isfinite(angles).all(axis=1)
+    q = np.full((len(angles), 4), np.nan)
+    q[finite] = rotation.quaternion_from_euler(angles[finite])
+    return q, list(EULERS)
+
+
+def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> None:
+    """An attitude of unknown frames, as a phone computes one, is no truth unless it is said."""
+    if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
+        findings.append(
+            Finding(
+                "it also holds an attitude, which is not used: nothing says whose it is and in "
+                "which frames",
+                file=raw.name,
+                quantity="attitude",
+                remedy="if it is body to north-east-down and better than the gyro, give the file "
+                "as --reference too",
+            )
+        )
+
+
+def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
+    """Quaternion ``q_sb`` from body axes to the axes in which the file has its truth."""
+    axis, sign = axes
+    C_bs = np.eye(3)[axis] * np.array(sign)[:, None]
+    if np.linalg.det(C_bs) < 0:
+        raise ConfigError(
+            "the axes stated are a mirror image of the sensor's, and its truth cannot be turned "
+            "into it",
+            file=raw.name,
+            quantity="--axes",
+            remedy="state a right-handed set, as in x,-y,-z",
+        )
+    return rotation.quaternion_from_dcm(C_bs.T)

@@ -1,0 +1,186 @@
+"""Which column of a file is which quantity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.formats.columns import QUANTITIES, TRIADS, UNIT_OF, read_name
+from strapdown.formats.recording import RawLog, ReadOptions
+
+AXES = "xyz"
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of the file that a quantity was found in."""
+
+    source: str
+    unit: str | None
+    why: str
+
+
+def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
+    """Find the column of each quantity.
+
+    Parameters
+    ----------
+    raw : RawLog
+    options : ReadOptions
+        Its `columns` go before what the file states, and that before what names suggest.
+
+    Returns
+    -------
+    dict of str to Column
+        Quantity to column; quantities that were not found are absent.
+
+    Raises
+    ------
+    ConfigError
+        Two columns could be one quantity, or an option names what is not there.
+    """
+    found = {
+        quantity: Column(source, unit, "stated by the file")
+        for source, (quantity, unit) in raw.stated.items()
+    }
+    if not raw.stated:
+        found |= _by_name(raw, options)
+    asked: dict[str, str] = {}
+    for quantity, source in options.columns.items():
+        if quantity not in QUANTITIES and quantity not in TRIADS:
+            raise ConfigError(
+                f"'{quantity}' is no quantity",
+                quantity="--columns",
+                remedy=nearest(quantity, [*QUANTITIES, *TRIADS]),
+            )
+        for q, name in _asked(raw, quantity, source):
+            if name in asked.values():
+                raise ConfigError(
+                    f"column '{name}' is named for two quantities",
+                    file=raw.name,
+                    quantity=f"--columns {q}",
+                    remedy="name each column once",
+                )
+            asked[q] = name
+            stated = found[q].unit if q in found and found[q].source == name else None
+            found[q] = Column(name, _unit_of(raw, name) or stated, "stated by --columns")
+    return found
+
+
+def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
+    """Refuse a log without three rates, and say what it has.
+
+    Raises
+    ------
+    DataError
+    """
+    missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]
+    if not missing:
+        return
+    left_out = "".join(f"; {f.what}" for f in raw.findings if f.what.startswith("left out"))
+    raise DataError(
+        f"no column was recognised as {', '.join(missing)}; it has: "
+        f"{', '.join(raw.columns) or 'none'}{left_out}",
+        file=raw.name,
+        remedy="name them, as in --columns time=t,gyro_x=wx,gyro_y=wy,gyro_z=wz (a number "
+        "counts columns from 1)",
+    )
+
+
+def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
+    candidates: dict[str, list[str]] = {}
+    for name in raw.columns:
+        quantity = read_name(name).quantity
+        if quantity is None or quantity in TRIADS:
+            continue
+        # Of an array of four, nothing says that the first three are x, y and z.
+        if name.endswith("]") and _width(raw, name.partition("[")[0]) != 3:
+            continue
+        candidates.setdefault(quantity, []).append(name)
+    asked = {q for key in options.columns for q in _members(key)}
+    found = {}
+    for quantity, names in candidates.items():
+        if quantity in asked:
+            continue
+        if len(names) > 1 and quantity == "time":
+            # A clock that says its unit goes before one that does not.
+            names = [n for n in names if _unit_of(raw, n)] or names
+        if len(names) > 1:
+            raise ConfigError(
+                f"{len(names)} columns could be it: {', '.join(names)}",
+                file=raw.name,
+                quantity=quantity,
+                remedy=f"choose one with --columns {quantity}={names[0]}",
+            )
+        found[quantity] = Column(names[0], _unit_of(raw, names[0]), "by its name")
+    return found
+
+
+def _unit_of(raw: RawLog, column: str) -> str | None:
+    if column in raw.units:
+        return UNIT_OF.get(raw.units[column].strip("[]() ").lower())
+    return read_name(column).unit
+
+
+def _members(quantity: str) -> list[str]:
+    return [f"{quantity}_{a}" for a in AXES] if quantity in TRIADS else [quantity]
+
+
+def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
+    """Resolve one ``quantity=source`` of the user to columns that exist."""
+    names = list(raw.columns)
+    if quantity in TRIADS:
+        if members := _three_of(raw, quantity, source):
+            return list(zip(_members(quantity), members, strict=True))
+    elif source in raw.columns:
+        return [(quantity, source)]
+    elif source.isdecimal() and 1 <= int(source) <= len(names):
+        return [(quantity, names[int(source) - 1])]
+    raise ConfigError(
+        f"there is no column '{source}'",
+        file=raw.name,
+        quantity=f"--columns {quantity}",
+        remedy=nearest(source, names),
+    )
+
+
+def _width(raw: RawLog, array: str) -> int:
+    return sum(name.startswith(f"{array}[") for name in raw.columns)
+
+
+def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
+    """Columns of an array of three, of three in a wider array, or of three names in x, y, z."""
+    base, _, index = source.partition("[")
+    width = _width(raw, base)
+    if width > 3 and not index:
+        raise ConfigError(
+            f"'{source}' has {width} columns",
+            file=raw.name,
+            quantity=f"--columns {quantity}",
+            remedy=f"say with which of them it begins, as in {quantity}={source}[{width - 3}]",
+        )
+    if width >= 3 and (not index or index.rstrip("]").isdecimal()):
+        first = int(index.rstrip("]")) if index else 0
+        members = [f"{base}[{first + k}]" for k in range(3)]
+        return members if all(m in raw.columns for m in members) else []
+    found = []
+    for axis in AXES:
+        names = [n for n in raw.columns if _is_axis(n, source, axis)]
+        if len(names) != 1:
+            return []
+        found += names
+    return found
+
+
+def _is_axis(name: str, prefix: str, axis: str) -> bool:
+    """Tell whether a name is the prefix and one axis, units and case apart."""
+    said = read_name(name).quantity
+    plain = name.lower()
+    if not plain.startswith(prefix.lower()):
+        return False
+    rest = plain[len(prefix) :].lstrip("_-. /:[(")
+    return (
+        rest[:1] == axis
+        and (said is None or said.endswith(f"_{axis}") or rest == axis)
+        and (len(rest) == 1 or not rest[1].isalnum())
+    )
