@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import rotation as kernel
+from strapdown._kernels.increments import LARGEST as LARGEST_RATE
 from strapdown.exceptions import DataError
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ __all__ = [
 _TOLERANCE = 1e-2
 
 #: Components beyond this are refused, because their squares leave the range of a double.
-LARGEST = 1e150
+LARGEST = LARGEST_RATE
 
 
 def _rows(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array, tuple[int, ...]]:

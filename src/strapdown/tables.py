@@ -110,6 +110,33 @@ def find_gaps(time: ArrayLike) -> list[Gap]:
     ]
 
 
+def _array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
+    """Numbers of shape (n,), or (n, columns)."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0, 0))
+    wanted = 1 if columns is None else 2
+    if array.ndim != wanted or (columns is not None and array.shape[1] != columns):
+        raise DataError(
+            f"it is no array of numbers of shape ({'n,' if columns is None else f'n, {columns}'})",
+            file=source,
+            quantity=name,
+            remedy="pass one row a sample",
+        )
+    return array
+
+
+def _same_length(source: str | None, **arrays: Array) -> None:
+    if len({len(a) for a in arrays.values()}) > 1:
+        lengths = ", ".join(f"{name} {len(a)}" for name, a in arrays.items())
+        raise DataError(
+            f"the arrays have different lengths: {lengths}",
+            file=source,
+            remedy="pass one row a sample in each",
+        )
+
+
 def _check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
     bad = ~np.isfinite(values)
     if bad.any():
@@ -189,18 +216,13 @@ def imu_table(
         Shapes disagree, a value is not finite, time does not advance, or `sampling` is
         unknown.
     """
-    stamps = np.asarray(time, dtype=np.float64)
-    columns = list(GYRO)
-    values = np.asarray(gyro, dtype=np.float64)
+    stamps = _array(time, None, "time", source)
+    columns, values = list(GYRO), _array(gyro, 3, "gyro", source)
+    _same_length(source, time=stamps, gyro=values)
     if accel is not None:
-        columns += ACCEL
-        values = np.hstack([values, np.asarray(accel, dtype=np.float64)])
-    if stamps.ndim != 1 or values.shape != (stamps.size, len(columns)):
-        raise DataError(
-            f"time has shape {stamps.shape} and the {len(columns)} sensor columns {values.shape}",
-            file=source,
-            remedy="pass time as (n,) and each triad as (n, 3)",
-        )
+        force = _array(accel, 3, "accel", source)
+        _same_length(source, time=stamps, accel=force)
+        columns, values = columns + ACCEL, np.hstack([values, force])
     table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
     check_imu(table)
@@ -270,11 +292,13 @@ def increments_table(
     DataError
         Shapes disagree, a value is not finite, or a step has no positive length.
     """
-    angles = np.asarray(theta, dtype=np.float64)
-    change = np.zeros_like(angles) if dtheta is None else np.asarray(dtheta, dtype=np.float64)
+    ends, lengths = _array(time, None, "time"), _array(dt, None, "dt")
+    angles = _array(theta, 3, "theta")
+    change = np.zeros_like(angles) if dtheta is None else _array(dtheta, 3, "dtheta")
+    _same_length(None, time=ends, dt=lengths, theta=angles, dtheta=change)
     table = pd.DataFrame(
-        np.column_stack([np.asarray(dt, dtype=np.float64), angles, change]),
-        index=pd.Index(np.asarray(time, dtype=np.float64), name="time"),
+        np.column_stack([lengths, angles, change]),
+        index=pd.Index(ends, name="time"),
         columns=["dt", *THETA, *DTHETA],
     )
     check_increments(table)
@@ -336,9 +360,9 @@ def attitude_table(time: ArrayLike, q_nb: ArrayLike, source: str | None = None) 
     DataError
         Shapes disagree, a value is not finite, time does not advance, or a norm is not 1.
     """
-    stamps = np.asarray(time, dtype=np.float64)
-    q = np.asarray(q_nb, dtype=np.float64)
-    _check_rows(q.reshape(-1, 4), QUATERNION, source)
+    stamps, q = _array(time, None, "time", source), _array(q_nb, 4, "q_nb", source)
+    _same_length(source, time=stamps, q_nb=q)
+    _check_rows(q, QUATERNION, source)
     table = pd.DataFrame(
         np.hstack([q, rotation.euler_from_quaternion(q)]),
         index=pd.Index(stamps, name="time"),
@@ -393,7 +417,8 @@ def references_table(rows: Sequence[dict[str, object]], source: str | None = Non
     """
     table = pd.DataFrame([dict(r) for r in rows], columns=REFERENCE)
     numbers = [c for c in REFERENCE if c not in ("kind", "axis")]
-    table[numbers] = table[numbers].astype(np.float64)
+    for name in numbers:
+        table[name] = _array(table[name].tolist(), None, name, source)
     table.attrs["source"] = source
     check_references(table)
     return table

@@ -127,6 +127,10 @@ def test_a_bad_sample_is_refused_and_changes_nothing(variant):
         (1.2, [np.nan, 0.2, 0.3], "three finite rates"),
         (1.2, [0.1, np.inf, 0.3], "three finite rates"),
         (1.2, [0.1, 0.2], "three finite rates"),
+        (1.2, [0.1, 0.2, 1e200], "three finite rates"),
+        (1.2, np.ones((3, 1)), "three finite rates"),
+        (1.2, ["a", "b", "c"], "three finite rates"),
+        (None, [0.1, 0.2, 0.3], "three finite rates"),
     ]
     for time, rate, message in bad:
         with pytest.raises(DataError, match=message):
@@ -229,3 +233,36 @@ def test_the_order_of_accuracy_that_it_declares(variant, source):
 def test_what_is_not_understood_is_named(text, message):
     with pytest.raises(ConfigError, match=message):
         make_algorithm(text)
+
+
+def test_orthogonalising_does_what_it_says():
+    time, theta = np.arange(1, 301) * 0.01, np.full((300, 3), 0.02)
+    increments = increments_table(time, np.full(300, 0.01), theta)
+    loss = {}
+    for every in (0, 1, 10):
+        algorithm = make_algorithm(f"dcm:order=1,orthogonalise_every={every}")
+        state, _ = algorithm.advance(algorithm.begin(START), increments)
+        loss[every] = algorithm.diagnostics(state, np.zeros(1))["orthogonality_loss"]
+    # I + [r x] stretches by 1 + |r|^2/2 a step: (1 + |r|^2)^300 - 1 in C^T C, |r|^2 = 0.0012.
+    assert loss[0] == pytest.approx((1.0012**300 - 1) * 2 / 3, rel=1e-6)
+    # One Newton step squares what a step, or ten, have left: E -> 3/4 E^2.
+    assert loss[1] < 0.0012**2
+    assert loss[10] < (1.0012**10 - 1) ** 2
+
+
+def test_the_nearest_approach_to_the_pole_counts_stages_and_steps():
+    """Half a step of 60 deg/s * 1 s from 55 deg passes the pole; both ends are 25 deg from it."""
+    start = rotation.quaternion_from_euler([0.0, 65.0, 0.0])
+    theta = np.radians([[0.0, 50.0, 0.0]])
+    increments = increments_table([1.0], [1.0], theta)
+    for step in ("forward", "rk4"):
+        algorithm = make_algorithm(f"euler:step={step}")
+        state, _ = algorithm.advance(algorithm.begin(start), increments)
+        assert algorithm.diagnostics(state, np.array([0.0, 1.0]))["closest_to_pole_deg"] == 0.0
+    # A start that is nearer than anything after it is the nearest.
+    algorithm = make_algorithm("euler")
+    away = increments_table([1.0], [1.0], -theta)
+    state, _ = algorithm.advance(algorithm.begin(start), away)
+    near = algorithm.diagnostics(state, np.array([0.0, 1.0]))
+    assert near["closest_to_pole_deg"] == pytest.approx(25.0, abs=1e-9)
+    assert near["closest_to_pole_time_s"] == 0.0

@@ -116,9 +116,11 @@ def test_numbers_that_differ_are_told_by_how_much(copy, shift, verdict):
     path.write_text(json.dumps(content))
     manifest = json.loads((copy / MANIFEST).read_text())
     next(o for o in manifest["outputs"] if o["name"] == path.name)["sha256"] = sha256(path)
+    manifest["platform"]["cpu"] = "another"
     (copy / MANIFEST).write_text(json.dumps(manifest))
     found = verify(copy)
     assert found.verdict == verdict
+    assert any(line.startswith("platform cpu: another then") for line in found.details)
     assert found.within == pytest.approx(relative, rel=1e-4)
 
 
@@ -188,3 +190,126 @@ def test_a_manifest_that_names_files_outside_is_refused(copy, name):
     (copy / MANIFEST).write_text(json.dumps(manifest))
     with pytest.raises(DataError, match="outside the folder"):
         verify(copy)
+
+
+def reseal(folder, name, data, *, elsewhere=False):
+    """Change a file and its digest in the manifest, as a forger would."""
+    (folder / name).write_bytes(data)
+    manifest = json.loads((folder / MANIFEST).read_text())
+    next(o for o in manifest["outputs"] if o["name"] == name)["sha256"] = sha256(folder / name)
+    if elsewhere:
+        manifest["platform"]["cpu"] = "another"
+    (folder / MANIFEST).write_text(json.dumps(manifest))
+
+
+FORGERIES = [
+    ("report.html", lambda data: data.replace(b"</h1>", b"!</h1>")),
+    ("figures/gyro.svg", lambda data: b"<svg/>"),
+    ("attitude.json", lambda data: data.replace(b'"headline": "At', b'"headline": "In')),
+    ("attitude.json", lambda data: data.replace(b'"error_deg": ', b'"error_deg": 1', 1)),
+    ("attitude.csv", lambda data: data[:-2] + b"7\n"),
+]
+
+
+@pytest.mark.parametrize(("name", "change"), FORGERIES)
+def test_what_was_changed_and_sealed_again_does_not_reproduce(copy, name, change):
+    before = (copy / name).read_bytes()
+    reseal(copy, name, change(before))
+    assert (copy / name).read_bytes() != before
+    found = verify(copy)
+    assert found.verdict == "changed"
+    assert any(line.startswith(name) for line in found.details)
+
+
+@pytest.mark.parametrize(("name", "change"), FORGERIES[2:4])
+def test_nor_elsewhere_where_it_is_no_rounding(copy, name, change):
+    reseal(copy, name, change((copy / name).read_bytes()), elsewhere=True)
+    assert verify(copy).verdict == "changed"
+
+
+def test_no_number_is_no_number_elsewhere_either(copy):
+    text = (copy / "attitude.json").read_text()
+    at = text.index('"error_deg": ') + len('"error_deg": ')
+    text = text[:at] + "NaN" + text[text.index(",", at) :]
+    reseal(copy, "attitude.json", text.encode(), elsewhere=True)
+    assert verify(copy).verdict == "changed"
+
+
+def test_a_file_taken_out_of_folder_and_manifest_is_missed(copy):
+    manifest = json.loads((copy / MANIFEST).read_text())
+    manifest["outputs"] = [o for o in manifest["outputs"] if o["name"] != "report.html"]
+    (copy / MANIFEST).write_text(json.dumps(manifest))
+    (copy / "report.html").unlink()
+    found = verify(copy)
+    assert found.verdict == "changed"
+    assert "report.html: written now, and not sealed" in found.details
+
+
+def test_a_configuration_that_reads_what_is_not_sealed_is_refused(copy):
+    manifest = json.loads((copy / MANIFEST).read_text())
+    manifest["configuration"]["source"]["path"] = "../log.csv"
+    (copy / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(DataError, match="outside the seal"):
+        verify(copy)
+
+
+@pytest.mark.parametrize("name", ["log.npz", "log.h5", "log.mat"])
+def test_a_forged_simulation_is_found_elsewhere(tmp_path, name):
+    seal = simulate("alexiev-fig2c", tmp_path / "s", rate=20, formats=["all"])
+    other = simulate("alexiev-fig2c", tmp_path / "t", rate=20.1, formats=["all"])
+    reseal(seal.path, name, (other.path / name).read_bytes(), elsewhere=True)
+    assert verify(seal.path).verdict == "changed"
+
+
+def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
+    simulate("alexiev-fig2e", tmp_path / "logs", rate=20)
+    monkeypatch.chdir(tmp_path)
+    names = ["logs/log.csv", "./logs/log.csv", "logs//log.csv", "logs/../logs/log.csv"]
+    names.append(str(tmp_path / "logs" / "log.csv"))
+    seals = [
+        write_attitude(bench_attitude(name, gyro_bias=name), f"out{k}")
+        for k, name in enumerate(names)
+    ]
+    assert len({s.digest for s in seals}) == 1
+    assert all(verify(s.path).verdict == "identical" for s in seals)
+
+
+def test_a_link_keeps_its_own_name(tmp_path, log):
+    (tmp_path / "blob1234").write_bytes(log.read_bytes())
+    (tmp_path / "mine.csv").symlink_to(tmp_path / "blob1234")
+    seal = write_attitude(bench_attitude(tmp_path / "mine.csv"), tmp_path / "out")
+    assert verify(seal.path).verdict == "identical"
+
+
+def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
+    mine = tmp_path / "mine.csv"
+    mine.write_bytes(log.read_bytes())
+    bench = bench_attitude(mine)
+    mine.write_bytes(log.read_bytes() + b"\n")
+    with pytest.raises(DataError, match="since it was read"):
+        write_attitude(bench, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_pictures_do_not_follow_the_style_of_whoever_runs_it(tmp_path, monkeypatch):
+    import matplotlib as mpl
+
+    seals = []
+    for size in (9.0, 30.0):
+        with mpl.rc_context({"font.size": size, "lines.linewidth": size}):
+            seals.append(write_attitude(bench_attitude("alexiev-fig2a"), tmp_path / str(size)))
+    assert seals[0].digest == seals[1].digest
+
+
+def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, log, monkeypatch):
+    bench = bench_attitude(log)
+    seal = write_attitude(bench, tmp_path / "out")
+
+    def refuse(self, target):
+        raise OSError("no")
+
+    monkeypatch.setattr("pathlib.Path.rename", refuse)
+    with pytest.raises(OSError, match="no"):
+        write_attitude(bench, tmp_path / "out", force=True)
+    monkeypatch.undo()
+    assert verify(seal.path).verdict == "identical"

@@ -26,7 +26,8 @@ def spoiled(array, index, value):
         (spoiled(TIME, 2, 0.05), RATE, r"row 3, time: time does not advance"),
         (TIME, spoiled(RATE, (1, 2), np.inf), r"row 2, gyro_z: not a finite number"),
         (TIME[:1], RATE[:1], "1 sample"),
-        (TIME, RATE[:3], "shape"),
+        (TIME, RATE[:3], "different lengths"),
+        (["a", "b"], RATE[:2], "no array of numbers"),
         (TIME, RATE[:, :2], "shape"),
     ],
 )

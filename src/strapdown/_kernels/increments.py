@@ -30,6 +30,7 @@ def increments(time, rate, mean, theta, dtheta):
 # What a sample-by-sample run remembers between calls: the head of one float64 array whose tail
 # is the algorithm's state. One array, because every further argument of a compiled function
 # costs several times what the attitude update itself does.
+LARGEST = 1e150
 TIME, RATE, SAMPLES, MEAN, OPTIONS = 0, 1, 4, 5, 6
 HEAD = 8
 
@@ -46,8 +47,8 @@ def take_sample(record, time, rate):
     if rate.shape[0] != 3:
         return refused, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     x, y, z = rate[0], rate[1], rate[2]
-    # Infinity and NaN are the numbers whose difference with themselves is not zero.
-    if not (x - x == 0.0 and y - y == 0.0 and z - z == 0.0 and time - time == 0.0):
+    # So written NaN is refused, too; a larger rate's square leaves the range of a double.
+    if not (abs(x) < LARGEST and abs(y) < LARGEST and abs(z) < LARGEST and abs(time) < LARGEST):
         return refused, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     if record[SAMPLES] == 0.0:
         dt, tx, ty, tz, dx, dy, dz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

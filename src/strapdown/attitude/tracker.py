@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
@@ -77,14 +79,18 @@ class AttitudeTracker:
             Time does not advance, or the rate is not three finite numbers. The sample is
             then not taken, and the state is as before.
         """
-        if gyro.__class__ is not _ndarray:
-            gyro = np.asarray(gyro, dtype=np.float64)
-        if self._update(self._record, time, gyro) >= 0.0:
-            return
+        try:
+            if gyro.__class__ is not _ndarray:
+                gyro = np.asarray(gyro, dtype=np.float64)
+            if self._update(self._record, time, gyro) >= 0.0:
+                return
+        except (NumbaError, TypeError, ValueError):
+            # Of a kind that cannot be compiled for, or no numbers at all.
+            self._refuse(float("nan"), gyro)
         self._refuse(time, gyro)
 
-    def _refuse(self, time: float, gyro: Array | Sequence[float]) -> None:
-        if self._record[SAMPLES] > 0 and time <= self._record[TIME]:
+    def _refuse(self, time: float, gyro: Array | Sequence[float]) -> NoReturn:
+        if self._record[SAMPLES] > 0 and time <= self._record[TIME] and np.size(gyro) == 3:
             raise DataError(
                 f"time does not advance: {self._record[TIME]:.9g} s is followed by {time:.9g} s",
                 row=int(self._record[SAMPLES]) + 1,
@@ -92,7 +98,8 @@ class AttitudeTracker:
                 remedy="leave the sample out; the attitude is as before it",
             )
         raise DataError(
-            f"time {time}, rate {np.asarray(gyro).tolist()}: three finite rates are needed",
+            f"time {time}, rate {np.asarray(gyro).tolist()}: a time and three finite rates below "
+            f"{rotation.LARGEST:g} rad/s are needed",
             row=int(self._record[SAMPLES]) + 1,
             quantity="gyro",
             remedy="leave the sample out; the attitude is as before it",

@@ -123,7 +123,9 @@ def attitude(
             rich_help_panel=_LOG,
         ),
     ] = False,
-    seed: Annotated[int, typer.Option(help="Of a scenario's noise.", rich_help_panel=_RUN)] = 0,
+    seed: Annotated[
+        int | None, typer.Option(help="Of a scenario's noise (0).", rich_help_panel=_RUN)
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(

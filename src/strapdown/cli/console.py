@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from time import perf_counter
@@ -22,7 +23,16 @@ def console(*, err: bool = False) -> Console:
     """A console that takes no text from outside for markup."""
     from rich.console import Console
 
-    out = Console(stderr=err, markup=False, highlight=False, soft_wrap=True)
+    class QuietlyPiped(Console):
+        """Ends with success when the reader has gone, as with ``| head``."""
+
+        def on_broken_pipe(self) -> None:
+            try:
+                super().on_broken_pipe()
+            except SystemExit:
+                sys.exit(0)
+
+    out = QuietlyPiped(stderr=err, markup=False, highlight=False, soft_wrap=True)
     if not out.is_terminal:
         out.width = PIPE_WIDTH
     return out

@@ -51,7 +51,7 @@ def main(
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
 app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
-app.command("modules")(modules.modules)
+app.command("modules", epilog=modules.EPILOG)(modules.modules)
 app.command("demo", epilog=demo.EPILOG)(demo.demo)
 
 
@@ -77,11 +77,6 @@ def run() -> None:
             remedy="check the path and the free space, or name another folder with --out",
         )
         _fail(str(what), 4)
-    except SystemExit as end:
-        # Typer turns a closed pipe into an exit of 1 and hides the stream behind a wrapper.
-        if end.code == 1 and type(sys.stdout).__name__ == "PacifyFlushWrapper":
-            _reader_gone()
-        raise
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+EPILOG = "Example: strapdown modules"
+
 
 def modules() -> None:
     """List what can stand in each slot: algorithms, scenarios, formats."""

@@ -37,18 +37,20 @@ def simulate(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
     """Write the gyro log of a scenario together with its exact attitude."""
-    from strapdown.cli.console import console, print_seal
+    from strapdown.cli.console import console, print_seal, progress
     from strapdown.report.simulation import simulate as write
 
-    seal = write(
-        name,
-        out or Path(f"{name}-simulated"),
-        rate=rate,
-        sampling=sampling,
-        seed=seed,
-        formats=formats.replace(",", " ").split(),
-        force=force,
-    )
+    with progress(quiet or json) as report:
+        report("simulating and writing", 0.5)
+        seal = write(
+            name,
+            out or Path(f"{name}-simulated"),
+            rate=rate,
+            sampling=sampling,
+            seed=seed,
+            formats=formats.replace(",", " ").split(),
+            force=force,
+        )
     if json:
         typer.echo((seal.path / "scenario.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:

@@ -117,7 +117,8 @@ _SPELLINGS = {
     "rad": "rad radian radians",
 }
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
-_INDEXED = re.compile(r"(.*)\[(\d+)\]")
+#: A column of an array: its name and its number.
+INDEXED = re.compile(r"(.*)\[(\d+)\]")
 _AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
@@ -153,7 +154,7 @@ def read_name(name: str) -> ColumnName:
         With None for what the name does not say.
     """
     text, index = name.strip(), ""
-    if match := _INDEXED.fullmatch(text):
+    if match := INDEXED.fullmatch(text):
         text, index = match.groups()
     bracket = _BRACKETS.search(text)
     unit = UNIT_OF.get(bracket.group(1).lower().replace(" ", "")) if bracket else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats.columns import QUANTITIES, TRIADS, UNIT_OF, read_name
+from strapdown.formats.columns import INDEXED, QUANTITIES, TRIADS, UNIT_OF, read_name
 from strapdown.formats.recording import RawLog, ReadOptions
 
 AXES = "xyz"
@@ -94,7 +94,7 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         if quantity is None or quantity in TRIADS:
             continue
         # Of an array of four, nothing says that the first three are x, y and z.
-        if name.endswith("]") and _width(raw, name.partition("[")[0]) != 3:
+        if (part := INDEXED.fullmatch(name)) and _width(raw, part.group(1)) != 3:
             continue
         candidates.setdefault(quantity, []).append(name)
     asked = {q for key in options.columns for q in _members(key)}

@@ -62,7 +62,7 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         still &= _window_sd(accel, starts, ends) <= MAX_ACCEL_SD
     rests = [
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
-        for a, b in _runs(still)
+        for a, b in _runs(still, starts[1:] < ends[:-1])
         if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
     ]
     return _of_one_bias(rests)
@@ -99,9 +99,15 @@ def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
     return np.asarray(np.sqrt(variances), dtype=np.float64)
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def _runs(still: NDArray[np.bool_], overlap: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last window of each run of still windows that overlap from one to the next."""
+    runs: list[tuple[int, int]] = []
+    for k in np.flatnonzero(still).tolist():
+        if runs and runs[-1][1] == k - 1 and overlap[k - 1]:
+            runs[-1] = (runs[-1][0], k)
+        else:
+            runs.append((k, k))
+    return runs
 
 
 def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> RestStretch:

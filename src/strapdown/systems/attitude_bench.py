@@ -71,7 +71,7 @@ def bench_attitude(
     gyro_bias: str = "none",
     rate: float | None = None,
     sampling: str | None = None,
-    seed: int = 0,
+    seed: int | None = None,
     columns: dict[str, str] | None = None,
     gyro_unit: str | None = None,
     accel_unit: str | None = None,
@@ -104,8 +104,8 @@ def bench_attitude(
         Of a scenario (100 if not given), or of a log without a time column.
     sampling : {'instantaneous', 'mean'}, optional
         What a row holds: the rate at its stamp, or its mean over the interval ending there.
-    seed : int
-        Of a scenario's noise.
+    seed : int, optional
+        Of a scenario's noise; 0 if not given.
     columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
     from_s, to_s : float, optional, s
@@ -177,7 +177,7 @@ def _as_texts(values: object) -> list[str]:
 
 
 def _source_spec(
-    text: str, rate: float | None, seed: int, reading: dict[str, Any], sampling: str | None
+    text: str, rate: float | None, seed: int | None, reading: dict[str, Any], sampling: str | None
 ) -> ScenarioSpec | LogSpec:
     name = text.strip().lower()
     if not name:
@@ -194,7 +194,11 @@ def _source_spec(
             name=name,
             rate_hz=100.0 if rate is None else rate,
             sampling=(sampling or "instantaneous").lower(),
-            seed=seed,
+            seed=0 if seed is None else seed,
+        )
+    if seed is not None:
+        raise ConfigError(
+            "a recorded log has no noise to be drawn", quantity="seed", remedy="leave it out"
         )
     if not _exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
         find_scenario(name)  # says which names there are

@@ -59,3 +59,20 @@ def test_a_steady_turn_is_not_taken_for_a_bias_where_a_rest_shows_it():
 
 def test_too_short_a_log_has_none():
     assert find_rests(imu_table([0.0, 0.1], np.zeros((2, 3)))) == ()
+
+
+def test_a_shake_that_does_not_turn_is_no_rest():
+    """On a vibrating table the gyro may be quiet; the accelerometer is not."""
+    table = log(100, 1e-4, [])
+    time = table.index.to_numpy()
+    busy = (time > 6.0) & (time < 14.0)
+    table.loc[busy, "accel_x"] += 2.0 * np.sin(300.0 * time[busy])
+    assert [(round(r.start), round(r.end)) for r in find_rests(table)] == [(0, 6), (14, 20)]
+
+
+def test_a_steady_turn_alone_is_no_rest():
+    assert find_rests(log(100, 2e-3, [], bias=(0.0, 0.0, 0.5))) == ()
+
+
+def test_a_bias_at_the_limit_of_a_cheap_gyro_is_a_rest():
+    assert len(find_rests(log(100, 2e-3, [], bias=tuple(np.radians([18.0, 5.0, 0.0]))))) == 1

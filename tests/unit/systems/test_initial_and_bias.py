@@ -1,0 +1,118 @@
+"""Where a run starts, and what is taken off its rates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from strapdown import bench_attitude
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.tables import GYRO, imu_table
+
+BIAS = np.array([0.02, -0.03, 0.01])
+
+
+@pytest.fixture
+def log(tmp_path) -> Path:
+    """Six seconds at rest with a bias, a turn, six at rest."""
+    time = np.arange(1500) * 0.01
+    gyro = np.tile(BIAS, (1500, 1))
+    gyro[600:900, 2] += 0.5
+    LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro), None)
+    return tmp_path / "log.csv"
+
+
+@pytest.mark.parametrize(
+    "bias", ["rest", "0.02,-0.03,0.01", "0.02, -0.03, 0.01 rad/s", tuple(BIAS), BIAS, "REST"]
+)
+def test_the_bias_is_taken_off(log, bias):
+    bench = bench_attitude(log, gyro_bias=bias)
+    assert np.abs(bench.imu[GYRO].to_numpy()[:500]).max() < 1e-15
+
+
+def test_a_bias_in_degrees_and_from_a_log(log):
+    words = ",".join(str(v) for v in np.degrees(BIAS)) + " deg/s"
+    for bias in (words, log, str(log)):
+        bench = bench_attitude(log, gyro_bias=bias)
+        assert np.abs(bench.imu[GYRO].to_numpy()[:500]).max() < 1e-15
+
+
+@pytest.mark.parametrize("bias", ["1,2", "a,b,c", "1,2,3 rpm", "nan,0,0", "typo", ""])
+def test_what_is_no_bias_is_refused(log, bias):
+    with pytest.raises(ConfigError):
+        bench_attitude(log, gyro_bias=bias)
+
+
+@pytest.mark.parametrize("initial", ["10,-20,300", (10, -20, 300), np.array([10.0, -20, 300])])
+def test_the_start_is_as_given(log, initial):
+    found = bench_attitude(log, initial=initial).initial
+    angles = [found[k] for k in ("roll_deg", "pitch_deg", "heading_deg")]
+    assert angles == pytest.approx([10, -20, 300], abs=1e-9)
+
+
+@pytest.mark.parametrize("initial", ["1,2", "north", "nan,0,0", "1e300,0,0", "truth", "level"])
+def test_a_start_that_cannot_be_had_is_refused(log, initial):
+    with pytest.raises(ConfigError):
+        bench_attitude(log, initial=initial)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"seed": -1},
+        {"seed": 1.5},
+        {"rate": float("nan")},
+        {"rate": "fast"},
+        {"from_s": float("-inf")},
+        {"axes": ["x"]},
+        {"columns": {"time": 1}},
+        {"columns": {"gyr": "x"}},
+        {"algorithms": []},
+        {"algorithms": ["dcm", "dcm"]},
+        {"reference": [None]},
+        {"reference": ["x" * 400]},
+    ],
+)
+def test_values_that_do_not_fit_are_our_own_errors(log, options):
+    with pytest.raises((ConfigError, DataError)):
+        bench_attitude(log, **options)
+
+
+def test_one_text_stands_for_a_list_of_one(log):
+    bench = bench_attitude(log, algorithms="QUATERNION", reference="end same as start")
+    assert [s.algorithm for s in bench.scores] == ["quaternion"]
+
+
+@pytest.mark.parametrize("option", [{"axes": "x,-y,-z"}, {"gyro_unit": "deg/s"}, {"repair": True}])
+def test_a_scenario_is_not_read_from_a_file(option):
+    with pytest.raises(ConfigError, match="not read from a file"):
+        bench_attitude("alexiev-fig4", **option)
+
+
+def test_the_part_that_was_used_is_told(log):
+    bench = bench_attitude(log, from_s=2.0, to_s=8.0)
+    assert "601 samples in 6 s" in bench.description
+    assert "the part from 2 to 8 s" in bench.description
+
+
+def test_a_run_through_the_pole_is_told_at_any_rate():
+    for rate in (5, 20, 50):
+        bench = bench_attitude("alexiev-fig4", rate=rate, algorithms=["euler"])
+        near = bench.runs[0].diagnostics["closest_to_pole_deg"]
+        pitch = bench.runs[0].attitude["pitch"]
+        # Read as 3-2-1 angles an attitude beyond the pole has turned roll and heading around.
+        beyond = bool((bench.runs[0].attitude["roll"].abs() > 90).any())
+        assert (near == 0.0) == beyond, (rate, near, pitch.max())
+
+
+def test_turns_on_a_log_of_means(tmp_path):
+    time = np.arange(101) * 0.1
+    gyro = np.zeros((101, 3))
+    gyro[1:51, 2] = 2 * np.pi / 5.0
+    LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro, sampling="mean"), None)
+    bench = bench_attitude(tmp_path / "log.csv", reference="end 1 turn about z since start")
+    assert bench.scores[0].turned_deg == pytest.approx(360.0, abs=1e-9)
+    assert {round(s.error_deg, 9) for s in bench.scores} == {0.0}
