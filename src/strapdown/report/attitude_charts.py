@@ -12,6 +12,7 @@ from strapdown.report.chart import (
     SERIES_COLOURS,
     Band,
     Chart,
+    Line,
     Mark,
     Panel,
     break_jumps,
@@ -39,6 +40,8 @@ def charts(bench: AttitudeBench) -> list[Chart]:
     found = [_gyro(bench), _attitude(bench)]
     if bench.truth is not None:
         found.append(_error(bench))
+    if len(bench.references):
+        found.append(_reference_error(bench))
     if len(bench.runs) > 1:
         found.append(_difference(bench))
     return found
@@ -106,6 +109,12 @@ def _attitude(bench: AttitudeBench) -> Chart:
                     1.0,
                 )
             )
+        known = bench.references[bench.references["kind"] == "known"]
+        if len(known):
+            at = known["time"].to_numpy(dtype=np.float64)
+            value = known[angle].to_numpy(dtype=np.float64)
+            shown = value % 360.0 if angle == "heading" else value
+            lines.append(Line("known", at, shown, BLACK, points=True))
         panels.append(Panel(f"{angle}, deg", tuple(lines)))
     return Chart(
         "attitude",
@@ -140,6 +149,26 @@ def _error(bench: AttitudeBench) -> Chart:
         f"Drawn at {LEAST_ERROR:g}° where it is less.",
         _TIME,
         (Panel("error, deg", tuple(lines), log=True),),
+        _marks(bench),
+    )
+
+
+def _reference_error(bench: AttitudeBench) -> Chart:
+    lines = []
+    for k, run in enumerate(bench.runs):
+        scores = [
+            s for s in bench.scores if s.algorithm == run.algorithm and s.reference is not None
+        ]
+        at = np.array([s.time for s in scores])
+        errors = np.array([s.error_deg for s in scores])
+        colour = SERIES_COLOURS[k % len(SERIES_COLOURS)]
+        lines.append(Line(run.algorithm, at, errors, colour, points=True))
+    return Chart(
+        "reference-error",
+        "Error at the reference points",
+        "Rotation angle between the computed and the known attitude.",
+        _TIME,
+        (Panel("error, deg", tuple(lines)),),
         _marks(bench),
     )
 

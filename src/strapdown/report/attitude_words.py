@@ -6,7 +6,7 @@ from typing import Any
 
 from strapdown.evaluation.reference_points import in_words
 from strapdown.results import AttitudeBench, Reading, Score
-from strapdown.systems.attitude_bench import passed_pole
+from strapdown.systems.attitude_judgement import passed_pole
 
 CONVENTIONS = (
     ("Body axes", "x forward, y right, z down"),

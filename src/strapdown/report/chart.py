@@ -22,7 +22,7 @@ BUCKETS = 1500
 
 @dataclass(frozen=True)
 class Line:
-    """One curve, thinned by `curve`. `dash` is solid, dash, dot or dashdot."""
+    """One curve, thinned by `curve`, or points alone. `dash` is solid, dash, dot or dashdot."""
 
     name: str
     x: Array
@@ -30,6 +30,7 @@ class Line:
     colour: str
     dash: str = "solid"
     width: float = 1.4
+    points: bool = False
 
 
 @dataclass(frozen=True)

@@ -104,7 +104,7 @@ def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
         out.append(
             {
                 "type": "scatter",
-                "mode": "lines",
+                "mode": "markers" if line.points else "lines",
                 "name": html.escape(line.name),
                 "legendgroup": html.escape(line.name),
                 "showlegend": legend,
@@ -113,6 +113,7 @@ def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
                 "xaxis": "x",
                 "yaxis": axis,
                 "line": {"color": line.colour, "width": line.width, "dash": line.dash},
+                "marker": {"color": line.colour, "size": 9, "symbol": "diamond"},
             }
         )
     return out

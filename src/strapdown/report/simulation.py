@@ -10,7 +10,7 @@ from strapdown.config import ScenarioSpec, SimulateSpec, specify
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
 from strapdown.simulation import find_scenario
-from strapdown.systems.attitude_bench import simulate_scenario
+from strapdown.systems.attitude_source import simulate_scenario
 
 __all__ = ["simulate", "write_simulation"]
 

@@ -44,7 +44,11 @@ def draw(chart: Chart, path: Path) -> None:
         axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
         for panel, axis in zip(chart.panels, axes, strict=True):
             for line in panel.lines:
-                style = {"color": line.colour, "ls": _DASH[line.dash], "lw": line.width}
+                style: dict[str, Any] = {"color": line.colour}
+                if line.points:
+                    style |= {"ls": "", "marker": "D", "ms": 5}
+                else:
+                    style |= {"ls": _DASH[line.dash], "lw": line.width}
                 axis.plot(line.x, line.y, label=line.name, **style)
             if panel.log:
                 axis.set_yscale("log")

@@ -62,7 +62,7 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         still &= _window_sd(accel, starts, ends) <= MAX_ACCEL_SD
     rests = [
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
-        for a, b in _runs(still, starts[1:] < ends[:-1])
+        for a, b in _runs(still, time[starts[1:]] - time[ends[:-1] - 1] < LEAST_LENGTH)
         if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
     ]
     return _of_one_bias(rests)
@@ -73,7 +73,7 @@ def _windows(time: Array) -> tuple[Indices, Indices]:
     first: list[Indices] = [np.empty(0, dtype=np.int64)]
     past: list[Indices] = [np.empty(0, dtype=np.int64)]
     # Piece by piece: a grid across a clock that was set would have no end.
-    holes = np.flatnonzero(np.diff(time) > WINDOW) + 1
+    holes = np.flatnonzero(np.diff(time) > LEAST_LENGTH) + 1
     for piece in np.split(np.arange(time.size), holes):
         end = time[piece[-1]]
         grid = np.arange(time[piece[0]], end - WINDOW, 0.5 * WINDOW)
@@ -99,11 +99,11 @@ def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
     return np.asarray(np.sqrt(variances), dtype=np.float64)
 
 
-def _runs(still: NDArray[np.bool_], overlap: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last window of each run of still windows that overlap from one to the next."""
+def _runs(still: NDArray[np.bool_], joined: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last window of each run of still windows, no hole of a second between them."""
     runs: list[tuple[int, int]] = []
     for k in np.flatnonzero(still).tolist():
-        if runs and runs[-1][1] == k - 1 and overlap[k - 1]:
+        if runs and runs[-1][1] == k - 1 and joined[k - 1]:
             runs[-1] = (runs[-1][0], k)
         else:
             runs.append((k, k))

@@ -76,7 +76,7 @@ def test_nothing_is_fetched(evil_page):
 def test_the_charts_of_the_page_are_whole(evil_page):
     bench, page = evil_page
     found = re.findall(
-        r'<script type="application/json" data-target="chart-(\w+)">(.*?)</script>', page
+        r'<script type="application/json" data-target="chart-([\w-]+)">(.*?)</script>', page
     )
     assert [slug for slug, _ in found] == [c.slug for c in charts(bench)]
     for _, text in found:

@@ -1,0 +1,129 @@
+"""What was asked of the attitude bench, in whatever form it was said, as a specification."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.config import LogSpec, ScenarioSpec, specify
+from strapdown.exceptions import ConfigError
+from strapdown.formats.references import read_reference_words
+from strapdown.simulation import SCENARIOS, find_scenario
+
+Array = NDArray[np.float64]
+
+
+def as_text(value: object) -> str:
+    """A text as it is; three numbers as the text that means them."""
+    if isinstance(value, str | Path):
+        return str(value).strip()
+    return ",".join(str(v) for v in np.asarray(value).ravel().tolist())
+
+
+def as_texts(values: object) -> list[str]:
+    """One text or many, or none."""
+    if values is None:
+        return []
+    if isinstance(values, str | Path):
+        return [str(values)]
+    return [str(v) for v in values] if isinstance(values, Iterable) else [str(values)]
+
+
+def source_spec(
+    text: str, rate: float | None, seed: int | None, reading: dict[str, Any], sampling: str | None
+) -> ScenarioSpec | LogSpec:
+    """Specify a scenario or a log.
+
+    Parameters
+    ----------
+    text : str
+        Name of a scenario, or path of a log.
+    rate : float or None, Hz
+    seed : int or None
+    reading : dict
+        What was said about reading a log; None where nothing was.
+    sampling : str or None
+
+    Returns
+    -------
+    ScenarioSpec or LogSpec
+
+    Raises
+    ------
+    ConfigError
+        There is no such thing, or something was said that the other kind needs.
+    """
+    name = text.strip().lower()
+    if not name:
+        raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+    if name in SCENARIOS:
+        if given := [key for key, value in reading.items() if value is not None]:
+            raise ConfigError(
+                f"{', '.join(given)}: a scenario is not read from a file",
+                quantity=name,
+                remedy="leave that out",
+            )
+        return specify(
+            ScenarioSpec,
+            name=name,
+            rate_hz=100.0 if rate is None else rate,
+            sampling=(sampling or "instantaneous").lower(),
+            seed=0 if seed is None else seed,
+        )
+    if seed is not None:
+        raise ConfigError(
+            "a recorded log has no noise to be drawn", quantity="seed", remedy="leave it out"
+        )
+    if not exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
+        find_scenario(name)  # says which names there are
+    said = {key: value for key, value in reading.items() if value is not None}
+    return specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)
+
+
+def exists(text: str) -> bool:
+    """Tell whether a text is the path of something; sentences and odd characters are not."""
+    if text in ("", "none", "rest"):
+        return False
+    try:
+        return Path(text).exists()
+    except (OSError, ValueError):
+        return False
+
+
+def sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
+    """Sort references into sentences and the path of a truth."""
+    words: list[str] = []
+    truth: str | None = None
+    for item in items:
+        path = Path(item)
+        if not exists(item):
+            if " " not in item.strip() and path.suffix:
+                raise ConfigError(
+                    "there is no such file",
+                    file=item,
+                    quantity="reference",
+                    remedy="check the path, or say it in words: 'end same as start'",
+                )
+            words.append(item)
+        elif path.is_dir():
+            raise ConfigError(
+                "it is a folder",
+                file=item,
+                quantity="reference",
+                remedy="name one file",
+            )
+        elif (listed := read_reference_words(path)) is not None:
+            words += listed
+        elif truth is None:
+            truth = str(path)
+        else:
+            raise ConfigError(
+                f"two attitude truths were given: {truth} and {item}",
+                quantity="reference",
+                remedy="give one; reference points may be as many as you like",
+            )
+    return tuple(words), truth

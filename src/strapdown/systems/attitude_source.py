@@ -1,0 +1,219 @@
+"""What the attitude bench runs on: a log or a scenario, its truth, its window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.attitude import Quaternion, run_attitude
+from strapdown.bundle import sha256
+from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
+from strapdown.evaluation.differences import error_angles
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats import read_log
+from strapdown.formats.recording import Origin, ReadOptions
+from strapdown.formats.references import read_truth
+from strapdown.increments import increments_from_imu
+from strapdown.results import InputFiles, Reading
+from strapdown.simulation import GyroErrors, find_scenario, simulate_gyro
+from strapdown.tables import QUATERNION
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A log or a scenario, read."""
+
+    name: str
+    what: str
+    origin: Origin
+    imu: pd.DataFrame
+    truth: pd.DataFrame | None
+    scored: NDArray[np.bool_] | None
+    readings: tuple[Reading, ...]
+    findings: tuple[Finding, ...]
+    inputs: tuple[InputFiles, ...]
+    sampling_error_deg: tuple[float, float] | None
+
+
+def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Return the samples of a scenario and its exact attitude.
+
+    Parameters
+    ----------
+    spec : ScenarioSpec
+
+    Returns
+    -------
+    imu, truth : DataFrame
+        Imu and Attitude tables on the same stamps.
+
+    Raises
+    ------
+    ConfigError
+        The scenario, the rate or the sampling is unknown.
+    """
+    scenario = find_scenario(spec.name)
+    return simulate_gyro(
+        scenario.motion,
+        scenario.errors,
+        rate=spec.rate_hz,
+        sampling=spec.sampling,
+        seed=spec.seed,
+        source=spec.name,
+    )
+
+
+def read_options(spec: LogSpec) -> ReadOptions:
+    """Return what a specification says about reading its log."""
+    return ReadOptions(
+        columns=dict(spec.columns),
+        gyro_unit=spec.gyro_unit,
+        accel_unit=spec.accel_unit,
+        time_unit=spec.time_unit,
+        axes=spec.axes,
+        sampling=spec.sampling,
+        rate=spec.rate_hz,
+        repair=spec.repair,
+    )
+
+
+def read_source(spec: AttitudeSpec) -> Source:
+    """Read the log, or simulate the scenario, of a specification.
+
+    Raises
+    ------
+    DataError, ConfigError
+        It cannot be used; the message names file, row and remedy.
+    """
+    if isinstance(spec.source, ScenarioSpec):
+        return _scenario(spec.source)
+    recording = read_log(spec.source.path, read_options(spec.source))
+    inputs = (input_files("log", spec.source.path, recording.files),)
+    return Source(
+        recording.name,
+        "recorded log",
+        recording.origin,
+        recording.imu,
+        recording.truth,
+        recording.scored,
+        recording.readings,
+        recording.findings,
+        inputs,
+        None,
+    )
+
+
+def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
+    """Files that were read in a role, with their digests as of now."""
+    return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
+
+
+def _scenario(spec: ScenarioSpec) -> Source:
+    scenario = find_scenario(spec.name)
+    imu, truth = simulate_scenario(spec)
+    clean, _ = simulate_gyro(
+        scenario.motion, GyroErrors(), rate=spec.rate_hz, sampling=spec.sampling
+    )
+    exact = run_attitude(Quaternion(), increments_from_imu(clean), truth[QUATERNION].to_numpy()[0])
+    lost = error_angles(exact.attitude, truth)
+    return Source(
+        spec.name,
+        f"simulated: {scenario.title} (Alexiev 2021, {scenario.origin})",
+        Origin(0, "s"),
+        imu,
+        truth,
+        np.ones(len(truth), dtype=bool),
+        (),
+        (),
+        (),
+        (float(lost.iloc[-1]), float(lost.max())),
+    )
+
+
+def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
+    """Say in words what was run on: how long, how fast, what a row is, and which part.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        The part that was used.
+    what : str
+        What it is.
+    whole : DataFrame
+        What it is a part of.
+    """
+    length = float(imu.index[-1] - imu.index[0])
+    rate = (len(imu) - 1) / length
+    kind = {
+        "instantaneous": "rates at the instant of each stamp",
+        "mean": "mean rates over the interval that ends at each stamp",
+    }[imu.attrs["sampling"]]
+    text = f"{what}; {len(imu)} samples in {length:.4g} s, {rate:.4g} Hz on average; {kind}"
+    if len(imu) < len(whole):
+        text += (
+            f"; the part from {imu.index[0]:.6g} to {imu.index[-1]:.6g} s of one from "
+            f"{whole.index[0]:.6g} to {whole.index[-1]:.6g} s"
+        )
+    return text
+
+
+def with_truth(source: Source, spec: AttitudeSpec) -> Source:
+    """The source with the truth that was given, on its own clock and within its window."""
+    if spec.truth_path is None:
+        if source.truth is None or source.scored is None:
+            return source
+        start, end = source.imu.index[0], source.imu.index[-1]
+        inside = np.asarray((source.truth.index >= start) & (source.truth.index <= end))
+        if not inside.any():
+            return replace(source, truth=None, scored=None)
+        return replace(source, truth=source.truth[inside], scored=source.scored[inside])
+    path = Path(spec.truth_path)
+    options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+    truth = read_truth(path, options, source.origin)
+    inside = np.asarray(
+        (truth.index >= source.imu.index[0]) & (truth.index <= source.imu.index[-1])
+    )
+    if inside.sum() < 2:
+        log = source.imu.index
+        raise DataError(
+            f"{int(inside.sum())} of its instants lie within the log: it runs from "
+            f"{truth.index[0]:.9g} to {truth.index[-1]:.9g} s, and the log from {log[0]:.9g} to "
+            f"{log[-1]:.9g} s",
+            file=path.name,
+            quantity="time",
+            remedy="bring both to one clock",
+        )
+    return replace(
+        source,
+        truth=truth[inside],
+        scored=np.ones(int(inside.sum()), dtype=bool),
+        inputs=(*source.inputs, input_files("truth", spec.truth_path, (path,))),
+    )
+
+
+def window(imu: pd.DataFrame, from_s: float | None, to_s: float | None, name: str) -> pd.DataFrame:
+    """The part of an Imu table between two instants, both included.
+
+    Raises
+    ------
+    ConfigError
+        Fewer than two samples lie between them.
+    """
+    start = imu.index[0] if from_s is None else from_s
+    end = imu.index[-1] if to_s is None else to_s
+    part = imu[(imu.index >= start) & (imu.index <= end)]
+    if len(part) < 2:
+        raise ConfigError(
+            f"{len(part)} samples lie between {start:.9g} and {end:.9g} s; the log runs from "
+            f"{imu.index[0]:.9g} to {imu.index[-1]:.9g} s",
+            file=name,
+            quantity="--from, --to",
+            remedy="choose a window within the log",
+        )
+    return part

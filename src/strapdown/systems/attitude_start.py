@@ -1,0 +1,210 @@
+"""Where a run of the attitude bench starts, and what is taken off its rates."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.alignment.levelling import level
+from strapdown.config import AttitudeSpec, LogSpec
+from strapdown.constants import GYRO_UNITS
+from strapdown.evaluation.differences import attitude_at
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats import read_log
+from strapdown.formats.columns import parse_unit
+from strapdown.results import InputFiles, RestStretch
+from strapdown.sensors.rest import find_rests
+from strapdown.systems.attitude_source import Source, input_files, read_options
+
+Array = NDArray[np.float64]
+
+
+def find_gyro_bias(
+    spec: AttitudeSpec, source: Source, rests: tuple[RestStretch, ...]
+) -> tuple[dict[str, Any], tuple[InputFiles, ...]]:
+    """Find what is to be taken off the rates.
+
+    Parameters
+    ----------
+    spec : AttitudeSpec
+    source : Source
+    rests : tuple of RestStretch
+
+    Returns
+    -------
+    bias : dict
+        ``rad_per_s`` about forward, right, down, or None; ``from``, in words.
+    inputs : tuple of InputFiles
+        Files that it was taken from.
+
+    Raises
+    ------
+    DataError
+        There is no rest to take it from.
+    ConfigError
+        It was not understood.
+    """
+    if spec.gyro_bias_path is not None:
+        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        other = read_log(spec.gyro_bias_path, options)
+        found = find_rests(other.imu)
+        if not found:
+            raise DataError(
+                "no stationary stretch of a second or more was found in it",
+                file=other.name,
+                quantity="gyro bias",
+                remedy="give a log of the sensor lying still, or the bias itself",
+            )
+        longest = max(found, key=lambda r: r.end - r.start)
+        files = input_files("gyro-bias", spec.gyro_bias_path, other.files)
+        return _bias_of(longest, f"{longest.end - longest.start:.4g} s of rest in {other.name}"), (
+            files,
+        )
+    choice = spec.gyro_bias.lower()
+    if choice == "none":
+        return {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
+    if choice == "rest":
+        if not rests:
+            raise DataError(
+                "no stationary stretch of a second or more was found",
+                file=source.name,
+                quantity="gyro bias",
+                remedy="give the bias itself, as in --gyro-bias '4.5,0.1,1.1 deg/s', or a log of "
+                "the sensor lying still",
+            )
+        first = rests[0]
+        return _bias_of(first, f"mean over the rest {first.start:.3f}–{first.end:.3f} s"), ()
+    numbers, unit = _stated_bias(spec.gyro_bias)
+    bias = [v * GYRO_UNITS[unit] for v in numbers]
+    return {"rad_per_s": bias, "from": f"stated: {spec.gyro_bias}"}, ()
+
+
+def _bias_of(rest: RestStretch, where: str) -> dict[str, Any]:
+    return {"rad_per_s": list(rest.gyro_mean), "from": where}
+
+
+def _stated_bias(text: str) -> tuple[list[float], str]:
+    match = re.fullmatch(r"([^,]+),([^,]+),\s*([+-]?[\d.]+(?:e[+-]?\d+)?)\s*(\D.*)?", text, re.I)
+    try:
+        if match is None:
+            raise ValueError
+        numbers = [float(match.group(k)) for k in (1, 2, 3)]
+        if not np.isfinite(numbers).all():
+            raise ValueError
+    except ValueError:
+        raise ConfigError(
+            f"'{text}' is no bias",
+            quantity="--gyro-bias",
+            remedy="give none, rest, three numbers and a unit about the body's forward, right and "
+            "down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
+        ) from None
+    return numbers, parse_unit((match.group(4) or "rad/s").strip(), "gyro")
+
+
+def initial_attitude(
+    text: str, source: Source, rests: tuple[RestStretch, ...], findings: list[Finding]
+) -> tuple[Array, dict[str, Any], float]:
+    """Attitude at the start of the run, in words, and where the run starts."""
+    start = float(source.imu.index[0])
+    at_rest = bool(rests) and rests[0].start - start <= 1.0 and rests[0].accel_mean is not None
+    choice = text.strip().lower()
+    if choice == "auto":
+        choice = "truth" if source.truth is not None else "level" if at_rest else "zero"
+        how = {
+            "truth": "from the truth",
+            "level": "levelled; heading zero, because nothing says what it is",
+            "zero": "zero, because none was given and the log does not begin at rest with an "
+            "accelerometer",
+        }[choice]
+    else:
+        how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}.get(
+            choice, "given"
+        )
+    if choice == "truth":
+        q_nb, begin = _first_truth(source, start)
+    elif choice == "level":
+        q_nb, begin = _levelled(source, rests, at_rest, findings), start
+    elif choice == "zero":
+        q_nb, begin = np.array([1.0, 0.0, 0.0, 0.0]), start
+    else:
+        q_nb, begin = rotation.quaternion_from_euler(_three_angles(text)), start
+    roll, pitch, heading = (float(a) for a in rotation.euler_from_quaternion(q_nb))
+    words = {
+        "roll_deg": roll,
+        "pitch_deg": pitch,
+        "heading_deg": heading,
+        "time_s": begin,
+        "from": how,
+    }
+    return q_nb, words, begin
+
+
+def _first_truth(source: Source, start: float) -> tuple[Array, float]:
+    if source.truth is None:
+        raise ConfigError(
+            "the log has no truth to take it from",
+            file=source.name,
+            quantity="--initial",
+            remedy="give --reference TRUTH.csv, or use level, zero or 'roll,pitch,heading'",
+        )
+    stamps = source.imu.index.to_numpy(dtype=np.float64)
+    known = source.truth.index.to_numpy(dtype=np.float64)
+    before = np.searchsorted(known, stamps, side="right") - 1
+    after = np.minimum(np.searchsorted(known, stamps), known.size - 1)
+    apart = np.where(before >= 0, known[after] - known[before], np.inf)
+    # Across a hole in the truth nothing is known; a sample needs it at hand on both sides.
+    usual = 3.0 * float(np.median(np.diff(known))) if known.size > 1 else 0.0
+    good = np.flatnonzero((apart >= 0.0) & (apart <= usual))
+    if not good.size:
+        raise ConfigError(
+            f"the truth is nowhere known at a sample between {stamps[0]:.9g} and "
+            f"{stamps[-1]:.9g} s",
+            file=source.name,
+            quantity="--initial",
+            remedy="use level, zero or 'roll,pitch,heading', or another window",
+        )
+    begin = float(stamps[good[0]])
+    return attitude_at(source.truth, [begin])[0], begin
+
+
+def _levelled(
+    source: Source, rests: tuple[RestStretch, ...], at_rest: bool, findings: list[Finding]
+) -> Array:
+    if not at_rest:
+        raise ConfigError(
+            "levelling needs an accelerometer and a log that begins at rest",
+            file=source.name,
+            quantity="--initial",
+            remedy="begin at a rest with --from, or give 'roll,pitch,heading' in deg",
+        )
+    assert rests[0].accel_mean is not None
+    roll, pitch = level(rests[0].accel_mean)
+    if abs(roll) > 90.0:
+        findings.append(
+            Finding(
+                f"levelled upside down (roll {roll:.1f}°)",
+                file=source.name,
+                quantity="accel",
+                remedy="if it lay the right way up, its acceleration has the other sign, as on "
+                "iOS: state the unit as --accel-unit -g or -m/s2",
+            )
+        )
+    return rotation.quaternion_from_euler([roll, pitch, 0.0])
+
+
+def _three_angles(text: str) -> list[float]:
+    try:
+        angles = [float(part) for part in text.split(",")]
+    except ValueError:
+        angles = []
+    if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
+        raise ConfigError(
+            f"'{text}' is no attitude",
+            quantity="--initial",
+            remedy="use truth, level, zero, or roll,pitch,heading in degrees, as in 0,0,90",
+        )
+    return angles
