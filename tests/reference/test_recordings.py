@@ -7,11 +7,14 @@ taken from a result of this code.
 
 from __future__ import annotations
 
+import h5py
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from strapdown import bench_attitude, read_log, rotation
 from strapdown.attitude import Quaternion, run_attitude
+from strapdown.evaluation.differences import error_angles
 from strapdown.increments import increments_from_imu
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
@@ -24,6 +27,12 @@ TURNS = {
 }
 
 
+# "Bias about (4.54, 0.11, 1.07) deg/s" about the board's axes, and what that is about the axis
+# turned about. Over the four unmoved logs the mean rate about z runs from 1.02 to 1.12 deg/s.
+BIAS = {"forward": -4.54, "right": 0.11, "up": 1.07}
+KNOWN_TO = 0.1  # deg/s
+
+
 @pytest.mark.parametrize("name", TURNS)
 @pytest.mark.parametrize("bias", ["none", "stated", "recorded"])
 def test_two_turns_by_hand(recordings, name, bias):
@@ -31,7 +40,6 @@ def test_two_turns_by_hand(recordings, name, bias):
     folder = recordings("mpu6050_turns")
     gyro_bias = {
         "none": "none",
-        # (4.54, 0.11, 1.07) deg/s about the board's axes.
         "stated": "-4.54,0.11,-1.07 deg/s",
         "recorded": str(folder / "unmoved-10min"),
     }[bias]
@@ -39,22 +47,38 @@ def test_two_turns_by_hand(recordings, name, bias):
         folder / name, reference=[f"end 2 turns about {axis} since start"], gyro_bias=gyro_bias
     )
     scores = {s.algorithm: s for s in bench.scores}
-    turned = abs(scores["quaternion"].turned_deg)
+    score = scores["quaternion"]
+    turned = score.turned_deg / score.expected_deg * 720.0  # positive in the sense that was named
     length = bench.imu.index[-1] - bench.imu.index[0]
-    if bias == "none":
-        # What the bias itself turns in that time is missing or too much, to the tenth of a
-        # degree a second to which it is known.
-        drift = {"forward": 4.54, "right": 0.11, "up": 1.07}[axis]
-        assert abs(turned - integral) == pytest.approx(drift * length, abs=0.12 * length)
-    else:
-        # The bias differs by 0.06 deg/s between the two ways of knowing it.
-        assert turned == pytest.approx(integral, abs=0.15 * length)
-    errors = {a: s.error_deg for a, s in scores.items()}
-    assert errors["dcm"] == pytest.approx(errors["quaternion"], abs=1e-9)
+    left_in = BIAS[axis] * length if bias == "none" else 0.0
+    # The notes' integral is printed to a tenth of a degree.
+    assert turned == pytest.approx(integral + left_in, abs=KNOWN_TO * length + 0.05)
     assert bench.differences_deg.loc["dcm", "quaternion"] < 1e-9
-    if bias != "none":
-        # Put back by hand, not by a machine: within a hand's breadth of the same attitude.
-        assert errors["quaternion"] < 20.0
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_what_the_hand_left_is_what_the_accelerometer_sees(recordings, name):
+    """The board is put back by hand; how far off, the direction of gravity tells.
+
+    The hand shakes it by some 0.5 m/s² even in the mean of a second, which is 3 deg of tilt at
+    each end; gyro and accelerometer must agree on the end within the two together, and a deg
+    for the scale of the gyro in two turns (0.1 to 0.4 %).
+    """
+    axis, _ = TURNS[name]
+    folder = recordings("mpu6050_turns")
+    bench = bench_attitude(
+        folder / name,
+        reference=[f"end 2 turns about {axis} since start"],
+        gyro_bias=str(folder / "unmoved-10min"),
+    )
+    time, force = bench.imu.index.to_numpy(), bench.imu[ACCEL].to_numpy()
+    q = bench.runs[-1].attitude[QUATERNION].to_numpy()
+    up = [
+        rotation.rotate(q[part], force[part]).mean(axis=0)
+        for part in (time < time[0] + 1.0, time > time[-1] - 1.0)
+    ]
+    cosine = up[0] @ up[1] / np.linalg.norm(up[0]) / np.linalg.norm(up[1])
+    assert np.degrees(np.arccos(cosine)) < 7.0
 
 
 @pytest.mark.parametrize("name", TURNS)
@@ -124,13 +148,46 @@ def test_broad_trials_against_their_optical_truth(recordings, trial):
     assert bench.scored.sum() == counted > 20_000
 
 
-def test_broad_s_attitude_is_its_own_truth_s(recordings):
-    """At the first instant with truth, level to the accelerometer and heading as optical."""
-    bench = bench_attitude(recordings(f"broad/{BROAD[0]}.hdf5"), gyro_bias="rest")
-    # On the table: roll and pitch are those that the accelerometer levels to, within its bias.
-    rest = bench.rests[0]
-    from strapdown.alignment.levelling import level
+@pytest.mark.parametrize("trial", BROAD)
+def test_broad_starts_as_its_own_quaternion_says(recordings, trial):
+    """From the first quaternion of the file alone, in its own frames: east, north, up."""
+    path = recordings(f"broad/{trial}.hdf5")
+    with h5py.File(path) as file:
+        q = file["opt_quat"][:]
+    w, x, y, z = q[np.argmax(np.isfinite(q[:, 0]))]
+    turn = Rotation.from_quat([x, y, z, w])
+    ahead, left = turn.apply([1.0, 0.0, 0.0]), turn.apply([0.0, 1.0, 0.0])
+    initial = bench_attitude(path, algorithms=["quaternion"]).initial
+    heading = np.degrees(np.arctan2(ahead[0], ahead[1])) % 360  # from north towards east
+    pitch = np.degrees(np.arcsin(ahead[2]))  # nose up
+    roll = np.degrees(np.arcsin(left[2] / np.cos(np.radians(pitch))))  # left side up
+    # Three roundings of angles up to 360 deg.
+    assert initial["heading_deg"] == pytest.approx(heading, abs=1e-9)
+    assert initial["pitch_deg"] == pytest.approx(pitch, abs=1e-9)
+    assert initial["roll_deg"] == pytest.approx(roll, abs=1e-9)
 
-    roll, pitch = level(rest.accel_mean)
-    assert bench.initial["roll_deg"] == pytest.approx(roll, abs=1.5)
-    assert bench.initial["pitch_deg"] == pytest.approx(pitch, abs=1.5)
+
+@pytest.mark.parametrize("trial", BROAD)
+def test_broad_by_another_library(recordings, trial):
+    """The same integration by scipy's rotations in the file's own frames."""
+    path = recordings(f"broad/{trial}.hdf5")
+    bench = bench_attitude(path, gyro_bias="rest", algorithms=["quaternion"])
+    with h5py.File(path) as file:
+        gyro, q = file["imu_gyr"][:], file["opt_quat"][:]
+        counts, step = file["movement"][:], 1.0 / file.attrs["sampling_rate"]
+    gyro = gyro - np.array(bench.gyro_bias["rad_per_s"]) * [1, -1, -1]
+    first = int(np.argmax(np.isfinite(q[:, 0])))
+    turns = Rotation.from_rotvec(0.5 * (gyro[first:-1] + gyro[first + 1 :]) * step)
+    attitude = Rotation.from_quat(q[first][[1, 2, 3, 0]])
+    known = counts & np.isfinite(q).all(axis=1)
+    errors = []
+    for k, turn in enumerate(turns, start=first + 1):
+        attitude = attitude * turn
+        if known[k] and k % 97 == 0:  # one in 97 is enough, and keeps this under a second
+            truth = Rotation.from_quat(q[k][[1, 2, 3, 0]])
+            errors.append((k * step, np.degrees((attitude.inv() * truth).magnitude())))
+    ours = error_angles(bench.runs[0].attitude, bench.truth)
+    for time, error in errors:
+        # 5e4 products, each rounded to some 1e-16 rad, in two libraries; the clock to 1e-14.
+        at = int(np.argmin(np.abs(ours.index.to_numpy() - time)))
+        assert ours.iloc[at] == pytest.approx(error, abs=1e-9)
