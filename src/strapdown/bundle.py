@@ -318,7 +318,7 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
         )
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DataError(
             f"no JSON any more: {error}",
             file=MANIFEST,

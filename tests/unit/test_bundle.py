@@ -172,6 +172,9 @@ def test_what_is_no_bundle_is_said_to_be_none(tmp_path):
     (tmp_path / MANIFEST).write_text("{")
     with pytest.raises(DataError, match="no JSON"):
         verify(tmp_path)
+    (tmp_path / MANIFEST).write_text("[" * 100_000)
+    with pytest.raises(DataError, match="no JSON"):
+        verify(tmp_path)
     (tmp_path / MANIFEST).write_text('{"schema": "other"}')
     with pytest.raises(DataError, match="not a manifest"):
         verify(tmp_path)

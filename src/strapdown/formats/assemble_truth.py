@@ -92,7 +92,7 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
     ----------
     raw : RawLog
     options : ReadOptions
-        Its unit of time is used where the file states none.
+        Whether to repair is used.
     origin : Origin
         What the log's time counts from.
 
@@ -114,16 +114,28 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
     rows = np.flatnonzero(_known(q) & np.isfinite(ticks.astype(np.float64)))
     if not rows.size:
         return None
-    unit = "ns" if dated else found["time"].unit or options.time_unit
-    stamps = read_stamps(
-        ticks[rows],
-        parse_unit(unit, "time") if unit else None,
-        "",
-        file=raw.name,
-        row=lambda k: raw.row(int(rows[k])),
-        repair=options.repair,
-        origin=origin,
-    )
+    unit = "ns" if dated else found["time"].unit
+    try:
+        stamps = read_stamps(
+            ticks[rows],
+            parse_unit(unit, "time") if unit else None,
+            "",
+            file=raw.name,
+            row=lambda k: raw.row(int(rows[k])),
+            repair=options.repair,
+            origin=origin,
+        )
+    except DataError as error:
+        if unit is not None:
+            raise
+        # The options that would state it are those of the log.
+        raise DataError(
+            error.finding.what,
+            file=raw.name,
+            row=error.finding.row,
+            quantity="time",
+            remedy="name its column with the unit of time, as in time_ms",
+        ) from None
     return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
 
 

@@ -50,7 +50,7 @@ def read(path: Path) -> RawLog:
         The file is damaged, or a dataset has another length than the gyro's.
     """
     arrays, _, meta = hdf5.read_arrays(path)
-    shapes = {name: arrays[name].shape for name in ("imu_gyr", "imu_acc", "opt_quat")}
+    shapes = {n: arrays.get(n, np.empty(0)).shape for n in ("imu_gyr", "imu_acc", "opt_quat")}
     samples = max((s[0] for s in shapes.values() if s), default=0)
     movement = np.asarray(arrays.get("movement", np.ones(samples, dtype=bool))).astype(bool)
     wanted = {"imu_gyr": (samples, 3), "imu_acc": (samples, 3), "opt_quat": (samples, 4)}

@@ -153,7 +153,7 @@ def read_truth(
         Any readable format with a time and either ``q_w q_x q_y q_z`` (body to
         north-east-down) or ``roll pitch heading``.
     options : ReadOptions, optional
-        For the unit of time, where the file states none.
+        Whether to repair.
     origin : Origin, optional
         What the time of the log counts from; zero if not given.
 

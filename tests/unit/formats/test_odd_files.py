@@ -248,3 +248,26 @@ def test_markers_that_were_lost_are_unknown(tmp_path):
     truth = read_truth(written(tmp_path / "truth.csv", "\n".join(lines)))
     assert truth.index.tolist() == [0.0, 2.0]
     assert rotation.rotation_angle(truth.iloc[0, :4], [1, 0, 0, 0]) == 0.0
+
+
+def test_a_truth_whose_clock_has_no_unit_says_what_to_do(tmp_path):
+    log, truth = turning(tmp_path, origin=0.0, begins=0.0)
+    lines = truth.read_text().splitlines()
+    in_ms = ["time,roll_deg,pitch_deg,heading_deg"]
+    in_ms += [f"{float(line.split(',')[0]) * 1e3},{line.partition(',')[2]}" for line in lines[1:]]
+    with pytest.raises(DataError, match="as in time_ms"):
+        bench_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
+    in_ms[0] = "time_ms,roll_deg,pitch_deg,heading_deg"
+    bench = bench_attitude(log, reference=[str(written(truth, "\n".join(in_ms)))])
+    assert bench.scores[-1].max_deg < 1e-9
+
+
+@pytest.mark.parametrize("spoiled", ["imu_gyr", "imu_acc", "opt_quat"])
+@pytest.mark.parametrize("value", ["text", 1.0, np.ones((7, 3))])
+def test_a_broad_trial_with_a_spoiled_dataset_is_refused(tmp_path, spoiled, value):
+    with h5py.File(tmp_path / "synthetic.h5", "w") as file:
+        file.attrs["sampling_rate"] = 50.0
+        for name, width in (("imu_gyr", 3), ("imu_acc", 3), ("opt_quat", 4)):
+            file[name] = value if name == spoiled else np.ones((30, width))
+    with pytest.raises(DataError, match="shapes"):
+        read_log(tmp_path / "synthetic.h5")
