@@ -208,6 +208,9 @@ def _manifest(
         for name in _files(staging)
         if name != TIMING
     ]
+    for item in inputs:
+        for file, digest in zip(item.files, item.digests, strict=True):
+            _refuse_changed(file, digest)
     copy = sum(f.stat().st_size for i in inputs for f in i.files) <= COPY_LIMIT
     kept, moved = [], {}
     for item in inputs:
@@ -215,7 +218,6 @@ def _manifest(
         # The name that was given; a link's target may have lost its ending.
         place = root / (item.path.name or item.path.resolve().name)
         for file, digest in zip(item.files, item.digests, strict=True):
-            _refuse_changed(file, digest)
             name = place / file.name if item.path.is_dir() else place
             if copy:
                 (staging / name).parent.mkdir(parents=True, exist_ok=True)

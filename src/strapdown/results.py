@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -195,4 +195,5 @@ class AttitudeBench:
     @property
     def summary(self) -> pd.DataFrame:
         """One row an algorithm and a comparison; angles in degrees, time in seconds."""
-        return pd.DataFrame([vars(score) for score in self.scores])
+        columns = [f.name for f in fields(Score)]
+        return pd.DataFrame([vars(score) for score in self.scores], columns=columns)

@@ -292,6 +292,9 @@ def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
     mine.write_bytes(log.read_bytes() + b"\n")
     with pytest.raises(DataError, match="since it was read"):
         write_attitude(bench, tmp_path / "out")
+    mine.unlink()
+    with pytest.raises(DataError, match="since it was read"):
+        write_attitude(bench, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

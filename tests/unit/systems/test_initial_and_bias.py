@@ -116,3 +116,9 @@ def test_turns_on_a_log_of_means(tmp_path):
     bench = bench_attitude(tmp_path / "log.csv", reference="end 1 turn about z since start")
     assert bench.scores[0].turned_deg == pytest.approx(360.0, abs=1e-9)
     assert {round(s.error_deg, 9) for s in bench.scores} == {0.0}
+
+
+def test_a_summary_of_nothing_still_has_its_columns(log):
+    summary = bench_attitude(log).summary
+    assert len(summary) == 0
+    assert {"algorithm", "against", "error_deg"} <= set(summary.columns)
