@@ -62,7 +62,7 @@ def read(path: Path) -> RawLog:
         )
     separator = _separator(numbered[0][1])
     fields = _fields(numbered[0][1], separator)
-    names, units = _above(comments, fields), {}
+    names, units = _above(comments, fields, separator), {}
     if not all(_is_data(f) for f in fields):
         head = numbered.pop(0)
         names = fields[:-1] if len(fields) > 1 and not fields[-1] else fields
@@ -124,10 +124,10 @@ def _units(line: str, separator: str | None, width: int) -> list[str] | None:
     return fields if len(fields) == width and known and all(known) else None
 
 
-def _above(comments: list[str], fields: list[str]) -> list[str]:
+def _above(comments: list[str], fields: list[str], separator: str | None) -> list[str]:
     """Names of columns without a header: the last comment, where it is one; else numbers."""
     text = comments[-1].strip().lstrip("".join(COMMENTS)).strip() if comments else ""
-    names = _fields(text, _separator(text))
+    names = _fields(text, separator)
     if len(names) == len(fields) and not any(_is_data(n) for n in names):
         return names
     return [f"column {k + 1}" for k in range(len(fields))]

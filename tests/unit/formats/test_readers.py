@@ -217,7 +217,10 @@ def test_three_columns_of_a_wider_array_must_be_chosen(tmp_path):
 
 
 def test_a_comment_above_the_numbers_may_be_the_header(tmp_path):
-    lines = ["# made by hand", "# gps_sow_s, gx_rad_s, gy_rad_s, gz_rad_s"]
+    lines = [
+        "# made by hand",
+        "# gps_sow_s, gx_rad_s, gy_rad_s, gz_rad_s (nominal; not calibrated)",
+    ]
     lines += [f"{243000.5 + t},0,0,0.1" for t in TIME]
     (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
     log = read_log(tmp_path / "log.csv")
