@@ -314,7 +314,3 @@ def quats_rotate(q, v, out):
         c = dcm_from_quat(q[i, 0], q[i, 1], q[i, 2], q[i, 3])
         for j in range(3):
             out[i, j] = c[3 * j] * v[i, 0] + c[3 * j + 1] * v[i, 1] + c[3 * j + 2] * v[i, 2]
-
-
-IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
-IDENTITY.flags.writeable = False
