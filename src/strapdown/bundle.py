@@ -15,7 +15,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -148,8 +148,10 @@ def write_bundle(
         _move(staging, out)
     except BaseException:
         shutil.rmtree(staging, ignore_errors=True)
-        for parent in made:
-            parent.rmdir()
+        # One that somebody else has begun to use stays.
+        with suppress(OSError):
+            for parent in made:
+                parent.rmdir()
         raise
     seals.append(Seal(out, digest))
 

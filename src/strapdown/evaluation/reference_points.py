@@ -67,7 +67,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     Parameters
     ----------
     text : str
-        As in the module's text; colons, equals signs and hyphens between words are allowed.
+        As in the module's text; ``same-as``, colons and equals signs are understood, too.
     start, end : float, s
         What these words stand for, and the span in which instants must lie.
 

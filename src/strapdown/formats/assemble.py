@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,9 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     findings = list(raw.findings)
     axes = _axes(raw, options, findings)
     values, units = _triads(raw, found, options, findings)
-    finite = _finite_rows(raw, found, values, options, findings)
-    stamps = _stamps(raw, found, options, finite, findings)
+    ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
+    finite = _finite_rows(raw, found, ticks, values, options, findings)
+    stamps = _stamps(raw, found, ticks, dated, options, finite, findings)
     kept = np.flatnonzero(finite)[stamps.keep]
     time = stamps.seconds[stamps.keep]
     if time.size < 2:
@@ -174,14 +176,14 @@ def _in_plain_words(triad: str, value: float) -> str:
 def _finite_rows(
     raw: RawLog,
     found: dict[str, Column],
+    ticks: NDArray[Any] | None,
     values: dict[str, Array],
     options: ReadOptions,
     findings: list[Finding],
 ) -> NDArray[np.bool_]:
     """Rows in which every value that is used is a number."""
     blocks = dict(values)
-    if "time" in found:
-        ticks = ticks_of(raw, found["time"])[0]
+    if ticks is not None:
         blocks = {"time": ticks[:, None].astype(np.float64)} | blocks
     keep = np.ones(len(values["gyro"]), dtype=bool)
     for name, block in blocks.items():
@@ -218,6 +220,8 @@ def _finite_rows(
 def _stamps(
     raw: RawLog,
     found: dict[str, Column],
+    ticks: NDArray[Any] | None,
+    dated: bool,
     options: ReadOptions,
     finite: NDArray[np.bool_],
     findings: list[Finding],
@@ -229,7 +233,7 @@ def _stamps(
         raise ConfigError(
             f"{options.rate:g} Hz is no rate", quantity="--rate", remedy="use a positive number"
         )
-    if "time" not in found:
+    if ticks is None:
         if rate is None:
             raise DataError(
                 "no column was recognised as time",
@@ -250,7 +254,6 @@ def _stamps(
                 quantity="time",
             )
         )
-    ticks, dated = ticks_of(raw, column)
     unit, why = column.unit, "in its name"
     if dated:
         unit, why = "ns", "dates and times of ISO 8601"

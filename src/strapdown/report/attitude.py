@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from strapdown.bundle import Seal, to_json, write_bundle
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
+from strapdown.report.chart import Chart
 from strapdown.report.page import embedded, render
 from strapdown.report.plotly_chart import figure
 from strapdown.report.svg_chart import draw
@@ -61,7 +63,9 @@ def write_attitude(bench: AttitudeBench, out: str | Path, *, force: bool = False
         drawn = charts(bench)
         for chart in drawn:
             draw(chart, folder / "figures" / f"{chart.slug}.svg")
-        (folder / "report.html").write_text(attitude_page(bench), encoding="utf-8", newline="\n")
+        (folder / "report.html").write_text(
+            attitude_page(bench, drawn), encoding="utf-8", newline="\n"
+        )
     return seals[0]
 
 
@@ -156,19 +160,21 @@ def _write_csv(bench: AttitudeBench, path: Path) -> None:
     )
 
 
-def attitude_page(bench: AttitudeBench) -> str:
+def attitude_page(bench: AttitudeBench, drawn: Sequence[Chart] | None = None) -> str:
     """Return a bench as one offline HTML page.
 
     Parameters
     ----------
     bench : AttitudeBench
+    drawn : sequence of Chart, optional
+        Its charts, where they have been made already.
 
     Returns
     -------
     str
     """
     shown = []
-    for chart in charts(bench):
+    for chart in charts(bench) if drawn is None else drawn:
         data = figure(chart)
         shown.append(
             {
