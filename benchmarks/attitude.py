@@ -48,10 +48,12 @@ def ratios() -> Iterator[Ratio]:
     gyro = rates()
     theta = np.ascontiguousarray(gyro * STEP)
     dtheta = np.zeros_like(theta)
+    dt = np.full(SAMPLES, STEP)
     history = np.empty((SAMPLES, 4))
 
     def batch() -> None:
-        kernel.quaternion_advance(np.array([1.0, 0, 0, 0]), theta, dtheta, history, 0, True)
+        start = np.array([1.0, 0.0, 0.0, 0.0])
+        kernel.quaternion_advance(start, dt, theta, dtheta, history, 0.0, 1.0)
 
     pointer = ctypes.POINTER(ctypes.c_double)
     library = c_loop()

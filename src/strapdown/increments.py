@@ -6,38 +6,60 @@ import numpy as np
 import pandas as pd
 
 from strapdown._kernels import increments as kernel
+from strapdown.exceptions import ConfigError
 from strapdown.tables import GYRO, check_imu, increments_table
 
 __all__ = ["increments_from_imu"]
 
 
-def increments_from_imu(imu: pd.DataFrame) -> pd.DataFrame:
+INTERPOLATIONS = ("linear", "cubic")
+
+
+def increments_from_imu(imu: pd.DataFrame, interpolation: str = "linear") -> pd.DataFrame:
     """Form the angular increments between the samples of a log.
 
     Parameters
     ----------
     imu : DataFrame
         An Imu table; any spacing, each step has its own length.
+    interpolation : {'linear', 'cubic'}
+        How rates at the stamps run between them: along the chord (the trapezoid, Alexiev 2021,
+        Eq. (2); second order in the step), or along the cubic through the two samples and
+        their neighbours (fourth order on smooth motion; a step beside a gap or in a burst
+        uses the neighbours whose steps are like it, within a factor of two). The cubic of a
+        step needs the sample after it, so that live it is known one sample late. A mean rate
+        has nothing between stamps to interpolate.
 
     Returns
     -------
     DataFrame
-        An Increments table of one row less: a rate at the stamp is integrated by the
-        trapezoid (Alexiev 2021, Eq. (2); second order in the step), a mean rate is multiplied
-        by its step. The first row of a mean rate belongs to an interval that begins before
-        the log, and is left out.
+        An Increments table of one row less; a mean rate is multiplied by its step. The first
+        row of a mean rate belongs to an interval that begins before the log, and is left out.
 
     Raises
     ------
     DataError
         As `tables.check_imu`.
+    ConfigError
+        `interpolation` is unknown.
     """
+    if interpolation not in INTERPOLATIONS:
+        raise ConfigError(
+            f"'{interpolation}' is no interpolation",
+            quantity="interpolation",
+            remedy=f"use {' or '.join(INTERPOLATIONS)}",
+        )
     check_imu(imu)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
     rate = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float64))
-    theta = np.empty((len(time) - 1, 3))
+    dt = np.diff(time)
+    theta = np.empty((len(dt), 3))
     dtheta = np.empty_like(theta)
-    kernel.increments(time, rate, imu.attrs["sampling"] == "mean", theta, dtheta)
-    table = increments_table(time[1:], np.diff(time), theta, dtheta)
+    mean = imu.attrs["sampling"] == "mean"
+    if interpolation == "cubic" and not mean:
+        kernel.increments_cubic(dt, rate, theta, dtheta)
+    else:
+        kernel.increments(dt, rate, mean, theta, dtheta)
+    table = increments_table(time[1:], dt, theta, dtheta)
     table.attrs["source"] = imu.attrs.get("source")
     return table

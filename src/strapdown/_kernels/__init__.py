@@ -18,7 +18,8 @@ from numba import __version__ as _numba_version
 from numba import config as _config
 
 
-def _cache_folder() -> str:
+def cache_folder() -> str:
+    """Folder of the compiled kernels, named after the digest of their sources."""
     digest = hashlib.sha256(_numba_version.encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
@@ -31,8 +32,8 @@ def _cache_folder() -> str:
 _before = _config.CACHE_DIR
 try:
     if not _before:
-        _config.CACHE_DIR = _cache_folder()
-    for _name in ("rotation", "increments", "attitude"):
+        _config.CACHE_DIR = cache_folder()
+    for _name in ("rotation", "increments", "attitude", "rotation_vector"):
         import_module(f"strapdown._kernels.{_name}")
 except RuntimeError:
     # Path.home() without a home; numba then chooses a place of its own.

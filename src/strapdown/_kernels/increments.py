@@ -19,12 +19,62 @@ def increment(w0, w1, dt, mean):
 
 
 @njit(cache=True)
-def increments(time, rate, mean, theta, dtheta):
-    """Fill theta and dtheta, both (n-1, 3), from n samples of time and rate."""
-    for k in range(time.shape[0] - 1):
-        dt = time[k + 1] - time[k]
+def increments(dt, rate, mean, theta, dtheta):
+    """Fill theta and dtheta, both (n-1, 3), from n samples of the rate and n-1 steps."""
+    for k in range(dt.shape[0]):
         for j in range(3):
-            theta[k, j], dtheta[k, j] = increment(rate[k, j], rate[k + 1, j], dt, mean)
+            theta[k, j], dtheta[k, j] = increment(rate[k, j], rate[k + 1, j], dt[k], mean)
+
+
+# Neighbours help only where their steps are like the one between them: in a burst, or beside
+# a gap, the polynomial through them says nothing of it.
+ALIKE = 2.0
+
+
+@njit(cache=True)
+def cubic_mean(before, first, last, after, p, r):
+    """Mean over a step of the cubic through its two ends and one neighbour on each side.
+
+    The neighbours are p and r steps away; one whose distance is zero is not used, and then
+    it is the parabola through three, or the chord.
+    """
+    slope = last - first
+    left = 0.0
+    right = 0.0
+    if p > 0.0:
+        left = (slope - (first - before) / p) / (1.0 + p)
+    if r > 0.0:
+        right = ((after - last) / r - slope) / (1.0 + r)
+    mean = 0.5 * (first + last)
+    if p > 0.0 and r > 0.0:
+        third = (right - left) / (1.0 + p + r)
+        return mean - left / 6.0 - third * (1.0 / 12.0 + p / 6.0)
+    return mean - (left + right) / 6.0
+
+
+@njit(cache=True)
+def neighbour(step, other):
+    """Distance of a neighbour in steps, or zero where it does not help."""
+    if other <= ALIKE * step and step <= ALIKE * other:
+        return other / step
+    return 0.0
+
+
+@njit(cache=True)
+def increments_cubic(dt, rate, theta, dtheta):
+    """As `increments` of instantaneous rates, with the rate as a cubic over each step."""
+    steps = dt.shape[0]
+    for k in range(steps):
+        p, r = 0.0, 0.0
+        if k > 0:
+            p = neighbour(dt[k], dt[k - 1])
+        if k + 1 < steps:
+            r = neighbour(dt[k], dt[k + 1])
+        for j in range(3):
+            first, last = rate[k, j], rate[k + 1, j]
+            before, after = rate[max(k - 1, 0), j], rate[min(k + 2, steps), j]
+            theta[k, j] = dt[k] * cubic_mean(before, first, last, after, p, r)
+            dtheta[k, j] = (last - first) * dt[k]
 
 
 # What a sample-by-sample run remembers between calls: the head of one float64 array whose tail

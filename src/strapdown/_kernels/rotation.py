@@ -65,7 +65,7 @@ def half_angle_truncated(u, order):
     for k in range(1, order + 1):
         # term = u^(k//2) (-1)^(k//2) / k!; even k belongs to c, and odd k to s, where the
         # vector part brings in one more power of the angle.
-        term /= k
+        term /= float(k)
         if k % 2 == 0:
             term *= -u
             c += term
@@ -143,12 +143,12 @@ def dcm_coefficients_truncated(n2, order):
     term_b = 0.5
     k = 1
     while 2 * k + 1 <= order:
-        term_a *= -n2 / ((2 * k) * (2 * k + 1))
+        term_a *= -n2 / float((2 * k) * (2 * k + 1))
         a += term_a
         k += 1
     k = 1
     while 2 * k + 2 <= order:
-        term_b *= -n2 / ((2 * k + 1) * (2 * k + 2))
+        term_b *= -n2 / float((2 * k + 1) * (2 * k + 2))
         b += term_b
         k += 1
     return a, b

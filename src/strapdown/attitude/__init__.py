@@ -14,6 +14,8 @@ from strapdown.attitude.direction_cosine import DirectionCosine
 from strapdown.attitude.euler_krylov import EulerKrylov
 from strapdown.attitude.naive import Naive
 from strapdown.attitude.quaternion import Quaternion
+from strapdown.attitude.rotation_vector import RotationVector
+from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.exceptions import ConfigError, DivergenceError, nearest
 from strapdown.results import AttitudeRun
@@ -27,6 +29,8 @@ __all__ = [
     "EulerKrylov",
     "Naive",
     "Quaternion",
+    "RotationVector",
+    "RungeKutta",
     "make_algorithm",
     "run_attitude",
 ]
@@ -36,6 +40,8 @@ ALGORITHMS: dict[str, type[AttitudeAlgorithm]] = {
     "euler": EulerKrylov,
     "dcm": DirectionCosine,
     "quaternion": Quaternion,
+    "rk4": RungeKutta,
+    "rotvec": RotationVector,
 }
 
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}

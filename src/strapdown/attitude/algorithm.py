@@ -24,6 +24,32 @@ def quaternions_from_angles(roll_pitch_heading: Array) -> Array:
     return q
 
 
+def unit_quaternions(history: Array) -> Array:
+    """Rows of four numbers, scaled to norm 1."""
+    norm = np.sqrt((history * history).sum(axis=1, keepdims=True))
+    return np.asarray(history / norm)
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """Powers of the step with which the attitude error of an algorithm falls; 0: it does not.
+
+    Attributes
+    ----------
+    increments : int
+        On general smooth motion, from exact increments.
+    rates : int
+        On general smooth motion, from rates at the stamps that are interpolated by a cubic;
+        by the trapezoid it is this, and at most 2.
+    coning : int
+        Drift on pure coning, from exact increments.
+    """
+
+    increments: int
+    rates: int
+    coning: int
+
+
 @dataclass(frozen=True)
 class AttitudeAlgorithm(ABC):
     """One attitude algorithm with its options; it holds no state of its own.
@@ -36,6 +62,8 @@ class AttitudeAlgorithm(ABC):
         The words for it in a report.
     equations : str
         Where it stands in its source.
+    source : str
+        That source.
     width : int
         Numbers of the state that are the attitude, the first of it.
     advance_kernel, update_kernel : callable
@@ -45,6 +73,7 @@ class AttitudeAlgorithm(ABC):
     name: ClassVar[str]
     title: ClassVar[str]
     equations: ClassVar[str]
+    source: ClassVar[str] = "Alexiev (2021)"
     summary: ClassVar[str]
     width: ClassVar[int]
     advance_kernel: ClassVar[Callable[..., Any]]
@@ -60,15 +89,12 @@ class AttitudeAlgorithm(ABC):
 
     @property
     @abstractmethod
-    def accuracy_order(self) -> int:
-        """Power of the step with which the attitude error falls on general motion.
-
-        For rates sampled at the stamps and exact increments alike; 0 where no rate helps.
-        """
+    def accuracy(self) -> Accuracy:
+        """Powers of the step with which its error falls."""
 
     @abstractmethod
-    def kernel_options(self) -> tuple[float, ...]:
-        """Return the options as numbers, at most two, as the kernels take them."""
+    def kernel_options(self) -> tuple[float, float]:
+        """Return the two options that the kernels take, as numbers; zero where there is none."""
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return what the algorithm knows of its own condition after a run.
@@ -99,11 +125,12 @@ class AttitudeAlgorithm(ABC):
         history : ndarray, (n, width)
             The attitude part of the state after each step.
         """
+        dt = np.ascontiguousarray(increments["dt"].to_numpy(dtype=np.float64))
         theta = np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64))
         dtheta = np.ascontiguousarray(increments[DTHETA].to_numpy(dtype=np.float64))
         history = np.empty((len(theta), self.width))
         after = state.copy()
-        type(self).advance_kernel(after, theta, dtheta, history, *self.kernel_options())
+        type(self).advance_kernel(after, dt, theta, dtheta, history, *self.kernel_options())
         return after, history
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
 from strapdown._kernels import rotation as kernel_rotation
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm
 from strapdown.exceptions import ConfigError
 
 
@@ -71,13 +71,13 @@ class DirectionCosine(AttitudeAlgorithm):
         return q
 
     @property
-    def accuracy_order(self) -> int:
+    def accuracy(self) -> Accuracy:
         """Two, whatever the order of the series: what it stretches, it does not turn."""
-        return 2
+        return Accuracy(increments=2, rates=2, coning=2)
 
-    def kernel_options(self) -> tuple[float, ...]:
+    def kernel_options(self) -> tuple[float, float]:
         """Return the order and the steps between re-orthogonalisations."""
-        return (int(self.order), float(self.orthogonalise_every))
+        return float(self.order), float(self.orthogonalise_every)
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return the largest element of C^T C - I at the end."""

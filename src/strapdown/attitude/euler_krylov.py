@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm, quaternions_from_angles
+from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, quaternions_from_angles
 from strapdown.exceptions import ConfigError
 
 
@@ -54,13 +54,15 @@ class EulerKrylov(AttitudeAlgorithm):
         return quaternions_from_angles(history)
 
     @property
-    def accuracy_order(self) -> int:
-        """One for the forward step; two for Runge-Kutta's, which the linear rate limits."""
-        return 2 if self.step == "rk4" else 1
+    def accuracy(self) -> Accuracy:
+        """One for the forward step; Runge-Kutta is limited by what is known of the rate."""
+        if self.step == "forward":
+            return Accuracy(increments=1, rates=1, coning=2)
+        return Accuracy(increments=2, rates=4, coning=2)
 
-    def kernel_options(self) -> tuple[float, ...]:
+    def kernel_options(self) -> tuple[float, float]:
         """Return whether the step is Runge-Kutta's."""
-        return (float(self.step == "rk4"),)
+        return float(self.step == "rk4"), 0.0
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return the least distance of the pitch from ±90° (deg), and when it was (s)."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm, quaternions_from_angles
+from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, quaternions_from_angles
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Naive(AttitudeAlgorithm):
         return quaternions_from_angles(history)
 
     @property
-    def accuracy_order(self) -> int:
+    def accuracy(self) -> Accuracy:
         """Zero: the error is of commutation, and not of the step."""
-        return 0
+        return Accuracy(increments=0, rates=0, coning=0)
 
-    def kernel_options(self) -> tuple[float, ...]:
+    def kernel_options(self) -> tuple[float, float]:
         """Return nothing: there are no options."""
-        return ()
+        return 0.0, 0.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
+from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
 from strapdown.exceptions import ConfigError
 
 
@@ -52,17 +52,16 @@ class Quaternion(AttitudeAlgorithm):
 
     def quaternions(self, history: Array) -> Array:
         """Scale each to norm 1: a truncated series without `normalise` grows or shrinks."""
-        norm = np.sqrt((history * history).sum(axis=1, keepdims=True))
-        return np.asarray(history / norm)
+        return unit_quaternions(history)
 
     @property
-    def accuracy_order(self) -> int:
+    def accuracy(self) -> Accuracy:
         """Two, whatever the order of the series: 2 atan(r/2) is r to that order already."""
-        return 2
+        return Accuracy(increments=2, rates=2, coning=2)
 
-    def kernel_options(self) -> tuple[float, ...]:
+    def kernel_options(self) -> tuple[float, float]:
         """Return the order and whether to normalise."""
-        return (int(self.order), bool(self.normalise))
+        return float(self.order), float(self.normalise)
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return how far the norm is from 1 at the end."""

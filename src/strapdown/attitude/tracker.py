@@ -58,7 +58,7 @@ class AttitudeTracker:
         head = np.zeros(HEAD)
         head[MEAN] = float(sampling == "mean")
         options = algorithm.kernel_options()
-        head[OPTIONS : OPTIONS + len(options)] = options
+        head[OPTIONS:] = options
         self._algorithm = algorithm
         self._record = np.concatenate([head, algorithm.begin(unit)])
         self._update = type(algorithm).update_kernel

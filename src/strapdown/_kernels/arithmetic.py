@@ -1,0 +1,251 @@
+"""The same formulas in another arithmetic: single precision, or counted.
+
+The kernels are written once, in double precision. An embedded processor runs them in single
+precision, and a designer asks how many operations they take. Both are answered by the very
+source of the kernels, read and changed in two ways: for single precision each constant and each
+conversion becomes ``np.float32``, so that numba compiles every operation as one on floats;
+for counting they run as plain Python on numbers that count what is done to them.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import importlib
+import math
+import os
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+SOURCES = ("rotation", "increments", "attitude", "rotation_vector")
+PACKAGE = "strapdown._kernels"
+SINGLE = "_strapdown_single"
+LARGEST_SINGLE = 3e38
+
+
+# --- single precision --------------------------------------------------------------------
+
+
+class _InSingle(ast.NodeTransformer):
+    """Make every constant and every conversion a float32."""
+
+    def visit_Constant(self, node: ast.Constant) -> ast.expr:
+        small = isinstance(node.value, float) and abs(node.value) < LARGEST_SINGLE
+        return _single(node) if small else node
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        return _single(node) if node.attr == "pi" else node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return _float32() if node.id == "float" else node
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        if node.col_offset > 0 or isinstance(node.value, ast.Tuple):
+            return self.generic_visit(node)
+        # A constant of the module is worked out in double precision, and rounded once.
+        if _is_inexact(node.value):
+            node.value = _single(node.value)
+        return node
+
+    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
+        if node.module and node.module.startswith(PACKAGE):
+            node.module = SINGLE + node.module.removeprefix(PACKAGE)
+        return node
+
+
+def _is_inexact(node: ast.expr) -> bool:
+    return any(
+        isinstance(part, ast.Constant)
+        and isinstance(part.value, float)
+        and abs(part.value) < LARGEST_SINGLE
+        for part in ast.walk(node)
+    )
+
+
+def _float32() -> ast.expr:
+    return ast.Attribute(ast.Name("_np", ast.Load()), "float32", ast.Load())
+
+
+def _single(value: ast.expr) -> ast.expr:
+    return ast.Call(_float32(), [value], [])
+
+
+def single_source(name: str) -> str:
+    """Source of a kernel module in single precision."""
+    tree = _InSingle().visit(ast.parse(_source(name)))
+    tree.body.insert(2, ast.parse("import numpy as _np").body[0])
+    return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+
+
+def single_precision(name: str) -> ModuleType:
+    """Import a kernel module compiled in single precision.
+
+    The sources are written beside the compiled kernels, because numba keeps compiled code
+    for what has a file alone; where nothing can be written they are compiled anew.
+
+    Parameters
+    ----------
+    name : str
+        One of `SOURCES`.
+
+    Returns
+    -------
+    module
+    """
+    if SINGLE not in sys.modules:
+        package = ModuleType(SINGLE)
+        package.__path__ = [str(_written({n: single_source(n) for n in SOURCES}))]
+        sys.modules[SINGLE] = package
+    return importlib.import_module(f"{SINGLE}.{name}")
+
+
+def _written(sources: dict[str, str]) -> Path:
+    from strapdown._kernels import cache_folder
+
+    digest = hashlib.sha256("".join(sources.values()).encode()).hexdigest()[:16]
+    base = os.environ.get("NUMBA_CACHE_DIR") or cache_folder()
+    folder = Path(base) / f"single-{digest}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in sources.items():
+            if not (folder / f"{name}.py").exists():
+                _write(folder / f"{name}.py", text)
+    except OSError:
+        folder = Path(tempfile.mkdtemp(prefix="strapdown-"))
+        for name, text in sources.items():
+            _write(folder / f"{name}.py", text)
+    return folder
+
+
+def _write(path: Path, text: str) -> None:
+    # Whole or not at all: another process may be writing the same.
+    with tempfile.NamedTemporaryFile(
+        "w", dir=path.parent, delete=False, encoding="utf-8", newline="\n"
+    ) as file:
+        file.write(text)
+    Path(file.name).replace(path)
+
+
+def _source(name: str) -> str:
+    return Path(__file__).with_name(f"{name}.py").read_text(encoding="utf-8")
+
+
+# --- counted -----------------------------------------------------------------------------
+
+
+class Counted:
+    """A number that notes every operation on it."""
+
+    __slots__ = ("count", "value")
+
+    def __init__(self, value: float, count: Counter[str]) -> None:
+        self.value, self.count = float(value), count
+
+    def _by(self, kind: str, value: float) -> Counted:
+        self.count[kind] += 1
+        return Counted(value, self.count)
+
+    def __add__(self, other: Counted | float) -> Counted:
+        return self._by("add", self.value + float(other))
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Counted | float) -> Counted:
+        return self._by("add", self.value - float(other))
+
+    def __rsub__(self, other: Counted | float) -> Counted:
+        return self._by("add", float(other) - self.value)
+
+    def __mul__(self, other: Counted | float) -> Counted:
+        return self._by("multiply", self.value * float(other))
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Counted | float) -> Counted:
+        return self._by("divide", self.value / float(other))
+
+    def __rtruediv__(self, other: Counted | float) -> Counted:
+        return self._by("divide", float(other) / self.value)
+
+    def __neg__(self) -> Counted:
+        return Counted(-self.value, self.count)
+
+    def __abs__(self) -> Counted:
+        return Counted(abs(self.value), self.count)
+
+    def __float__(self) -> float:
+        return self.value
+
+    def __int__(self) -> int:
+        return int(self.value)
+
+    def __lt__(self, other: Counted | float) -> bool:
+        return self.value < float(other)
+
+    def __le__(self, other: Counted | float) -> bool:
+        return self.value <= float(other)
+
+    def __gt__(self, other: Counted | float) -> bool:
+        return self.value > float(other)
+
+    def __ge__(self, other: Counted | float) -> bool:
+        return self.value >= float(other)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Counted | float | int) and self.value == float(other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def counted_kernels() -> dict[str, SimpleNamespace]:
+    """Return every kernel module as plain Python, for numbers of `Counted`."""
+    loaded: dict[str, SimpleNamespace] = {}
+    for name in SOURCES:
+        tree = ast.parse(_source(name))
+        namespace: dict[str, object] = {}
+        for node in list(tree.body):
+            if isinstance(node, ast.ImportFrom):
+                tree.body.remove(node)
+                if node.module and node.module.startswith(f"{PACKAGE}."):
+                    other = vars(loaded[node.module.rpartition(".")[2]])
+                    namespace |= {item.name: other[item.name] for item in node.names}
+            elif isinstance(node, ast.FunctionDef):
+                node.decorator_list = []
+        exec(compile(tree, f"{name} (counted)", "exec"), namespace)
+        # Only now, so that the constants of the module are numbers.
+        namespace["math"] = namespace["np"] = _CountedMath
+        loaded[name] = SimpleNamespace(**namespace)
+    return loaded
+
+
+class _CountedMath:
+    """The functions of `math` that kernels call."""
+
+    @staticmethod
+    def _of(kind: str, value: float, x: Counted | float) -> Counted | float:
+        return x._by(kind, value) if isinstance(x, Counted) else value
+
+    @staticmethod
+    def sqrt(x: Counted | float) -> Counted | float:
+        return _CountedMath._of("sqrt", math.sqrt(x), x)
+
+    @staticmethod
+    def sin(x: Counted | float) -> Counted | float:
+        return _CountedMath._of("trig", math.sin(x), x)
+
+    @staticmethod
+    def cos(x: Counted | float) -> Counted | float:
+        return _CountedMath._of("trig", math.cos(x), x)
+
+    @staticmethod
+    def fmod(x: Counted | float, y: float) -> Counted | float:
+        return _CountedMath._of("divide", math.fmod(x, y), x)
+
+    @staticmethod
+    def copysign(x: float, y: Counted | float) -> float:
+        return math.copysign(x, y)
+
+    pi = math.pi

@@ -1,0 +1,86 @@
+"""Rotation-vector updates with compensation of coning over 1 to 4 increments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from strapdown._kernels import rotation_vector as kernel
+from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
+from strapdown.exceptions import ConfigError, nearest
+
+_COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT}
+
+
+@dataclass(frozen=True)
+class RotationVector(AttitudeAlgorithm):
+    """The quaternion, multiplied by that of the rotation vector of 1 to 4 increments.
+
+    Increments of one block are compared with each other: what their axis turned is put into
+    the rotation vector (Bortz 1971). Within a block, and at a ragged end, the attitude is
+    that of the increments so far; only whole blocks are built upon, so that the error does
+    not depend on where a record ends.
+
+    Parameters
+    ----------
+    samples : int
+        Increments of a block, 1 to 4. One alone knows its own turning only where rates at
+        the stamps were given: then it is taken from their change over the step.
+    coefficients : {'auto', 'miller', 'fit'}
+        ``miller``: those that are best for pure coning, for equal steps. ``fit``: the
+        polynomial through the increments, for steps of any lengths, with the products of
+        three and more that general motion needs. ``auto``: ``miller`` where the steps of a
+        block are equal to a thousandth, and ``fit`` where they are not.
+    """
+
+    name = "rotvec"
+    title = "Rotation vector"
+    equations = "(11)"
+    source = "Bortz (1971), Miller (1983)"
+    summary = "rotation vector of 1 to 4 increments, compensated for coning"
+    width = 4
+    advance_kernel = staticmethod(kernel.rotvec_advance)
+    update_kernel = staticmethod(kernel.rotvec_update)
+
+    samples: int = 2
+    coefficients: Literal["auto", "miller", "fit"] = "auto"
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.samples <= 4:
+            raise ConfigError(
+                f"{self.samples} is out of range",
+                quantity="rotvec:samples",
+                remedy="use 1, 2, 3 or 4 increments",
+            )
+        if self.coefficients not in _COEFFICIENTS:
+            raise ConfigError(
+                f"'{self.coefficients}' is no kind of coefficients",
+                quantity="rotvec:coefficients",
+                remedy=nearest(str(self.coefficients), _COEFFICIENTS),
+            )
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return the quaternion now and at the block's start, and an empty block."""
+        state = np.zeros(kernel.STATE)
+        state[:4] = state[4:8] = q_nb
+        return state
+
+    def quaternions(self, history: Array) -> Array:
+        """Scale each to norm 1, from which rounding alone has taken it."""
+        return unit_quaternions(history)
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """By the number of increments; products of three are what general motion needs."""
+        if self.samples == 1:
+            return Accuracy(increments=2, rates=4, coning=2)
+        if self.coefficients == "fit":
+            order = {2: 4, 3: 4, 4: 6}[self.samples]
+            return Accuracy(increments=order, rates=4, coning=order)
+        return Accuracy(increments=4, rates=4, coning=2 * self.samples)
+
+    def kernel_options(self) -> tuple[float, float]:
+        """Return the increments of a block and the kind of coefficients."""
+        return float(self.samples), _COEFFICIENTS[self.coefficients]

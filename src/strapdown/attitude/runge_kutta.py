@@ -1,0 +1,56 @@
+"""The quaternion's kinematic equation by the classical Runge-Kutta step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown._kernels import attitude as kernel
+from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
+
+
+@dataclass(frozen=True)
+class RungeKutta(AttitudeAlgorithm):
+    """The quaternion, by the fourth-order Runge-Kutta step of its differential equation.
+
+    The rate is taken as linear over the step: from rates at the stamps it knows how the axis
+    of the rate turned, which the exponential of the increment alone does not; from increments
+    it does not know it, and is then of order 2 like that.
+
+    Parameters
+    ----------
+    normalise : bool
+        Scale back to norm 1 after each step.
+    """
+
+    name = "rk4"
+    title = "Runge-Kutta quaternion"
+    equations = "(18)"
+    summary = "dq/dt = q (0, rate)/2 by the classical fourth-order step, rate linear over it"
+    width = 4
+    advance_kernel = staticmethod(kernel.rk4_advance)
+    update_kernel = staticmethod(kernel.rk4_update)
+
+    normalise: bool = True
+
+    def begin(self, q_nb: Array) -> Array:
+        """Return the quaternion itself."""
+        return np.array(q_nb, dtype=np.float64)
+
+    def quaternions(self, history: Array) -> Array:
+        """Scale each to norm 1: without `normalise` the step shrinks it."""
+        return unit_quaternions(history)
+
+    @property
+    def accuracy(self) -> Accuracy:
+        """Four where the rate is known to that order, and two from increments alone."""
+        return Accuracy(increments=2, rates=4, coning=2)
+
+    def kernel_options(self) -> tuple[float, float]:
+        """Return whether to normalise."""
+        return float(self.normalise), 0.0
+
+    def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
+        """Return how far the norm is from 1 at the end."""
+        return {"norm_error": float(np.sqrt(state @ state) - 1.0)}
