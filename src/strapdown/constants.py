@@ -9,6 +9,7 @@ import math
 
 __all__ = [
     "ACCEL_UNITS",
+    "CORTEX_M4F_CYCLES",
     "GYRO_UNITS",
     "STANDARD_GRAVITY",
     "TIME_UNITS",
@@ -45,4 +46,15 @@ TIME_UNITS: dict[str, float] = {
     "us": 1e-6,
     "ns": 1e-9,
     "min": 60.0,
+}
+
+#: Cycles of one operation on floats on a Cortex-M4F: add, multiply, divide and root from Arm
+#: DDI 0439 (Cortex-M4 Technical Reference Manual), FPU instruction timing. Trigonometric
+#: functions are a library's: 60 to 100 are usual, and 80 is assumed.
+CORTEX_M4F_CYCLES: dict[str, float] = {
+    "add": 1.0,
+    "multiply": 1.0,
+    "divide": 14.0,
+    "sqrt": 14.0,
+    "trig": 80.0,
 }

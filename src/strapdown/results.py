@@ -10,7 +10,19 @@ import pandas as pd
 
 from strapdown.exceptions import Finding
 
-__all__ = ["AttitudeBench", "AttitudeRun", "InputFiles", "Reading", "RestStretch", "Score"]
+__all__ = [
+    "Answer",
+    "AttitudeBench",
+    "AttitudeRun",
+    "Cost",
+    "InputFiles",
+    "PeerRun",
+    "Reading",
+    "RestStretch",
+    "Score",
+    "Share",
+    "Trials",
+]
 
 
 @dataclass(frozen=True)
@@ -139,6 +151,129 @@ class InputFiles:
 
 
 @dataclass(frozen=True)
+class Cost:
+    """What one sample costs one algorithm.
+
+    Attributes
+    ----------
+    algorithm : str
+    add, multiply, divide, sqrt, trig : float
+        Operations, counted on the kernel itself while it ran on this log's larger steps, and
+        averaged over the samples of a block. Subtractions count as additions.
+    cycles : float
+        The same in cycles of a Cortex-M4F (`constants.CORTEX_M4F_CYCLES`): a weight for ranking.
+    memory : int
+        Numbers that it keeps between samples.
+    """
+
+    algorithm: str
+    add: float
+    multiply: float
+    divide: float
+    sqrt: float
+    trig: float
+    cycles: float
+    memory: int
+
+
+@dataclass(frozen=True)
+class Share:
+    """Whose the error of one algorithm is: its own, the sensor's, and single precision's.
+
+    Attributes
+    ----------
+    algorithm : str
+    own_deg : tuple of float
+        Error of the algorithm and of the rate: at the end, RMS, largest. On a simulation the
+        error on error-free samples; on a log the difference from the most accurate algorithm
+        on the same samples, which is an estimate.
+    sensor_deg : tuple of float, or None
+        Likewise what the sensor's errors make: on a simulation the difference that they make
+        to this algorithm, on a log the error of the most accurate algorithm against the
+        truth; None without a truth.
+    single_deg : tuple of float
+        Likewise the difference between single and double precision on the same samples.
+    """
+
+    algorithm: str
+    own_deg: tuple[float, float, float]
+    sensor_deg: tuple[float, float, float] | None
+    single_deg: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The simplest algorithm, and the lowest rate, that are accurate enough.
+
+    Attributes
+    ----------
+    verdict : str
+        ``enough``: one is found; ``sensor``: none is, because of the sensor; ``rate``: none is,
+        because of the rate; ``own``: nothing is known of the attitude, and it is the
+        algorithm's own error that was judged.
+    sentence : str
+        For people.
+    tolerance_deg : float
+    algorithm, meaning : str or None
+    rate_hz : float or None
+    why, helps : tuple of str
+        What it rests on, and what would help.
+    """
+
+    verdict: str
+    sentence: str
+    tolerance_deg: float
+    algorithm: str | None
+    meaning: str | None
+    rate_hz: float | None
+    why: tuple[str, ...]
+    helps: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Trials:
+    """The same bench over several logs or seeds.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the trials.
+    errors : DataFrame
+        One row a trial and an algorithm: ``trial``, ``algorithm``, ``error_deg`` (what the
+        answer is judged by), ``own_deg``, ``rms_deg``, ``final_deg``.
+    ranking : DataFrame
+        One row an algorithm, best first: ``algorithm``, ``mean_deg``, ``low_deg``, ``high_deg``
+        (95 % interval of the mean), ``luck`` (probability that the next one is no worse, from
+        paired differences; NaN for the last).
+    """
+
+    names: tuple[str, ...]
+    errors: pd.DataFrame = field(repr=False)
+    ranking: pd.DataFrame
+
+
+@dataclass(frozen=True)
+class PeerRun:
+    """Another library's filter over the same log.
+
+    Attributes
+    ----------
+    peer : str
+        Name and version.
+    aiding : str
+        ``gyro``, ``gyro+accel`` or ``gyro+accel+mag``; only like is compared with like.
+    attitude : DataFrame
+        Attitude table.
+    scores : tuple of Score
+    """
+
+    peer: str
+    aiding: str
+    attitude: pd.DataFrame = field(repr=False)
+    scores: tuple[Score, ...]
+
+
+@dataclass(frozen=True)
 class AttitudeBench:
     """What the attitude bench found.
 
@@ -172,6 +307,20 @@ class AttitudeBench:
     findings : tuple of Finding
         Warnings and notes, in words.
     inputs : tuple of InputFiles
+    costs : tuple of Cost
+        One an algorithm, in the order of `runs`.
+    shares : tuple of Share
+        Likewise.
+    sweep : DataFrame
+        One row an algorithm, a rate and a way to come to it: ``algorithm``, ``meaning``
+        (``drop``: samples are left out; ``sum``: increments are summed, as a sensor that
+        integrates would), ``factor``, ``rate_hz``, ``own_deg`` (largest error of algorithm and
+        rate, as in `Share`), ``final_deg``, ``rms_deg``, ``max_deg`` (against the truth),
+        ``reference_deg`` (largest at a reference point), ``error_deg`` (the one that the answer
+        judges: the largest of what is known, else ``own_deg``).
+    answer : Answer
+    trials : Trials or None
+    peers : tuple of PeerRun
     """
 
     source: str
@@ -191,6 +340,12 @@ class AttitudeBench:
     readings: tuple[Reading, ...] = field(repr=False)
     findings: tuple[Finding, ...]
     inputs: tuple[InputFiles, ...] = field(repr=False)
+    costs: tuple[Cost, ...] = field(repr=False)
+    shares: tuple[Share, ...] = field(repr=False)
+    sweep: pd.DataFrame = field(repr=False)
+    answer: Answer
+    trials: Trials | None = None
+    peers: tuple[PeerRun, ...] = field(default=(), repr=False)
 
     @property
     def summary(self) -> pd.DataFrame:
