@@ -46,7 +46,11 @@ class AttitudeSpec(Spec):
     """One run of the attitude bench."""
 
     source: Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")]
-    algorithms: tuple[str, ...] = ("naive", "euler", "dcm", "quaternion")
+    also: tuple[Annotated[ScenarioSpec | LogSpec, Field(discriminator="kind")], ...] = ()
+    algorithms: tuple[str, ...] = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
+    interpolation: Literal["linear", "cubic"] = "linear"
+    rates_hz: tuple[FiniteFloat, ...] = ()
+    tolerance_deg: FiniteFloat = Field(default=1.0, gt=0.0)
     initial: str = "auto"
     gyro_bias: str = "none"
     references: tuple[str, ...] = ()

@@ -294,7 +294,8 @@ class AttitudeBench:
     scores : tuple of Score
     sampling_error_deg : tuple of float, or None
         For a scenario: what noise-free samples lose with exact arithmetic, at the end and at
-        most.
+        most. For a log an estimate: the difference between rates that run along chords and
+        along cubics between their stamps; None for mean rates.
     differences_deg : DataFrame
         Largest rotation angle between each pair of algorithms.
     rests : tuple of RestStretch

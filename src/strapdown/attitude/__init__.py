@@ -31,6 +31,7 @@ __all__ = [
     "Quaternion",
     "RotationVector",
     "RungeKutta",
+    "attitude_history",
     "make_algorithm",
     "run_attitude",
 ]
@@ -116,6 +117,43 @@ def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64])
         )
 
 
+def attitude_history(
+    algorithm: AttitudeAlgorithm, increments: pd.DataFrame, q_nb: ArrayLike
+) -> NDArray[np.float64]:
+    """Run an attitude algorithm for its quaternions alone.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+    increments : DataFrame
+        An Increments table.
+    q_nb : array_like, (4,)
+        Attitude at the start, body to local level.
+
+    Returns
+    -------
+    ndarray, (n+1, 4)
+        ``q_nb`` at the start and at the end of each step.
+
+    Raises
+    ------
+    DataError, DivergenceError
+        As `run_attitude`.
+    """
+    return _run(algorithm, increments, q_nb)[0]
+
+
+def _run(
+    algorithm: AttitudeAlgorithm, increments: pd.DataFrame, q_nb: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Quaternions at the start and after each step, and the state at the end."""
+    state = algorithm.begin(rotation.normalise(q_nb))
+    first = state[None, : algorithm.width]
+    state, history = algorithm.advance(state, increments)
+    _refuse_overflow(algorithm, history)
+    return algorithm.quaternions(np.vstack([first, history])), state
+
+
 def run_attitude(
     algorithm: AttitudeAlgorithm,
     increments: pd.DataFrame,
@@ -144,17 +182,13 @@ def run_attitude(
     DivergenceError
         The algorithm left the range of floating point.
     """
-    unit = rotation.normalise(q_nb)
-    state = algorithm.begin(unit)
-    first = algorithm.quaternions(state[None, : algorithm.width].copy())
-    state, history = algorithm.advance(state, increments)
-    _refuse_overflow(algorithm, history)
+    q, state = _run(algorithm, increments, q_nb)
     ends = increments.index.to_numpy(dtype=np.float64)
     time = np.concatenate([[ends[0] - increments["dt"].iloc[0]], ends])
     return AttitudeRun(
         algorithm=algorithm.label,
         title=algorithm.title,
         equations=algorithm.equations,
-        attitude=attitude_table(time, np.vstack([first, algorithm.quaternions(history)])),
+        attitude=attitude_table(time, q),
         diagnostics=algorithm.diagnostics(state, time),
     )

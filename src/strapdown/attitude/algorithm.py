@@ -76,7 +76,7 @@ class AttitudeAlgorithm(ABC):
     source: ClassVar[str] = "Alexiev (2021)"
     summary: ClassVar[str]
     width: ClassVar[int]
-    advance_kernel: ClassVar[Callable[..., Any]]
+    advance_kernel: ClassVar[Any]
     update_kernel: ClassVar[Callable[..., Any]]
 
     @abstractmethod

@@ -7,26 +7,45 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.attitude import AttitudeAlgorithm, make_algorithm, run_attitude
+from strapdown.attitude.cost import count_operations
 from strapdown.config import AttitudeSpec, specify
 from strapdown.evaluation.differences import largest_differences
+from strapdown.evaluation.known import Known, known_at
 from strapdown.evaluation.reference_points import references_from_words, score_references
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeBench
+from strapdown.results import AttitudeBench, RestStretch
 from strapdown.sensors.rest import find_rests
+from strapdown.systems.attitude_answer import Evidence, find_answer
 from strapdown.systems.attitude_judgement import judge_runs, judge_truth, judge_turns, truth_score
 from strapdown.systems.attitude_request import (
+    ALL_ALGORITHMS,
     as_text,
     as_texts,
     exists,
     sort_references,
     source_spec,
 )
-from strapdown.systems.attitude_source import describe, read_source, window, with_truth
+from strapdown.systems.attitude_shares import (
+    MOST_ACCURATE,
+    best_error,
+    between_samples,
+    find_shares,
+    own_truth,
+)
+from strapdown.systems.attitude_source import Source, describe, read_source, window, with_truth
 from strapdown.systems.attitude_start import find_gyro_bias, initial_attitude
+from strapdown.systems.attitude_sweep import (
+    Grounds,
+    choose_factors,
+    error_at_full_rate,
+    sweep_rates,
+)
+from strapdown.systems.attitude_trials import gather, trial_names, worst_sweep
 from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
@@ -40,9 +59,13 @@ def _silent(stage: str, share: float) -> None:
 
 
 def bench_attitude(
-    source: str | Path,
+    source: str | Path | Sequence[str | Path],
     *,
-    algorithms: Sequence[str] = ("naive", "euler", "dcm", "quaternion"),
+    algorithms: Sequence[str] = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec"),
+    rates: Sequence[float] = (),
+    tolerance_deg: float = 1.0,
+    interpolation: str = "linear",
+    trials: int = 1,
     reference: Sequence[str] = (),
     initial: str = "auto",
     gyro_bias: str = "none",
@@ -63,11 +86,21 @@ def bench_attitude(
 
     Parameters
     ----------
-    source : str or Path
+    source : str or Path, or a sequence of them
         Name of a scenario (`simulation.SCENARIOS`), or path of a log: a file of a known
-        format, or the folder of a known recording.
+        format, or the folder of a known recording. Several are trials of the same question:
+        the first is shown, and the answer holds for all of them.
     algorithms : sequence of str
-        Names with options, as in ``quaternion:order=3`` (`attitude.make_algorithm`).
+        Names with options, as in ``quaternion:order=3`` (`attitude.make_algorithm`), or
+        ``all``: the paper's four, Runge-Kutta, and rotation vectors of 1 to 4 increments.
+    rates : sequence of float, optional, Hz
+        Lower rates to try; the full rate and its halves if none is given.
+    tolerance_deg : float
+        What counts as accurate enough: the largest error that is known, in deg.
+    interpolation : {'linear', 'cubic'}
+        How rates at the stamps run between them (`increments.increments_from_imu`).
+    trials : int
+        Of a scenario: so many seeds, from `seed` on.
     reference : sequence of str
         Reference points in words (``end same as start``, `evaluation.reference_points`), or
         the path of a file of them, or of an attitude truth.
@@ -106,26 +139,33 @@ def bench_attitude(
     -----
     Alexiev (2021). The Earth's rotation is neglected, as in the paper: 15 deg/h.
     """
+    sources = as_texts(source)
+    if not sources:
+        raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+    reading = {
+        "columns": columns or None,
+        "gyro_unit": gyro_unit,
+        "accel_unit": accel_unit,
+        "time_unit": time_unit,
+        "axes": axes,
+        "repair": repair or None,
+    }
+    first, *others = (
+        one
+        for text in sources
+        for one in source_spec(text, rate, seed, reading, sampling, trials, rates)
+    )
     words, truth_path = sort_references(as_texts(reference))
     bias = as_text(gyro_bias)
     bias_path = str(Path(bias)) if exists(bias) else None
     spec = specify(
         AttitudeSpec,
-        source=source_spec(
-            str(source),
-            rate,
-            seed,
-            {
-                "columns": columns or None,
-                "gyro_unit": gyro_unit,
-                "accel_unit": accel_unit,
-                "time_unit": time_unit,
-                "axes": axes,
-                "repair": repair or None,
-            },
-            sampling,
-        ),
-        algorithms=tuple(as_texts(algorithms)),
+        source=first,
+        also=tuple(others),
+        algorithms=_named(as_texts(algorithms)),
+        interpolation=as_text(interpolation),
+        rates_hz=tuple(float(r) for r in rates),
+        tolerance_deg=tolerance_deg,
         initial=as_text(initial),
         gyro_bias="log" if bias_path else bias,
         references=words,
@@ -157,7 +197,45 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     ConfigError
         Something that was asked for is not known, or cannot be had from this log.
     """
-    algorithms = [make_algorithm(text) for text in spec.algorithms]
+    specs = [spec.model_copy(update={"source": s, "also": ()}) for s in (spec.source, *spec.also)]
+    judged = []
+    for k, one in enumerate(specs):
+        judged.append(_bench(one, _part_of(progress, k, len(specs))))
+    bench, evidence = judged[0]
+    if len(judged) == 1:
+        return bench
+    benches = [b for b, _ in judged]
+    names = trial_names([s.source for s in specs])
+    sweep = worst_sweep([b.sweep for b in benches])
+    known = [e.sensor for _, e in judged if e.sensor is not None]
+    worst = max(known, key=lambda e: e[2]) if len(known) == len(judged) else None
+    together = replace(evidence, sweep=sweep, sensor=worst, without_bias=None)
+    return replace(
+        bench,
+        specification=spec.model_dump(mode="json"),
+        sweep=sweep,
+        answer=find_answer(together, spec.tolerance_deg),
+        trials=gather(benches, names),
+        findings=tuple(
+            replace(f, file=f.file or name)
+            for b, name in zip(benches, names, strict=True)
+            for f in b.findings
+        ),
+        inputs=tuple(item for b in benches for item in b.inputs),
+    )
+
+
+def _named(texts: list[str]) -> tuple[str, ...]:
+    return ALL_ALGORITHMS if texts == ["all"] else tuple(texts)
+
+
+def _part_of(progress: Progress, k: int, count: int) -> Progress:
+    """Progress of one of several alike."""
+    return lambda stage, share: progress(stage, (k + share) / count)
+
+
+def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
+    algorithms = [make_algorithm(text) for text in texts]
     if not algorithms:
         raise ConfigError("none is named", quantity="algorithms", remedy="name at least one")
     if len({a.label for a in algorithms}) < len(algorithms):
@@ -166,6 +244,12 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
             quantity="algorithms",
             remedy="name each once, or give it different options",
         )
+    return algorithms
+
+
+def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evidence]:
+    """Bench one source, and what its answer rests on."""
+    algorithms = _make_algorithms(spec.algorithms)
     progress("reading", 0.0)
     source = read_source(spec)
     whole = source.imu
@@ -186,12 +270,11 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
             file=source.name,
             remedy="give another --initial",
         )
-    increments = increments_from_imu(imu)
+    increments = increments_from_imu(imu, spec.interpolation)
     runs = []
     for k, algorithm in enumerate(algorithms):
-        progress(algorithm.title, (k + 0.5) / (len(algorithms) + 1.0))
+        progress(algorithm.title, 0.05 + 0.15 * k / len(algorithms))
         runs.append(run_attitude(algorithm, increments, q_nb))
-    progress("comparing", 0.9)
     span = (float(imu.index[0]), float(imu.index[-1]))
     references = references_from_words(list(spec.references), *span)
     scores = [s for run in runs for s in truth_score(run, source)]
@@ -199,11 +282,28 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     findings += judge_runs(runs, increments)
     findings += judge_turns(scores)
     findings += judge_truth(source, span)
+    grounds, known = _grounds(spec, source, imu, q_nb, references)
+    progress("sharing out the error", 0.2)
+    shares = find_shares(algorithms, runs, imu, grounds.own, known, q_nb, spec.interpolation)
+    factors = choose_factors(imu, spec.rates_hz, findings)
+    sweep = sweep_rates(
+        algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
+    )
+    costs = tuple(count_operations(algorithm) for algorithm in algorithms)
+    evidence = Evidence(
+        algorithms=algorithms,
+        costs=costs,
+        sweep=sweep,
+        sensor=best_error(grounds.own, known, imu, q_nb),
+        known=known is not None or bool(len(references)),
+        exact=grounds.own.exact,
+        without_bias=_without_bias(grounds, bias, rests),
+    )
     truth, scored = source.truth, source.scored
     if truth is not None and scored is not None:
         inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
         truth, scored = truth[inside], scored[inside]
-    return AttitudeBench(
+    bench = AttitudeBench(
         source=source.name,
         description=describe(source.imu, source.what, whole),
         specification=spec.model_dump(mode="json"),
@@ -212,7 +312,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
         truth=truth,
         scored=scored,
         scores=tuple(scores),
-        sampling_error_deg=source.sampling_error_deg,
+        sampling_error_deg=source.sampling_error_deg or between_samples(imu, q_nb),
         differences_deg=largest_differences(tuple(runs)),
         rests=rests,
         initial=initial,
@@ -221,4 +321,35 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
         readings=source.readings,
         findings=tuple(findings),
         inputs=source.inputs + bias_input,
+        costs=costs,
+        shares=shares,
+        sweep=sweep,
+        answer=find_answer(evidence, spec.tolerance_deg),
     )
+    return bench, evidence
+
+
+def _grounds(
+    spec: AttitudeSpec, source: Source, imu: pd.DataFrame, q_nb: Array, references: pd.DataFrame
+) -> tuple[Grounds, Known | None]:
+    """What errors are measured against, and what is known of the attitude itself."""
+    stamps = imu.index.to_numpy(dtype=np.float64)
+    known = None
+    if source.truth is not None and source.scored is not None:
+        found = known_at(source.truth, source.scored, stamps)
+        known = found if found.counts.any() else None
+    clean = None if source.clean is None else source.clean.loc[imu.index]
+    own = own_truth(imu, clean, known, q_nb, spec.interpolation)
+    return Grounds(imu, q_nb, own, known, references, spec.interpolation), known
+
+
+def _without_bias(
+    grounds: Grounds, bias: dict[str, object], rests: tuple[RestStretch, ...]
+) -> float | None:
+    """Error that the most accurate algorithm would leave with the bias of a rest removed."""
+    nothing_known = grounds.truth is None and grounds.references.empty
+    if bias["rad_per_s"] is not None or not rests or nothing_known:
+        return None
+    imu = grounds.imu.copy()
+    imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(rests[0].gyro_mean)
+    return error_at_full_rate(MOST_ACCURATE, replace(grounds, imu=imu))

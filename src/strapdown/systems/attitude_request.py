@@ -16,6 +16,12 @@ from strapdown.simulation import SCENARIOS, find_scenario
 
 Array = NDArray[np.float64]
 
+#: What ``all`` stands for: Alexiev's four, Runge-Kutta, and 1 to 4 increments.
+ALL_ALGORITHMS = (
+    *("naive", "euler", "dcm", "quaternion", "rk4"),
+    *(f"rotvec:samples={n}" for n in (1, 2, 3, 4)),
+)
+
 
 def as_text(value: object) -> str:
     """A text as it is; three numbers as the text that means them."""
@@ -34,9 +40,15 @@ def as_texts(values: object) -> list[str]:
 
 
 def source_spec(
-    text: str, rate: float | None, seed: int | None, reading: dict[str, Any], sampling: str | None
-) -> ScenarioSpec | LogSpec:
-    """Specify a scenario or a log.
+    text: str,
+    rate: float | None,
+    seed: int | None,
+    reading: dict[str, Any],
+    sampling: str | None,
+    trials: int = 1,
+    rates: Sequence[float] = (),
+) -> list[ScenarioSpec] | list[LogSpec]:
+    """Specify a scenario, as often as there are trials, or a log.
 
     Parameters
     ----------
@@ -47,16 +59,22 @@ def source_spec(
     reading : dict
         What was said about reading a log; None where nothing was.
     sampling : str or None
+    trials : int
+        Seeds of a scenario.
+    rates : sequence of float, Hz
+        That will be tried; a scenario without a rate is sampled at the highest.
 
     Returns
     -------
-    ScenarioSpec or LogSpec
+    list of ScenarioSpec or LogSpec
 
     Raises
     ------
     ConfigError
         There is no such thing, or something was said that the other kind needs.
     """
+    if trials < 1:
+        raise ConfigError(f"{trials} is no number of trials", quantity="--trials", remedy="use 1")
     name = text.strip().lower()
     if not name:
         raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
@@ -67,21 +85,32 @@ def source_spec(
                 quantity=name,
                 remedy="leave that out",
             )
-        return specify(
-            ScenarioSpec,
-            name=name,
-            rate_hz=100.0 if rate is None else rate,
-            sampling=(sampling or "instantaneous").lower(),
-            seed=0 if seed is None else seed,
-        )
+        first = 0 if seed is None else seed
+        highest = max((float(r) for r in rates), default=100.0)
+        return [
+            specify(
+                ScenarioSpec,
+                name=name,
+                rate_hz=highest if rate is None else rate,
+                sampling=(sampling or "instantaneous").lower(),
+                seed=first + k,
+            )
+            for k in range(trials)
+        ]
     if seed is not None:
         raise ConfigError(
             "a recorded log has no noise to be drawn", quantity="seed", remedy="leave it out"
         )
+    if trials > 1:
+        raise ConfigError(
+            "a recorded log is what it is, and is not drawn again",
+            quantity="--trials",
+            remedy="name several logs instead",
+        )
     if not exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
         find_scenario(name)  # says which names there are
     said = {key: value for key, value in reading.items() if value is not None}
-    return specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)
+    return [specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)]
 
 
 def exists(text: str) -> bool:

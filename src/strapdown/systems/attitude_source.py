@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Source:
-    """A log or a scenario, read."""
+    """A log or a scenario, read; `clean` is a scenario without the sensor's errors."""
 
     name: str
     what: str
@@ -39,6 +39,7 @@ class Source:
     findings: tuple[Finding, ...]
     inputs: tuple[InputFiles, ...]
     sampling_error_deg: tuple[float, float] | None
+    clean: pd.DataFrame | None = None
 
 
 def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -133,6 +134,7 @@ def _scenario(spec: ScenarioSpec) -> Source:
         (),
         (),
         (float(lost.iloc[-1]), float(lost.max())),
+        clean,
     )
 
 

@@ -1,0 +1,278 @@
+"""The answer: the simplest algorithm, and the lowest rate, that are accurate enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from strapdown.attitude import AttitudeAlgorithm
+from strapdown.evaluation.known import Errors
+from strapdown.results import Answer, Cost
+
+# Where the sensor's error is beyond the tolerance, an algorithm's own error of this share of it
+# changes nothing that could be seen.
+UNSEEN = 0.1
+_WAYS = {"drop": "by leaving samples out", "sum": "by summing increments"}
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the answer is drawn from.
+
+    Attributes
+    ----------
+    algorithms : sequence of AttitudeAlgorithm
+    costs : sequence of Cost
+        In the same order.
+    sweep : DataFrame
+        As `results.AttitudeBench.sweep`.
+    sensor : tuple of float or None
+        Error of the sensor alone, deg, where it is known.
+    known : bool
+        Whether anything is known of the attitude: a truth or a reference point.
+    exact : bool
+        Whether the algorithms' own errors are against exact truth.
+    without_bias : float or None
+        Error in deg that would be left with the bias of a rest removed, where it was not.
+    """
+
+    algorithms: Sequence[AttitudeAlgorithm]
+    costs: Sequence[Cost]
+    sweep: pd.DataFrame
+    sensor: Errors | None
+    known: bool
+    exact: bool
+    without_bias: float | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """An algorithm, and the lowest rate at which it and every higher rate pass."""
+
+    cost: Cost
+    meaning: str
+    rate_hz: float
+    error_deg: float
+
+    @property
+    def cycles_per_second(self) -> float:
+        """Cycles of a Cortex-M4F a second."""
+        return self.cost.cycles * self.rate_hz
+
+
+def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
+    """Choose the simplest algorithm and its lowest rate.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    tolerance_deg : float
+        On the largest error that is known: against the truth wherever it counts, and at every
+        reference point; where nothing is known, on the algorithm's own error.
+
+    Returns
+    -------
+    Answer
+        The simplest is that of the fewest cycles a sample; its rate the lowest at which it
+        passes, as it does at every rate above. Where nothing passes, the sentence says whether
+        the sensor or the rate is the limit, and what is then good enough.
+    """
+    passing = choices(evidence, "error_deg", tolerance_deg)
+    if passing:
+        return _enough(evidence, passing, tolerance_deg)
+    full = evidence.sweep[evidence.sweep["factor"] == 1]
+    # By their own errors: a wrong algorithm may end nearer to the truth by luck.
+    best = full.iloc[int(full["own_deg"].to_numpy().argmin())]
+    sensor = _sensor_error(evidence, best)
+    if evidence.known and sensor is not None and sensor > tolerance_deg:
+        return _limited_by_sensor(evidence, best, sensor, tolerance_deg)
+    return _limited_by_rate(evidence, best, tolerance_deg)
+
+
+def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop") -> list[Choice]:
+    """Every algorithm that passes, with its lowest rate; simplest first.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    column : str
+        Of the sweep: what is judged.
+    limit : float, deg
+    meaning : {'drop', 'sum'}
+
+    Returns
+    -------
+    list of Choice
+    """
+    found = []
+    for cost in evidence.costs:
+        cells = evidence.sweep[
+            (evidence.sweep["algorithm"] == cost.algorithm) & (evidence.sweep["meaning"] == meaning)
+        ].sort_values("factor")
+        passes = cells[column].to_numpy() <= limit
+        # A lower rate that passes where a higher one does not passes by luck.
+        count = len(passes) if passes.all() else int(np.argmin(passes))
+        if count:
+            last = cells.iloc[count - 1]
+            found.append(Choice(cost, meaning, float(last["rate_hz"]), float(last[column])))
+    return sorted(found, key=lambda c: c.cost.cycles)
+
+
+def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answer:
+    chosen = passing[0]
+    judged = "error" if evidence.known else "own error"
+    sentence = (
+        f"{_title(evidence, chosen)} at {_rate(chosen)} is the simplest that stays within "
+        f"{tolerance:g}°: its largest {judged} is {_deg(chosen.error_deg)}."
+    )
+    why = [_why_not_lower(evidence, chosen, tolerance)]
+    summed = choices(evidence, "error_deg", tolerance, "sum")
+    if same := [c for c in summed if c.cost.algorithm == chosen.cost.algorithm]:
+        why.append(
+            f"With a sensor that sums its increments {_rate(same[0])} would do "
+            f"({_deg(same[0].error_deg)})."
+        )
+    thrifty = min(passing, key=lambda c: c.cycles_per_second)
+    if thrifty.cost.algorithm != chosen.cost.algorithm:
+        why.append(
+            f"Fewest operations a second: {thrifty.cost.algorithm} at {_rate(thrifty)}, "
+            f"{_cycles(thrifty)} against {_cycles(chosen)}."
+        )
+    simpler = [c for c in evidence.costs if c.cycles < chosen.cost.cycles]
+    why += [_why_not(evidence, cost) for cost in simpler]
+    helps: tuple[str, ...] = ()
+    if not evidence.known:
+        why.append(
+            "Nothing is known of the attitude here, so that this judges the algorithm and the "
+            "rate, and not the sensor."
+        )
+        helps = ("Name a reference point, as in --reference 'end same as start'.",)
+    return Answer(
+        "enough" if evidence.known else "own",
+        sentence,
+        tolerance,
+        chosen.cost.algorithm,
+        chosen.meaning,
+        chosen.rate_hz,
+        tuple(why),
+        helps,
+    )
+
+
+def _limited_by_sensor(
+    evidence: Evidence, best: pd.Series, sensor: float, tolerance: float
+) -> Answer:
+    limit = UNSEEN * sensor
+    good = choices(evidence, "own_deg", limit)
+    how = "" if evidence.exact else ", as estimated from the most accurate algorithm"
+    sentence = (
+        f"No algorithm stays within {tolerance:g}°, and none could: the sensor alone makes "
+        f"{_deg(sensor)} on this log{how}."
+    )
+    algorithm = meaning = rate = None
+    why = [
+        f"The most accurate algorithm here, {best['algorithm']} at {float(best['rate_hz']):.4g} "
+        f"Hz, is {_deg(float(best['error_deg']))} off; its own part is "
+        f"{_deg(float(best['own_deg']))}."
+    ]
+    if good:
+        chosen = good[0]
+        algorithm, meaning, rate = chosen.cost.algorithm, chosen.meaning, chosen.rate_hz
+        sentence += (
+            f" {_title(evidence, chosen)} at {_rate(chosen)} is all that this sensor needs: its "
+            f"own error, {_deg(chosen.error_deg)}, is under a tenth of the sensor's."
+        )
+        why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
+    helps = []
+    if evidence.without_bias is not None and evidence.without_bias < float(best["error_deg"]):
+        helps.append(
+            "Remove the gyro's bias: with that of the first rest taken off (--gyro-bias rest) "
+            f"{_deg(evidence.without_bias)} would be left."
+        )
+    helps += [
+        f"A gyro whose errors are {sensor / tolerance:.2g} times smaller, or that much less time "
+        "between reference points.",
+        "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading (--peers shows "
+        "what such filters reach on this log).",
+    ]
+    return Answer("sensor", sentence, tolerance, algorithm, meaning, rate, tuple(why), tuple(helps))
+
+
+def _limited_by_rate(evidence: Evidence, best: pd.Series, tolerance: float) -> Answer:
+    error, rate = float(best["error_deg"]), float(best["rate_hz"])
+    sentence = (
+        f"No algorithm stays within {tolerance:g}° at {rate:.4g} Hz: the best, "
+        f"{best['algorithm']}, is {_deg(error)} off, and the rate is the limit."
+    )
+    order = next(a.accuracy.rates for a in evidence.algorithms if a.label == str(best["algorithm"]))
+    helps = []
+    if order and np.isfinite(error):
+        # From rates by the trapezoid no algorithm is of more than second order.
+        needed = rate * (error / tolerance) ** (1.0 / min(order, 2))
+        helps.append(
+            f"A higher rate: on smooth motion about {needed:.2g} Hz, by its order of accuracy."
+        )
+    helps.append("A sensor that integrates between samples, or a tolerance that is wider.")
+    return Answer("rate", sentence, tolerance, None, None, None, (), tuple(helps))
+
+
+def _sensor_error(evidence: Evidence, best: pd.Series) -> float | None:
+    """Error that the sensor makes: against the truth, else what the algorithm's own leaves."""
+    if evidence.sensor is not None:
+        return evidence.sensor[2]
+    if not evidence.known:
+        return None
+    return max(0.0, float(best["error_deg"]) - float(best["own_deg"]))
+
+
+def _why_not_lower(
+    evidence: Evidence, chosen: Choice, limit: float, column: str = "error_deg"
+) -> str:
+    cells = evidence.sweep[
+        (evidence.sweep["algorithm"] == chosen.cost.algorithm)
+        & (evidence.sweep["meaning"] == chosen.meaning)
+        & (evidence.sweep["rate_hz"] < chosen.rate_hz)
+    ].sort_values("rate_hz", ascending=False)
+    if cells.empty:
+        return f"{chosen.rate_hz:.4g} Hz is the lowest rate that was tried."
+    lower = cells.iloc[0]
+    error = float(lower[column])
+    if not np.isfinite(error):
+        return f"At {float(lower['rate_hz']):.4g} Hz it runs away."
+    return f"At {float(lower['rate_hz']):.4g} Hz it would be {_deg(error)}, beyond {_deg(limit)}."
+
+
+def _why_not(evidence: Evidence, cost: Cost) -> str:
+    full = evidence.sweep[
+        (evidence.sweep["algorithm"] == cost.algorithm)
+        & (evidence.sweep["meaning"] == "drop")
+        & (evidence.sweep["factor"] == 1)
+    ].iloc[0]
+    return (
+        f"{cost.algorithm} is simpler, and {_deg(float(full['error_deg']))} off at "
+        f"{float(full['rate_hz']):.4g} Hz already."
+    )
+
+
+def _title(evidence: Evidence, choice: Choice) -> str:
+    title = next(a.title for a in evidence.algorithms if a.label == choice.cost.algorithm)
+    return f"{title} ({choice.cost.algorithm})"
+
+
+def _rate(choice: Choice) -> str:
+    return f"{choice.rate_hz:.4g} Hz"
+
+
+def _cycles(choice: Choice) -> str:
+    return f"{choice.cycles_per_second / 1e3:.3g} thousand cycles of a Cortex-M4F a second"
+
+
+def _deg(angle: float) -> str:
+    if not np.isfinite(angle):
+        return "without bound"
+    if angle < 5e-7:
+        return "under 1e-6°"
+    return f"{angle:.3g}°"

@@ -1,0 +1,147 @@
+"""Several logs or seeds together, so that a rank is not luck."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.exceptions import ConfigError
+from strapdown.results import AttitudeBench, Trials
+
+Array = NDArray[np.float64]
+
+CONFIDENCE = 0.95
+_CELL = ["algorithm", "meaning", "factor"]
+
+
+def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
+    """Names of trials: of logs their path's last part, of a scenario its seed.
+
+    Parameters
+    ----------
+    sources : sequence of ScenarioSpec or LogSpec
+
+    Returns
+    -------
+    list of str
+        All different.
+    """
+    names = [
+        f"{s.name}, seed {s.seed}" if isinstance(s, ScenarioSpec) else Path(s.path).name
+        for s in sources
+    ]
+    return [n if names.count(n) == 1 else f"{n} ({k + 1})" for k, n in enumerate(names)]
+
+
+def gather(benches: Sequence[AttitudeBench], names: Sequence[str]) -> Trials:
+    """Put the errors of several benches together.
+
+    Parameters
+    ----------
+    benches : sequence of AttitudeBench
+        Of the same algorithms.
+    names : sequence of str
+        Of the trials.
+
+    Returns
+    -------
+    Trials
+        The interval of the mean is Student's; `luck` is the one-sided probability, by
+        Student's test of paired differences, that the next algorithm is in truth no worse.
+    """
+    rows = []
+    for name, bench in zip(names, benches, strict=True):
+        full = bench.sweep[(bench.sweep["factor"] == 1) & (bench.sweep["meaning"] == "drop")]
+        for _, cell in full.iterrows():
+            rows.append(
+                {"trial": name}
+                | {key: cell[key] for key in ("algorithm", "error_deg", "own_deg")}
+                | {key: cell[key] for key in ("rms_deg", "final_deg")}
+            )
+    errors = pd.DataFrame(rows)
+    return Trials(tuple(names), errors, rank(errors))
+
+
+def rank(errors: pd.DataFrame) -> pd.DataFrame:
+    """Rank algorithms by their mean error over trials.
+
+    Parameters
+    ----------
+    errors : DataFrame
+        ``trial``, ``algorithm``, ``error_deg``.
+
+    Returns
+    -------
+    DataFrame
+        As `results.Trials.ranking`.
+    """
+    from scipy import stats
+
+    by = errors.pivot(index="trial", columns="algorithm", values="error_deg")
+    order = by.mean().sort_values(kind="stable").index
+    count = len(by)
+    rows = []
+    for k, name in enumerate(order):
+        values = by[name].to_numpy(dtype=np.float64)
+        mean, spread = float(values.mean()), np.nan
+        if count > 1:
+            spread = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1) * stats.sem(values))
+        luck = np.nan
+        if k + 1 < len(order) and count > 1:
+            luck = _luck(by[order[k + 1]].to_numpy(dtype=np.float64) - values)
+        rows.append(
+            {
+                "algorithm": name,
+                "mean_deg": mean,
+                # An angle between attitudes is not negative, and neither is its mean.
+                "low_deg": max(0.0, mean - spread),
+                "high_deg": mean + spread,
+                "luck": luck,
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _luck(worse_by: Array) -> float:
+    """Probability that differences with this mean come of a mean that is not positive."""
+    from scipy import stats
+
+    spread = float(worse_by.std(ddof=1))
+    # Rounding alone tells nothing apart.
+    if spread <= 1e-12 * max(1.0, float(np.abs(worse_by).max())):
+        return 0.5 if abs(float(worse_by.mean())) < 1e-9 else float(worse_by.mean() < 0.0)
+    t = float(worse_by.mean()) / (spread / np.sqrt(len(worse_by)))
+    return float(stats.t.sf(t, len(worse_by) - 1))
+
+
+def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """Cell by cell the largest errors of several sweeps, and the mean rate.
+
+    Parameters
+    ----------
+    sweeps : sequence of DataFrame
+        As `results.AttitudeBench.sweep`, over the same algorithms.
+
+    Returns
+    -------
+    DataFrame
+        Of the cells that all of them have.
+
+    Raises
+    ------
+    ConfigError
+        They have none in common.
+    """
+    together = pd.concat(sweeps, ignore_index=True)
+    groups = together.groupby(_CELL, sort=False)
+    worst = groups.max(numeric_only=True)
+    worst["rate_hz"] = groups["rate_hz"].mean()
+    worst = worst[groups.size() == len(sweeps)].reset_index()
+    if worst.empty:
+        raise ConfigError("no rate is common to all trials", quantity="--rates")
+    return worst[list(sweeps[0].columns)]
