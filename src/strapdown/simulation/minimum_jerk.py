@@ -33,8 +33,14 @@ def minimum_jerk(x: Array) -> tuple[Array, Array, Array]:
     """
     x = np.clip(x, 0.0, 1.0)
     rest = 1.0 - x
-    value = x * x * x * (10.0 - x * (15.0 - 6.0 * x))
-    return value, 30.0 * (x * rest) ** 2, 60.0 * x * rest * (rest - x)
+    # Past the middle the mirrored move is taken from one: the polynomial cancels there.
+    y = np.minimum(x, rest)
+    moved = y * y * y * (10.0 - y * (15.0 - 6.0 * y))
+    return (
+        np.where(x > 0.5, 1.0 - moved, moved),
+        30.0 * (x * rest) ** 2,
+        60.0 * x * rest * (rest - x),
+    )
 
 
 @dataclass(frozen=True)

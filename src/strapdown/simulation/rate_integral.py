@@ -64,6 +64,8 @@ class RateIntegral:
             x = ((part - left) - (right - part)) / (right - left)
             series = np.moveaxis(self.series[k], 1, 0)
             added = legendre.legval(x[:, None], series, tensor=False)
+            # At its left edge a panel has added nothing, and not what a series rounds that to.
+            added[part == left] = 0.0
             out[start : start + _CHUNK] = self.before[k] + added
         return out
 
