@@ -75,8 +75,8 @@ def test_the_rate_is_the_derivative_of_the_attitude(name):
     )
     # A quaternion carries some 1e-15, and up to 8e-15 where an angle reaches 3600 deg (63 rad, two
     # units of 1.1e-16 of it, half the angle); weights of 2.1 and the factor 2 over a step of 1 ms
-    # make 4e-11 of that. The next term of the differences is (half rate x step)^8 / 630 of the rate:
-    # 20 rad/s give 1e-16.
+    # make 4e-11 of that. The next term of the differences is (half rate x step)^8 / 630 of the
+    # rate: 20 rad/s give 1e-16.
     assert np.abs(found - motion.rate(time)).max() < 4e-11
 
 
