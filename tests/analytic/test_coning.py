@@ -13,6 +13,7 @@ import pytest
 from strapdown import rotation
 from strapdown.attitude import make_algorithm, run_attitude
 from strapdown.increments import increments_from_imu
+from strapdown.simulation import Coning, GyroErrors, find_scenario, simulate_gyro
 from strapdown.tables import QUATERNION, THETA, imu_table, increments_table
 
 HALF_ANGLE = np.radians(1.0)
@@ -145,3 +146,45 @@ def test_cubic_rates_beat_the_trapezoid():
     }
     assert by["linear"] == pytest.approx(-126.1, abs=0.1)
     assert abs(by["cubic"]) < abs(by["linear"]) / 10
+
+
+def test_the_scenario_is_this_motion():
+    motion = find_scenario("coning").motion
+    time = np.linspace(0.0, 60.0, 4001)
+    # Six hundred cycles: the phase is known to 2 pi 600 x 1e-16 = 4e-13 here, where no whole
+    # cycles are taken away, times the sine of half a degree or the rate of 1.1 rad/s.
+    assert np.abs(motion.attitude(time) - attitude(time)).max() < 1e-14
+    assert np.abs(motion.rate(time) - rates(time)).max() < 1e-12
+    whole = increments_table(time[1:], np.diff(time), np.diff(motion.angle(time), axis=0))
+    known = exact_increments(time)
+    assert np.abs(whole.to_numpy() - known.to_numpy()).max() < 3e-14
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (1.0, -2.0, 3.0)])
+@pytest.mark.parametrize(("sampling", "expected"), [("mean", -127.3), ("instantaneous", -247.6)])
+def test_the_drift_is_about_the_cone_axis_wherever_it_points(axis, sampling, expected):
+    motion = Coning(1.0, 10.0, 10.0, axis=axis, q_nb=(0.5, 0.5, -0.5, 0.5))
+    imu, truth = simulate_gyro(motion, GyroErrors(), rate=100.0, sampling=sampling)
+    q = truth[QUATERNION].to_numpy()
+    run = run_attitude(make_algorithm("quaternion"), increments_from_imu(imu), q[0])
+    final = run.attitude[QUATERNION].to_numpy()[-1]
+    # Seen from the mean attitude, in whose axes the cone axis is the one that is given.
+    mean = rotation.conjugate(motion.q_nb)
+    error = rotation.rotation_vector_from_quaternion(
+        rotation.compose(
+            rotation.compose(mean, final), rotation.conjugate(rotation.compose(mean, q[-1]))
+        )
+    )
+    along = error @ np.array(axis) / np.linalg.norm(axis)
+    assert np.degrees(along) / 10.0 * 3600 == pytest.approx(expected, abs=0.051)
+    assert np.linalg.norm(error) == pytest.approx(abs(along), rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["coning", "coning-slow"])
+def test_the_naive_drift_is_the_solid_angle(name):
+    """Each cycle leaves 2 pi (1 - cos(half-angle)) of a turn that never was."""
+    motion = find_scenario(name).motion
+    cycles = motion.frequency * motion.duration
+    solid = 2 * np.pi * (1 - np.cos(np.radians(motion.half_angle))) * cycles
+    # Whole cycles: nothing is left about the other two axes.
+    assert np.abs(motion.angle([motion.duration])[0] - [0, 0, -solid]).max() < 1e-12

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config import ScenarioSpec, SimulateSpec, specify
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
-from strapdown.simulation import find_scenario
+from strapdown.simulation import PulseMotion, find_scenario
+from strapdown.simulation.motion_protocol import Motion
 from strapdown.systems.attitude_source import simulate_scenario
 
 __all__ = ["simulate", "write_simulation"]
@@ -94,21 +96,13 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
             "schema": "strapdown scenario 1",
             "scenario": spec.scenario.name,
             "title": scenario.title,
-            "origin": f"Alexiev (2021), {scenario.origin}",
+            "origin": scenario.source,
             "sampling": spec.scenario.sampling,
             "rate_hz": spec.scenario.rate_hz,
             "seed": spec.scenario.seed,
             "duration_s": scenario.motion.duration,
-            "pulses": [
-                {
-                    "axis": "xyz"[p.axis],
-                    "start_s": p.start,
-                    "end_s": p.end,
-                    "end_closed": p.closed,
-                    "rate_rad_per_s": p.rate,
-                }
-                for p in scenario.motion.pulses
-            ],
+            **_describe_motion(scenario.motion),
+            "references": scenario.references,
             "gyro_errors": {
                 "noise_density_rad_per_s_per_sqrt_hz": scenario.errors.noise_density,
                 "bias_rad_per_s": scenario.errors.bias,
@@ -124,3 +118,28 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
         }
         (folder / "scenario.json").write_text(to_json(description), encoding="utf-8", newline="\n")
     return seals[0]
+
+
+def _describe_motion(motion: PulseMotion | Motion) -> dict[str, object]:
+    """Numbers that make the motion: its pulses, or the fields of its class with their names."""
+    if isinstance(motion, PulseMotion):
+        pulses = [
+            {
+                "axis": "xyz"[p.axis],
+                "start_s": p.start,
+                "end_s": p.end,
+                "end_closed": p.closed,
+                "rate_rad_per_s": p.rate,
+            }
+            for p in motion.pulses
+        ]
+        return {"pulses": pulses}
+    return {"motion": {"class": type(motion).__name__, **_fields(motion)}}
+
+
+def _fields(thing: object) -> dict[str, object]:
+    found = {}
+    for f in fields(thing):  # type: ignore[arg-type]
+        value = getattr(thing, f.name)
+        found[f.name] = _fields(value) if hasattr(value, "__dataclass_fields__") else value
+    return found

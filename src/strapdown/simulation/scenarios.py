@@ -1,8 +1,8 @@
-"""Alexiev's generated gyro data as named scenarios.
+"""Alexiev's generated gyro data, and motions beyond his, as named scenarios.
 
 The figures of the paper did not survive scanning, so that the shapes are those of the
 captions and the text, and the numbers are chosen here, except for Fig. 4, whose numbers the
-text gives. Every scenario rests for the first and the last two seconds.
+text gives. Every scenario but coning rests at its start and end, for 1.5 s or more.
 """
 
 from __future__ import annotations
@@ -10,13 +10,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from strapdown.exceptions import ConfigError, nearest
+from strapdown.simulation.coning import Coning
 from strapdown.simulation.gyro import GyroErrors
+from strapdown.simulation.hand_motions import INTENSIVE, PHONE, TABLE_TO_TABLE
+from strapdown.simulation.handling import Handling
 from strapdown.simulation.motion import Pulse, PulseMotion
+from strapdown.simulation.motion_protocol import Motion
+from strapdown.simulation.smooth_random import SmoothRandom
 
 X, Y, Z = 0, 1, 2
 _QUARTER_TURN = 1.5707963267948966  # rad
 # Some ten times that of a phone, so that it shows in a plot: 0.01 rad/s at 100 Hz.
 _NOISE = 0.001  # rad/s/√Hz
+_BEYOND = "beyond the paper"
 
 
 @dataclass(frozen=True)
@@ -27,19 +33,42 @@ class Scenario:
     ----------
     title : str
     origin : str
-        Where in the paper it stands.
-    motion : PulseMotion
+        Where in Alexiev (2021) it stands, or that it is beyond the paper.
+    motion : PulseMotion or Motion
     errors : GyroErrors
+    references : tuple of str
+        What is known of the attitude at some instants, in the words of `--reference`, as for a
+        recording that has no other truth.
     """
 
     title: str
     origin: str
-    motion: PulseMotion
+    motion: PulseMotion | Motion
     errors: GyroErrors = field(default_factory=GyroErrors)
+    references: tuple[str, ...] = ()
+
+    @property
+    def source(self) -> str:
+        """Where it comes from, with the name of the paper if it stands there."""
+        return self.origin if self.origin == _BEYOND else f"Alexiev 2021, {self.origin}"
 
 
 _TWO_AXES = (Pulse(X, 2.0, 4.0, 0.8), Pulse(Y, 3.0, 5.0, -0.6))
 _THREE_AXES = (Pulse(X, 2.0, 5.0, 0.3), Pulse(Y, 2.5, 4.5, 0.7), Pulse(Z, 3.0, 4.0, 1.5))
+_HOME = "end same as start"
+
+
+def _fig5(scale: float) -> PulseMotion:
+    # On the grid of 100 Hz and off that of 5 Hz, as pulses fall that nobody arranged.
+    return PulseMotion(
+        (
+            Pulse(X, 2.07, 3.53, 0.10 * scale),
+            Pulse(Y, 2.51, 4.13, -0.05 * scale),
+            Pulse(Z, 2.93, 3.77, 0.15 * scale),
+        ),
+        7.0,
+    )
+
 
 SCENARIOS: dict[str, Scenario] = {
     "alexiev-fig2a": Scenario(
@@ -92,6 +121,56 @@ SCENARIOS: dict[str, Scenario] = {
         "Fig. 4 with pulses closed at their end, [2 s, 3 s]: one sample too many",
         "Fig. 4, the other reading of its interval",
         PulseMotion((Pulse(X, 2.0, 3.0, 0.1, True), Pulse(Y, 2.0, 3.0, 2.0, True)), 5.0),
+    ),
+    "alexiev-fig5": Scenario(
+        "three axes overlapping, turns of 5° to 8°: what a rate of 5 Hz or 100 Hz makes of it",
+        "Fig. 5",
+        _fig5(1.0),
+    ),
+    "alexiev-fig5-large": Scenario(
+        "Fig. 5 with ten times the rates, turns of 46° to 84°",
+        "Fig. 5, where its statement on the naive sum ends",
+        _fig5(10.0),
+    ),
+    "alexiev-fig6": Scenario(
+        "by hand, as fast as it can be: the same pose at 5 s and at 9 s, whatever came between",
+        "Fig. 6, whose log was of 20 Hz",
+        TABLE_TO_TABLE,
+        references=("9 same as 5",),
+    ),
+    "intensive": Scenario(
+        "up to 4.5 turns a second about axes that never stay, back to the same pose",
+        "Section 4, highly intensive rotations",
+        INTENSIVE,
+        references=(_HOME,),
+    ),
+    "coning": Scenario(
+        "coning as under vibration, half-angle 1° at 10 Hz",
+        _BEYOND,
+        Coning(half_angle=1.0, frequency=10.0, duration=60.0),
+    ),
+    "coning-slow": Scenario(
+        "coning as a hand wobbles, half-angle 5° at 0.5 Hz",
+        _BEYOND,
+        Coning(half_angle=5.0, frequency=0.5, duration=60.0),
+    ),
+    "smooth-random": Scenario(
+        "smooth random rotation and translation, 0.1 to 2 Hz, 60 °/s and 1 m/s² rms",
+        _BEYOND,
+        SmoothRandom(duration=60.0, seed=1, rms_rate=60.0, rms_acceleration=1.0, band=(0.1, 2.0)),
+        references=(_HOME,),
+    ),
+    "gestures": Scenario(
+        "a phone taken up, tilted, turned and put back in the same place, five times",
+        _BEYOND,
+        PHONE,
+        references=("6 same as start", "13 same as start", "20.6 same as start", _HOME),
+    ),
+    "handling": Scenario(
+        "ten minutes of taking a phone up and putting it back in the same place",
+        _BEYOND,
+        Handling(duration=600.0, seed=1),
+        references=(_HOME,),
     ),
 }
 

@@ -125,7 +125,7 @@ def _scenario(spec: ScenarioSpec) -> Source:
     lost = error_angles(exact.attitude, truth)
     return Source(
         spec.name,
-        f"simulated: {scenario.title} (Alexiev 2021, {scenario.origin})",
+        f"simulated: {scenario.title} ({scenario.source})",
         Origin(0, "s"),
         imu,
         truth,
