@@ -32,7 +32,7 @@ _before = _config.CACHE_DIR
 try:
     if not _before:
         _config.CACHE_DIR = _cache_folder()
-    for _name in ("rotation", "increments", "attitude"):
+    for _name in ("rotation", "increments", "attitude", "recursion"):
         import_module(f"strapdown._kernels.{_name}")
 except RuntimeError:
     # Path.home() without a home; numba then chooses a place of its own.

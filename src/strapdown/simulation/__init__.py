@@ -1,15 +1,18 @@
 """Motions with exact truth, and the sensor data they would give."""
 
-from strapdown.simulation.gyro import GyroErrors, simulate_gyro
-from strapdown.simulation.motion import Pulse, PulseMotion
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.simulation.imu import simulate_imu
+from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
 
 __all__ = [
     "SCENARIOS",
-    "GyroErrors",
+    "ImuErrors",
+    "Motion",
     "Pulse",
     "PulseMotion",
     "Scenario",
+    "TriadErrors",
     "find_scenario",
-    "simulate_gyro",
+    "simulate_imu",
 ]

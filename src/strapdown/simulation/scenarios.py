@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.simulation.gyro import GyroErrors
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.motion import Pulse, PulseMotion
 
 X, Y, Z = 0, 1, 2
@@ -21,7 +21,7 @@ _NOISE = 0.001  # rad/s/√Hz
 
 @dataclass(frozen=True)
 class Scenario:
-    """A motion with an exactly known attitude, and the errors of the gyros that measure it.
+    """A motion with an exactly known attitude, and the errors of the sensors that measure it.
 
     Attributes
     ----------
@@ -29,13 +29,13 @@ class Scenario:
     origin : str
         Where in the paper it stands.
     motion : PulseMotion
-    errors : GyroErrors
+    errors : ImuErrors
     """
 
     title: str
     origin: str
     motion: PulseMotion
-    errors: GyroErrors = field(default_factory=GyroErrors)
+    errors: ImuErrors = field(default_factory=ImuErrors)
 
 
 _TWO_AXES = (Pulse(X, 2.0, 4.0, 0.8), Pulse(Y, 3.0, 5.0, -0.6))
@@ -69,19 +69,19 @@ SCENARIOS: dict[str, Scenario] = {
         "three axes overlapping, with noise",
         "Fig. 2d",
         PulseMotion(_THREE_AXES, 7.0),
-        GyroErrors(noise_density=_NOISE),
+        ImuErrors(TriadErrors(noise_density=_NOISE)),
     ),
     "alexiev-fig2e": Scenario(
         "two axes overlapping, with noise and bias",
         "Fig. 2e",
         PulseMotion(_TWO_AXES, 7.0),
-        GyroErrors(noise_density=_NOISE, bias=(0.02, -0.03, 0.01)),
+        ImuErrors(TriadErrors(noise_density=_NOISE, bias=(0.02, -0.03, 0.01))),
     ),
     "alexiev-fig2f": Scenario(
         "two axes overlapping, with noise and a different trend on each axis",
         "Fig. 2f",
         PulseMotion(_TWO_AXES, 7.0),
-        GyroErrors(noise_density=_NOISE, trend=(0.01, -0.02, 0.005)),
+        ImuErrors(TriadErrors(noise_density=_NOISE, trend=(0.01, -0.02, 0.005))),
     ),
     "alexiev-fig4": Scenario(
         "through a pitch near 90°: x 0.1 rad/s and y 2 rad/s, both on [2 s, 3 s)",
