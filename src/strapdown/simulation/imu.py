@@ -176,8 +176,10 @@ def _force(
     at = _instants(motion, errors, time, seed)
     if sampling == "instantaneous":
         return low_passed(force, at, errors.bandwidth)
-    length = np.diff(at)[:, None] / step
-    mean = np.vstack([force(at[:1]), mean_over(force, at[:-1], at[1:]) * length])
+    mean = np.vstack([force(at[:1]), mean_over(force, at[:-1], at[1:])])
+    if errors.jitter > 0.0:
+        # The sensor divides what it has gathered by the interval that it knows of.
+        mean[1:] *= np.diff(at)[:, None] / step
     return _filtered_mean(force, at, mean, step, errors.bandwidth)
 
 
