@@ -126,7 +126,17 @@ def test_algorithms_are_named_with_their_options(here, run_cli, text, labels):
 
 def test_modules_lists_what_there_is(run_cli):
     text = run_cli("modules").out
-    for word in ("naive", "euler", "dcm", "quaternion", "alexiev-fig4", "mpu-6050", "broad", "npz", "h5"):
+    for word in (
+        "naive",
+        "euler",
+        "dcm",
+        "quaternion",
+        "alexiev-fig4",
+        "mpu-6050",
+        "broad",
+        "npz",
+        "h5",
+    ):
         assert word in text
 
 

@@ -40,7 +40,7 @@ def test_white_noise_has_the_allan_deviation_of_its_density(rate, size):
     check_variance(found, 0.02**2 / (size / rate), freedom)
 
 
-@pytest.mark.parametrize("size", [4, 32, 256])
+@pytest.mark.parametrize("size", [1, 4, 32, 256])
 @pytest.mark.parametrize("mean", [False, True])
 def test_a_random_walk_has_the_allan_deviation_of_its_density(size, mean):
     steps = np.full(200_000, 0.1)
@@ -58,13 +58,14 @@ def gauss_markov_allan(x):
     return 2.0 / x * (1.0 - (3.0 - 4.0 * np.exp(-x) + np.exp(-2.0 * x)) / (2.0 * x))
 
 
-@pytest.mark.parametrize("size", [5, 20, 100])
-def test_the_mean_of_a_gauss_markov_process_has_its_allan_deviation(size):
-    steps = np.full(200_000, 0.1)
+# Single steps tell what is drawn within a step, many what goes on from step to step.
+@pytest.mark.parametrize(("step", "size"), [(0.5, 1), (2.0, 1), (0.1, 5), (0.1, 20), (0.1, 100)])
+def test_the_mean_of_a_gauss_markov_process_has_its_allan_deviation(step, size):
+    steps = np.full(200_000, step)
     found, freedom = allan_variance(draws.gauss_markov(5, steps, ONE, 1.0, True), size)
     # Neighbouring differences are correlated by what is left after a window; at least a half
     # of them count as independent (windows of half a correlation time and more).
-    check_variance(found, gauss_markov_allan(0.1 * size), freedom // 2)
+    check_variance(found, gauss_markov_allan(step * size), freedom // 2)
 
 
 def test_the_factor_from_bias_instability_is_the_peak_of_that_curve():
