@@ -18,13 +18,14 @@ class Spec(BaseModel):
 
 
 class ScenarioSpec(Spec):
-    """A simulated log."""
+    """A simulated log; `sensor` takes the place of the scenario's own errors."""
 
     kind: Literal["scenario"] = "scenario"
     name: str
     rate_hz: FiniteFloat = 100.0
     sampling: str = "instantaneous"
     seed: int = Field(default=0, ge=0)
+    sensor: str | None = None
 
 
 class LogSpec(Spec):

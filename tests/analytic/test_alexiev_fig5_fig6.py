@@ -8,13 +8,13 @@ import pytest
 from strapdown import rotation
 from strapdown.attitude import make_algorithm, run_attitude
 from strapdown.increments import increments_from_imu
-from strapdown.simulation import GyroErrors, find_scenario, simulate_gyro
+from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
 
 def final_error(name: str, algorithm: str, rate: float, sampling: str = "instantaneous") -> float:
     motion = find_scenario(name).motion
-    imu, truth = simulate_gyro(motion, GyroErrors(), rate=rate, sampling=sampling)
+    imu, truth = simulate_imu(motion, ImuErrors(), rate=rate, sampling=sampling)
     q = truth[QUATERNION].to_numpy()
     run = run_attitude(make_algorithm(algorithm), increments_from_imu(imu), q[0])
     return float(rotation.rotation_angle(run.attitude[QUATERNION].to_numpy()[-1], q[-1]))
@@ -63,7 +63,7 @@ def test_at_20_hz_the_rate_alone_costs_degrees_and_twice_the_rate_takes_three_qu
 
 def test_decimating_a_faster_record_gives_the_slower_one():
     motion = find_scenario("alexiev-fig6").motion
-    fast, _ = simulate_gyro(motion, GyroErrors(), rate=100.0)
-    slow, _ = simulate_gyro(motion, GyroErrors(), rate=20.0)
+    fast, _ = simulate_imu(motion, ImuErrors(), rate=100.0)
+    slow, _ = simulate_imu(motion, ImuErrors(), rate=20.0)
     # The stamps differ by a rounding of 11 s, and the rates change by 300 rad/s² at most.
     assert np.abs(fast.iloc[::5].to_numpy() - slow.to_numpy()).max() < 300 * 4e-15

@@ -13,7 +13,7 @@ import pytest
 from strapdown import rotation
 from strapdown.attitude import make_algorithm, run_attitude
 from strapdown.increments import increments_from_imu
-from strapdown.simulation import Coning, GyroErrors, find_scenario, simulate_gyro
+from strapdown.simulation import Coning, ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION, THETA, imu_table, increments_table
 
 HALF_ANGLE = np.radians(1.0)
@@ -164,7 +164,7 @@ def test_the_scenario_is_this_motion():
 @pytest.mark.parametrize(("sampling", "expected"), [("mean", -127.3), ("instantaneous", -247.6)])
 def test_the_drift_is_about_the_cone_axis_wherever_it_points(axis, sampling, expected):
     motion = Coning(1.0, 10.0, 10.0, axis=axis, q_nb=(0.5, 0.5, -0.5, 0.5))
-    imu, truth = simulate_gyro(motion, GyroErrors(), rate=100.0, sampling=sampling)
+    imu, truth = simulate_imu(motion, ImuErrors(), rate=100.0, sampling=sampling)
     q = truth[QUATERNION].to_numpy()
     run = run_attitude(make_algorithm("quaternion"), increments_from_imu(imu), q[0])
     final = run.attitude[QUATERNION].to_numpy()[-1]

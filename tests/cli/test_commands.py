@@ -126,8 +126,34 @@ def test_algorithms_are_named_with_their_options(here, run_cli, text, labels):
 
 def test_modules_lists_what_there_is(run_cli):
     text = run_cli("modules").out
-    for word in ("naive", "euler", "dcm", "quaternion", "alexiev-fig4", "broad", "npz", "h5"):
+    for word in (
+        "naive",
+        "euler",
+        "dcm",
+        "quaternion",
+        "alexiev-fig4",
+        "mpu-6050",
+        "broad",
+        "npz",
+        "h5",
+    ):
         assert word in text
+
+
+def test_a_simulation_takes_a_named_sensor_or_a_file(here, run_cli):
+    base = ["simulate", "alexiev-fig2a", "--rate", "20", "--json"]
+    named = json.loads(run_cli(*base, "--sensor", "mpu-9250", "--out", "a").out)
+    assert named["sensor"] == "mpu-9250"
+    assert "noise_density_rad_per_s_per_sqrt_hz" in named["gyro_errors"]
+    (here / "own.toml").write_text(
+        'title = "x"\nclass = "phone"\nsummary = "x"\n[gyro]\n'
+        'bias_bound_deg_per_s = { value = 1, assumed = "for this test" }\n'
+    )
+    own = json.loads(run_cli(*base, "--sensor", "own.toml", "--out", "b").out)
+    assert list(own["gyro_errors"]) == ["bias_rad_per_s"]
+    wrong = run_cli(*base, "--sensor", "mpu-9251", "--out", "c")
+    assert wrong.code == 4
+    assert "did you mean 'mpu-9250'" in wrong.err
 
 
 def test_the_demo_runs_without_any_recording(here, run_cli, monkeypatch):

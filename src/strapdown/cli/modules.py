@@ -6,13 +6,14 @@ EPILOG = "Example: strapdown modules"
 
 
 def modules() -> None:
-    """List what can stand in each slot: algorithms, scenarios, formats."""
+    """List what can stand in each slot: algorithms, scenarios, sensors, formats."""
     from dataclasses import fields
 
     from strapdown.attitude import ALGORITHMS
     from strapdown.cli.console import console, print_table
     from strapdown.formats import READERS
     from strapdown.formats.log_writers import LOG_WRITERS
+    from strapdown.sensors.catalogue import SENSORS, load_sensor
     from strapdown.simulation import SCENARIOS
 
     out = console()
@@ -36,6 +37,11 @@ def modules() -> None:
             [name, f"{s.motion.duration:g}", f"{s.title} ({s.origin})"]
             for name, s in SCENARIOS.items()
         ],
+    )
+    out.print("Sensors that can be simulated", style="bold")
+    print_table(
+        ["name", "class", "what it is"],
+        [[s.name, s.grade, f"{s.title}: {s.summary}"] for s in map(load_sensor, SENSORS)],
     )
     out.print("Formats that are read", style="bold")
     print_table(["name", "what it is"], [[name, r.title] for name, r in READERS.items()])

@@ -27,7 +27,15 @@ def simulate(
         str,
         typer.Option("--format", metavar="F", help="csv, npz, h5, mat (joined by commas), or all."),
     ] = "csv",
-    seed: Annotated[int, typer.Option(help="Of the noise.")] = 0,
+    seed: Annotated[int, typer.Option(help="Of the errors.")] = 0,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Errors of one unit of this sensor (see: strapdown modules), instead of the "
+            "scenario's own.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder to make (NAME-simulated)."),
@@ -36,7 +44,7 @@ def simulate(
     json: Annotated[bool, typer.Option("--json", help="Print the scenario as JSON alone.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Write the gyro log of a scenario together with its exact attitude."""
+    """Write the log of a scenario together with its exact attitude."""
     from strapdown.cli.console import console, print_seal, progress
     from strapdown.report.simulation import simulate as write
 
@@ -48,6 +56,7 @@ def simulate(
             rate=rate,
             sampling=sampling,
             seed=seed,
+            sensor=sensor,
             formats=formats.replace(",", " ").split(),
             force=force,
         )

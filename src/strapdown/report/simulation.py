@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config import ScenarioSpec, SimulateSpec, specify
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
-from strapdown.simulation import PulseMotion, find_scenario
-from strapdown.simulation.motion_protocol import Motion
-from strapdown.systems.attitude_source import simulate_scenario
+from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
+from strapdown.systems.attitude_source import scenario_errors, simulate_scenario
 
 __all__ = ["simulate", "write_simulation"]
 
@@ -24,10 +24,11 @@ def simulate(
     rate: float = 100.0,
     sampling: str = "instantaneous",
     seed: int = 0,
+    sensor: str | None = None,
     formats: str | Sequence[str] = ("csv",),
     force: bool = False,
 ) -> Seal:
-    """Write the gyro log of a scenario and its exact attitude.
+    """Write the log of a scenario and its exact attitude.
 
     Parameters
     ----------
@@ -39,7 +40,10 @@ def simulate(
     sampling : {'instantaneous', 'mean'}
         The rate at each stamp, or its exact mean over the interval that ends there.
     seed : int
-        Of the noise.
+        Of the errors.
+    sensor : str, optional
+        One of `sensors.catalogue.SENSORS`, or the path of a file in the same form: the errors
+        of one unit of it, drawn with the seed, take the place of the scenario's own.
     formats : sequence of str
         Of `formats.log_writers.LOG_WRITERS`, or ``all``.
     force : bool
@@ -54,11 +58,16 @@ def simulate(
     Raises
     ------
     ConfigError
-        The scenario, the rate, the sampling or a format is unknown, or `out` may not be
+        The scenario, the rate, the sampling, the sensor or a format is unknown, or `out` may not be
         written.
     """
     scenario = specify(
-        ScenarioSpec, name=name.lower(), rate_hz=rate, sampling=sampling.lower(), seed=seed
+        ScenarioSpec,
+        name=name.lower(),
+        rate_hz=rate,
+        sampling=sampling.lower(),
+        seed=seed,
+        sensor=sensor,
     )
     wanted = [formats] if isinstance(formats, str) else list(formats)
     if not wanted:
@@ -80,6 +89,7 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
             )
     imu, truth = simulate_scenario(spec.scenario)
     scenario = find_scenario(spec.scenario.name)
+    errors = scenario_errors(spec.scenario)
     seals: list[Seal] = []
     with write_bundle(
         out,
@@ -103,11 +113,9 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
             "duration_s": scenario.motion.duration,
             **_describe_motion(scenario.motion),
             "references": scenario.references,
-            "gyro_errors": {
-                "noise_density_rad_per_s_per_sqrt_hz": scenario.errors.noise_density,
-                "bias_rad_per_s": scenario.errors.bias,
-                "trend_rad_per_s2": scenario.errors.trend,
-            },
+            "sensor": spec.scenario.sensor,
+            "gyro_errors": _stated(errors.gyro, "rad_per_s"),
+            "accel_errors": _stated(errors.accel or TriadErrors(), "m_per_s2"),
             "final_attitude": {
                 "time_s": float(truth.index[-1]),
                 "q_nb": [float(final[q]) for q in ("q_w", "q_x", "q_y", "q_z")],
@@ -120,7 +128,7 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
     return seals[0]
 
 
-def _describe_motion(motion: PulseMotion | Motion) -> dict[str, object]:
+def _describe_motion(motion: Motion) -> dict[str, object]:
     """Numbers that make the motion: its pulses, or the fields of its class with their names."""
     if isinstance(motion, PulseMotion):
         pulses = [
@@ -143,3 +151,28 @@ def _fields(thing: object) -> dict[str, object]:
         value = getattr(thing, f.name)
         found[f.name] = _fields(value) if hasattr(value, "__dataclass_fields__") else value
     return found
+
+
+# What follows the unit of the triad in a key, or stands instead of it.
+_AFTER = {"noise_density": "_per_sqrt_hz", "random_walk": "_per_sqrt_s", "trend": "_per_s"}
+_UNITS = {
+    "correlation_time": "s",
+    "jitter": "s",
+    "bandwidth": "hz",
+    "misalignment": "rad",
+    "scale": "relative",
+    "nonlinearity_2": "relative",
+    "nonlinearity_3": "relative",
+}
+
+
+def _stated(errors: TriadErrors, unit: str) -> dict[str, Any]:
+    """The errors that there are, each key with its unit."""
+    none, stated = TriadErrors(), {}
+    for f in fields(errors):
+        value = getattr(errors, f.name)
+        if value != getattr(none, f.name):
+            of = _UNITS.get(f.name, unit + _AFTER.get(f.name, ""))
+            of += "_per_m_per_s2" if f.name == "g_sensitivity" else ""
+            stated[f"{f.name}_{of}"] = value
+    return stated

@@ -1,11 +1,12 @@
 """Motions with exact truth, and the sensor data they would give."""
 
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.coning import Coning
 from strapdown.simulation.gesture import Gesture, gesture
-from strapdown.simulation.gyro import GyroErrors, simulate_gyro
 from strapdown.simulation.handling import Handling
+from strapdown.simulation.imu import simulate_imu
 from strapdown.simulation.minimum_jerk import Track
-from strapdown.simulation.motion import Pulse, PulseMotion
+from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
 from strapdown.simulation.smooth_random import SmoothRandom
 
@@ -13,14 +14,16 @@ __all__ = [
     "SCENARIOS",
     "Coning",
     "Gesture",
-    "GyroErrors",
     "Handling",
+    "ImuErrors",
+    "Motion",
     "Pulse",
     "PulseMotion",
     "Scenario",
     "SmoothRandom",
     "Track",
+    "TriadErrors",
     "find_scenario",
     "gesture",
-    "simulate_gyro",
+    "simulate_imu",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,6 +11,43 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 
 Array = NDArray[np.float64]
+
+
+class Motion(Protocol):
+    """What a simulation asks of a motion: the exact truth at any instant from 0 to `duration`.
+
+    Each method takes instants, (n,) in s, and returns one row for each. Linear quantities are in
+    north-east-down, of the sensor's place, relative to an Earth that is flat and at rest.
+    """
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        ...
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate as a gyro reads it, (n, 3), rad/s."""
+        ...
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero, (n, 3), rad."""
+        ...
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Attitude ``q_nb``, (n, 4)."""
+        ...
+
+    def acceleration(self, time: ArrayLike) -> Array:
+        """Second derivative of the position, (n, 3), m/s²."""
+        ...
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """First derivative of the position, (n, 3), m/s."""
+        ...
+
+    def position(self, time: ArrayLike) -> Array:
+        """Position, (n, 3), m."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -117,6 +155,18 @@ class PulseMotion:
         return rotation.compose(
             np.array(at_edge)[last], rotation.quaternion_from_rotation_vector(since)
         )
+
+    def acceleration(self, time: ArrayLike) -> Array:
+        """Zero, (n, 3), m/s²: the body turns about the sensor."""
+        return np.zeros((np.size(time), 3))
+
+    def velocity(self, time: ArrayLike) -> Array:
+        """Zero, (n, 3), m/s."""
+        return np.zeros((np.size(time), 3))
+
+    def position(self, time: ArrayLike) -> Array:
+        """Zero, (n, 3), m."""
+        return np.zeros((np.size(time), 3))
 
 
 def _half_open(pulse: Pulse) -> Pulse:

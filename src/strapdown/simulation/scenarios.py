@@ -10,12 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from strapdown.exceptions import ConfigError, nearest
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.coning import Coning
-from strapdown.simulation.gyro import GyroErrors
 from strapdown.simulation.hand_motions import INTENSIVE, PHONE, TABLE_TO_TABLE
 from strapdown.simulation.handling import Handling
-from strapdown.simulation.motion import Pulse, PulseMotion
-from strapdown.simulation.motion_protocol import Motion
+from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.smooth_random import SmoothRandom
 
 X, Y, Z = 0, 1, 2
@@ -27,15 +26,15 @@ _BEYOND = "beyond the paper"
 
 @dataclass(frozen=True)
 class Scenario:
-    """A motion with an exactly known attitude, and the errors of the gyros that measure it.
+    """A motion with an exactly known attitude, and the errors of the sensors that measure it.
 
     Attributes
     ----------
     title : str
     origin : str
         Where in Alexiev (2021) it stands, or that it is beyond the paper.
-    motion : PulseMotion or Motion
-    errors : GyroErrors
+    motion : Motion
+    errors : ImuErrors
     references : tuple of str
         What is known of the attitude at some instants, in the words of `--reference`, as for a
         recording that has no other truth.
@@ -43,8 +42,8 @@ class Scenario:
 
     title: str
     origin: str
-    motion: PulseMotion | Motion
-    errors: GyroErrors = field(default_factory=GyroErrors)
+    motion: Motion
+    errors: ImuErrors = field(default_factory=ImuErrors)
     references: tuple[str, ...] = ()
 
     @property
@@ -98,19 +97,19 @@ SCENARIOS: dict[str, Scenario] = {
         "three axes overlapping, with noise",
         "Fig. 2d",
         PulseMotion(_THREE_AXES, 7.0),
-        GyroErrors(noise_density=_NOISE),
+        ImuErrors(TriadErrors(noise_density=_NOISE)),
     ),
     "alexiev-fig2e": Scenario(
         "two axes overlapping, with noise and bias",
         "Fig. 2e",
         PulseMotion(_TWO_AXES, 7.0),
-        GyroErrors(noise_density=_NOISE, bias=(0.02, -0.03, 0.01)),
+        ImuErrors(TriadErrors(noise_density=_NOISE, bias=(0.02, -0.03, 0.01))),
     ),
     "alexiev-fig2f": Scenario(
         "two axes overlapping, with noise and a different trend on each axis",
         "Fig. 2f",
         PulseMotion(_TWO_AXES, 7.0),
-        GyroErrors(noise_density=_NOISE, trend=(0.01, -0.02, 0.005)),
+        ImuErrors(TriadErrors(noise_density=_NOISE, trend=(0.01, -0.02, 0.005))),
     ),
     "alexiev-fig4": Scenario(
         "through a pitch near 90°: x 0.1 rad/s and y 2 rad/s, both on [2 s, 3 s)",

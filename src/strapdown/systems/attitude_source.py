@@ -19,7 +19,8 @@ from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.increments import increments_from_imu
 from strapdown.results import InputFiles, Reading
-from strapdown.simulation import GyroErrors, find_scenario, simulate_gyro
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
 Array = NDArray[np.float64]
@@ -48,6 +49,8 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     Parameters
     ----------
     spec : ScenarioSpec
+        Where it names a sensor, the errors of one unit of that take the place of the
+        scenario's own.
 
     Returns
     -------
@@ -57,17 +60,29 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     Raises
     ------
     ConfigError
-        The scenario, the rate or the sampling is unknown.
+        The scenario, the rate, the sampling or the sensor is unknown.
     """
-    scenario = find_scenario(spec.name)
-    return simulate_gyro(
-        scenario.motion,
-        scenario.errors,
+    return simulate_imu(
+        find_scenario(spec.name).motion,
+        scenario_errors(spec),
         rate=spec.rate_hz,
         sampling=spec.sampling,
         seed=spec.seed,
         source=spec.name,
     )
+
+
+def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
+    """Return the errors that a scenario is simulated with: its own, or those of a sensor's unit.
+
+    Raises
+    ------
+    ConfigError
+        The scenario or the sensor is unknown.
+    """
+    if spec.sensor is None:
+        return find_scenario(spec.name).errors
+    return load_sensor(spec.sensor).draw(spec.seed)
 
 
 def read_options(spec: LogSpec) -> ReadOptions:
@@ -118,14 +133,19 @@ def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
 def _scenario(spec: ScenarioSpec) -> Source:
     scenario = find_scenario(spec.name)
     imu, truth = simulate_scenario(spec)
-    clean, _ = simulate_gyro(
-        scenario.motion, GyroErrors(), rate=spec.rate_hz, sampling=spec.sampling
+    clean, _ = simulate_imu(
+        scenario.motion,
+        ImuErrors(),
+        rate=spec.rate_hz,
+        sampling=spec.sampling,
+        accelerometer=False,
     )
     exact = run_attitude(Quaternion(), increments_from_imu(clean), truth[QUATERNION].to_numpy()[0])
     lost = error_angles(exact.attitude, truth)
     return Source(
         spec.name,
-        f"simulated: {scenario.title} ({scenario.source})",
+        f"simulated: {scenario.title} ({scenario.source})"
+        + (f", sensor {spec.sensor}" if spec.sensor else ""),
         Origin(0, "s"),
         imu,
         truth,

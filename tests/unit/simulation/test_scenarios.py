@@ -12,11 +12,12 @@ from strapdown import rotation
 from strapdown.exceptions import ConfigError
 from strapdown.simulation import (
     SCENARIOS,
-    GyroErrors,
+    ImuErrors,
     Pulse,
     PulseMotion,
+    TriadErrors,
     find_scenario,
-    simulate_gyro,
+    simulate_imu,
 )
 from strapdown.tables import GYRO, QUATERNION
 
@@ -46,9 +47,9 @@ def test_each_panel_is_what_its_caption_says(name):
     found = [
         kind
         for kind, value in (
-            ("noise", scenario.errors.noise_density),
-            ("bias", any(scenario.errors.bias)),
-            ("trend", len(set(scenario.errors.trend)) == 3),
+            ("noise", any(scenario.errors.gyro.noise_density)),
+            ("bias", any(scenario.errors.gyro.bias)),
+            ("trend", len(set(scenario.errors.gyro.trend)) == 3),
         )
         if value
     ]
@@ -105,7 +106,7 @@ def test_the_angle_is_the_integral_of_the_rate_and_the_attitude_follows_it(name,
 def test_mean_rates_add_up_to_the_angle_at_any_rate():
     motion = SCENARIOS["alexiev-fig2c"].motion
     for rate in (3.0, 10.0, 333.0):
-        imu, _ = simulate_gyro(motion, GyroErrors(), rate=rate, sampling="mean")
+        imu, _ = simulate_imu(motion, ImuErrors(), rate=rate, sampling="mean")
         total = imu[GYRO].to_numpy()[1:].sum(axis=0) / rate
         assert np.allclose(total, motion.angle([imu.index[-1]])[0], atol=1e-12)
 
@@ -121,7 +122,7 @@ def test_a_half_open_pulse_reads_its_rate_at_the_start_and_not_at_the_end():
 def test_the_seed_decides_the_noise_and_nothing_else_does():
     scenario = SCENARIOS["alexiev-fig2d"]
     first, again, other = (
-        simulate_gyro(scenario.motion, scenario.errors, rate=100.0, seed=seed)[0]
+        simulate_imu(scenario.motion, scenario.errors, rate=100.0, seed=seed)[0]
         for seed in (4, 4, 5)
     )
     assert first.equals(again)
@@ -131,8 +132,8 @@ def test_the_seed_decides_the_noise_and_nothing_else_does():
 @pytest.mark.parametrize("rate", [10.0, 1000.0])
 def test_noise_bias_and_trend_have_the_size_that_is_stated(rate):
     still = PulseMotion((Pulse(0, 0.0, 1.0, 0.0),), 2000.0 / rate * 10)
-    errors = GyroErrors(noise_density=0.01, bias=(0.1, 0.2, 0.3), trend=(0.0, 0.01, -0.01))
-    imu, truth = simulate_gyro(still, errors, rate=rate, seed=1)
+    errors = TriadErrors(noise_density=0.01, bias=(0.1, 0.2, 0.3), trend=(0.0, 0.01, -0.01))
+    imu, truth = simulate_imu(still, ImuErrors(errors), rate=rate, seed=1)
     time = imu.index.to_numpy()
     left = imu[GYRO].to_numpy() - np.array(errors.bias) - np.outer(time, errors.trend)
     # 20000 samples an axis: the standard deviation is known to 0.5 %, three axes; bound 4 sigma.
@@ -142,7 +143,9 @@ def test_noise_bias_and_trend_have_the_size_that_is_stated(rate):
 
 def test_mean_samples_hold_the_mean_of_the_trend():
     still = PulseMotion((Pulse(0, 0.0, 1.0, 0.0),), 10.0)
-    imu, _ = simulate_gyro(still, GyroErrors(trend=(0.1, 0, 0)), rate=10.0, sampling="mean")
+    imu, _ = simulate_imu(
+        still, ImuErrors(TriadErrors(trend=(0.1, 0, 0))), rate=10.0, sampling="mean"
+    )
     # Over [t - 0.1, t] a growth of 0.1 t has the mean 0.1 (t - 0.05).
     assert np.allclose(imu["gyro_x"], 0.1 * (imu.index.to_numpy() - 0.05), atol=1e-15)
 
@@ -159,7 +162,7 @@ def test_mean_samples_hold_the_mean_of_the_trend():
 )
 def test_what_cannot_be_sampled_is_refused(options, message):
     with pytest.raises(ConfigError, match=message):
-        simulate_gyro(SCENARIOS["alexiev-fig4"].motion, GyroErrors(), **options)
+        simulate_imu(SCENARIOS["alexiev-fig4"].motion, ImuErrors(), **options)
 
 
 def test_an_unknown_scenario_is_named_with_the_nearest():

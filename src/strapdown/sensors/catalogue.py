@@ -1,0 +1,316 @@
+"""Named sensors: what their data sheets state, and where."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.sensors.catalogue_keys import KEYS, Key
+from strapdown.sensors.error_draws import child
+from strapdown.sensors.triad_errors import ImuErrors, Matrix, Triad, TriadErrors
+
+FOLDER = Path(__file__).with_suffix("")
+#: Names of the sensors that come with strapdown; nothing is read for them.
+SENSORS: tuple[str, ...] = tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+GRADES = ("phone", "industrial", "tactical", "navigation", "crash")
+
+TOP = ("title", "class", "summary", "sources", "gyro", "accel")
+FIGURE = ("value", "source", "place", "assumed")
+# Place in the tree of seeds, beside those of the triads in a simulation, and what is drawn for
+# a unit, in the order of its places below it.
+DRAW_SEED = 2
+DRAWN = ("bias", "scale", "misalignment", "g_sensitivity", "nonlinearity")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One number of a data sheet.
+
+    Attributes
+    ----------
+    key : str
+        As in the file, with the triad: ``gyro.bias_bound_deg_per_s``.
+    value : triad
+        In the unit of the key.
+    source : str
+        Document and place; empty, where it is assumed.
+    assumed : str
+        Why it is taken to be so; empty, where it has a source.
+    """
+
+    key: str
+    value: Triad
+    source: str
+    assumed: str
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How a quantity differs from unit to unit, in SI: ``sd`` (normal) or ``bound`` (uniform)."""
+
+    kind: str
+    size: Triad
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A sensor of the catalogue, or of a file in the same form.
+
+    Attributes
+    ----------
+    name, title, summary : str
+    grade : str
+        The file's ``class``: ``phone``, ``industrial``, ``tactical``, ``navigation``, ``crash``.
+    imu_errors : ImuErrors
+        What all units have in common. A triad that the sensor lacks has no errors (gyro) or is
+        None (accelerometer).
+    spreads : dict
+        By triad and quantity, what differs from unit to unit.
+    rates : dict
+        Highest output rate in Hz, by triad.
+    sources : tuple of Figure
+        Every number, with where it is from.
+    """
+
+    name: str
+    title: str
+    summary: str
+    grade: str
+    imu_errors: ImuErrors
+    spreads: Mapping[str, Mapping[str, Spread]]
+    rates: Mapping[str, float]
+    sources: tuple[Figure, ...]
+
+    def draw(self, seed: int) -> ImuErrors:
+        """Errors of one unit.
+
+        Parameters
+        ----------
+        seed : int
+            The unit. Bias, scale factor, misalignment, g-sensitivity and nonlinearity are drawn
+            within what the data sheet states, each axis from a stream of its own.
+
+        Returns
+        -------
+        ImuErrors
+        """
+        gyro = _unit(self.imu_errors.gyro, self.spreads.get("gyro", {}), seed, 0)
+        accel = self.imu_errors.accel
+        if accel is not None:
+            accel = _unit(accel, self.spreads.get("accel", {}), seed, 1)
+        return ImuErrors(gyro, accel)
+
+
+def load_sensor(name: str | Path) -> Sensor:
+    """Read a sensor.
+
+    Parameters
+    ----------
+    name : str or Path
+        One of `SENSORS`, or the path of a file that ends in ``.toml``.
+
+    Returns
+    -------
+    Sensor
+
+    Raises
+    ------
+    ConfigError
+        There is no such sensor, or the file is not in the form of the catalogue; the message
+        names the file and the key.
+    """
+    text = str(name)
+    if text.lower() in SENSORS:
+        return _read(FOLDER / f"{text.lower()}.toml")
+    path = Path(text)
+    if path.suffix.lower() != ".toml":
+        raise ConfigError(
+            f"'{text}' is no sensor",
+            quantity="sensor",
+            remedy=f"{nearest(text.lower(), SENSORS)} Or give the path of a .toml file.",
+        )
+    if not path.is_file():
+        raise ConfigError("there is no such file", file=text, remedy="check the path")
+    return _read(path)
+
+
+def _read(path: Path) -> Sensor:
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"it is no TOML: {error}", file=path.name, remedy="mend it where it says"
+        ) from None
+    _known(table, TOP, path, "")
+    title, summary, grade = (_text(table, key, path) for key in ("title", "summary", "class"))
+    if grade not in GRADES:
+        raise _bad(path, "class", f"'{grade}' is no class", nearest(grade, GRADES))
+    documents = table.get("sources", {})
+    if not isinstance(documents, dict):
+        raise _bad(path, "sources", "it is no table", "write [sources], one document a line")
+    figures: list[Figure] = []
+    triads: dict[str, TriadErrors] = {}
+    spreads: dict[str, dict[str, Spread]] = {}
+    rates: dict[str, float] = {}
+    for triad in ("gyro", "accel"):
+        if triad in table:
+            triads[triad], spreads[triad] = _triad(table[triad], triad, documents, path, figures)
+            rates.update((triad, f.value[0]) for f in figures if f.key == f"{triad}.output_rate_hz")
+    if not triads:
+        raise _bad(path, "gyro, accel", "there is neither", "write [gyro], [accel] or both")
+    return Sensor(
+        path.stem,
+        title,
+        summary,
+        grade,
+        ImuErrors(triads.get("gyro", TriadErrors()), triads.get("accel")),
+        spreads,
+        rates,
+        tuple(figures),
+    )
+
+
+def _triad(
+    table: Any, triad: str, documents: Mapping[str, Any], path: Path, figures: list[Figure]
+) -> tuple[TriadErrors, dict[str, Spread]]:
+    if not isinstance(table, dict):
+        raise _bad(path, triad, "it is no table", f"write [{triad}]")
+    _known(table, KEYS[triad], path, f"{triad}.")
+    errors: dict[str, Any] = {}
+    spreads: dict[str, Spread] = {}
+    for name, entry in table.items():
+        key, place = KEYS[triad][name], f"{triad}.{name}"
+        figure = _figure(entry, place, documents, path)
+        figures.append(figure)
+        if key.quantity == "output_rate":
+            continue
+        if key.quantity in errors or key.quantity in spreads:
+            raise _bad(path, place, "the quantity is stated twice", "keep one of the two")
+        size = _si(figure, key)
+        if key.spread != "value":
+            spreads[key.quantity] = Spread(key.spread, size)
+        elif key.quantity in ("correlation_time", "bandwidth", "jitter"):
+            errors[key.quantity] = size[0]
+        else:
+            errors[key.quantity] = size
+    if "bias_instability" in errors and "correlation_time" not in errors:
+        raise _bad(
+            path,
+            f"{triad}.correlation_time_s",
+            "a bias instability needs it, and it is missing",
+            "state it, if need be as assumed",
+        )
+    try:
+        nominal = TriadErrors(**errors)
+        # The worst unit must be one that can exist, or a draw would fail for some seeds.
+        _worst(nominal, spreads)
+    except ConfigError as error:
+        f = error.finding
+        raise _bad(path, f"{triad}: {f.quantity}", f.what, f.remedy or "") from None
+    return nominal, spreads
+
+
+def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) -> Figure:
+    form = 'write { value = 1.0, source = "…", place = "Table 1" } or { …, assumed = "why" }'
+    if not isinstance(entry, dict):
+        raise _bad(path, place, f"{entry!r} says not where it is from", form)
+    _known(entry, FIGURE, path, f"{place}.")
+    given = entry.get("value")
+    numbers: list[Any] = given if isinstance(given, list) else [given] * 3
+    if len(numbers) != 3 or not all(
+        isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) and x >= 0.0
+        for x in numbers
+    ):
+        raise _bad(path, place, f"the value is {given!r}", "give one number, or [x, y, z]")
+    source, assumed = entry.get("source", ""), entry.get("assumed", "")
+    if bool(source) == bool(assumed):
+        raise _bad(path, place, "it must have either a source or a reason to assume it", form)
+    if source:
+        if source not in documents:
+            raise _bad(path, place, f"there is no source '{source}'", nearest(source, documents))
+        where = entry.get("place", "")
+        source = f"{documents[source]}, {where}" if where else str(documents[source])
+    x, y, z = (float(n) for n in numbers)
+    return Figure(place, (x, y, z), source, str(assumed))
+
+
+def _si(figure: Figure, key: Key) -> Triad:
+    x, y, z = figure.value
+    return (x * key.factor, y * key.factor, z * key.factor)
+
+
+def _unit(
+    nominal: TriadErrors, spreads: Mapping[str, Spread], seed: int, triad: int
+) -> TriadErrors:
+    values: dict[str, Any] = {}
+    for k, quantity in enumerate(DRAWN):
+        if quantity not in spreads:
+            continue
+        spread = spreads[quantity]
+        rows = []
+        for axis in range(3):
+            place = child(seed, DRAW_SEED, triad, k, axis)
+            generator = np.random.Generator(np.random.PCG64(place))
+            draw = (
+                generator.standard_normal(3)
+                if spread.kind == "sd"
+                else generator.uniform(-1.0, 1.0, 3)
+            )
+            rows.append(spread.size[axis] * draw)
+        values.update(_placed(quantity, np.array(rows)))
+    return replace(nominal, **values)
+
+
+def _worst(nominal: TriadErrors, spreads: Mapping[str, Spread]) -> TriadErrors:
+    """Make a unit whose every bounded quantity is at its bound, and others at 6 sd."""
+    values: dict[str, Any] = {}
+    for quantity, spread in spreads.items():
+        size = np.asarray(spread.size) * (6.0 if spread.kind == "sd" else 1.0)
+        values.update(_placed(quantity, -np.tile(size[:, None], (1, 3))))
+    return replace(nominal, **values)
+
+
+def _placed(quantity: str, rows: np.ndarray[Any, Any]) -> dict[str, Any]:
+    """Put three numbers an axis where the quantity has its place."""
+    if quantity == "misalignment":
+        matrix = rows.copy()
+        np.fill_diagonal(matrix, 0.0)
+        return {quantity: _matrix(matrix)}
+    if quantity == "g_sensitivity":
+        return {quantity: _matrix(rows)}
+    if quantity == "nonlinearity":
+        # Second and third order share the bound, so that their sum stays within it.
+        return {
+            "nonlinearity_2": tuple(0.5 * rows[:, 0]),
+            "nonlinearity_3": tuple(0.5 * rows[:, 1]),
+        }
+    return {quantity: tuple(rows[:, 0])}
+
+
+def _matrix(rows: np.ndarray[Any, Any]) -> Matrix:
+    first, second, third = (tuple(float(x) for x in row) for row in rows)
+    return (first, second, third)  # type: ignore[return-value]
+
+
+def _known(table: Mapping[str, Any], known: Any, path: Path, prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise _bad(path, f"{prefix}{key}", "there is no such key", nearest(key, known))
+
+
+def _text(table: Mapping[str, Any], key: str, path: Path) -> str:
+    value = table.get(key)
+    if not isinstance(value, str) or not value:
+        raise _bad(path, key, "it is missing, or no text", f'write {key} = "…"')
+    return value
+
+
+def _bad(path: Path, key: str, what: str, remedy: str) -> ConfigError:
+    return ConfigError(what, file=path.name, quantity=key, remedy=remedy)

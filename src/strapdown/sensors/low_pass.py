@@ -1,0 +1,68 @@
+"""A single-pole low-pass over samples whose spacing may vary."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def time_constant(bandwidth: float) -> float:
+    """Time constant in s of a single pole that is 3 dB down at `bandwidth` Hz."""
+    return 1.0 / (2.0 * math.pi * bandwidth)
+
+
+def low_pass(time: Array, values: Array, bandwidth: float) -> Array:
+    """Pass samples through the filter, exactly where the input is linear between them.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    values : ndarray, (n, 3)
+    bandwidth : float, Hz
+        Its -3 dB frequency; infinity changes nothing.
+
+    Returns
+    -------
+    ndarray, (n, 3)
+        The output at the stamps, at rest with the first value before the first stamp. With
+        ``h = dt/τ`` and ``a = exp(-h)``, a step goes from y0 to
+        ``a y0 + ((1-a)/h - a) u0 + (1 - (1-a)/h) u1``, which solves ``τ y' = u - y`` for u
+        linear in between.
+    """
+    if math.isinf(bandwidth):
+        return values
+    from strapdown._kernels.recursion import first_order
+
+    h = np.diff(time) / time_constant(bandwidth)
+    a = np.exp(-h)
+    held = -np.expm1(-h) / h
+    drive = (held - a)[:, None] * values[:-1] + (1.0 - held)[:, None] * values[1:]
+    out = np.empty_like(values)
+    out[0] = values[0]
+    first_order(a, np.ascontiguousarray(drive), np.ascontiguousarray(values[0]), out[1:])
+    return out
+
+
+def mean_of_filtered(ends: Array, mean: Array, steps: Array, bandwidth: float) -> Array:
+    """Mean of the filter's output over each step, from the mean of its input.
+
+    ``τ y' = u - y`` integrated over a step: ``mean(y) = mean(u) - τ (y1 - y0)/dt``.
+
+    Parameters
+    ----------
+    ends : ndarray, (n, 3)
+        The output at the end of each step; before the first step it is at rest with the mean
+        over it.
+    mean : ndarray, (n, 3)
+        Mean of the input over each step.
+    steps : ndarray, (n,), s
+    bandwidth : float, Hz
+    """
+    before = np.vstack([ends[:1], ends[:-1]])
+    return np.asarray(
+        mean - time_constant(bandwidth) * (ends - before) / steps[:, None], dtype=np.float64
+    )

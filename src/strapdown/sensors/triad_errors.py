@@ -1,0 +1,235 @@
+"""The specification of what a triad of sensors does to the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+from strapdown.exceptions import ConfigError
+
+Triad = tuple[float, float, float]
+Matrix = tuple[Triad, Triad, Triad]
+# What the user may write where a triad is meant.
+TriadLike = float | Sequence[float]
+
+ZERO: Triad = (0.0, 0.0, 0.0)
+NO_MATRIX: Matrix = (ZERO, ZERO, ZERO)
+
+# Per axis; what is of one value for the triad; and the matrices.
+TRIADS = (
+    "noise_density",
+    "bias",
+    "bias_instability",
+    "random_walk",
+    "trend",
+    "scale",
+    "nonlinearity_2",
+    "nonlinearity_3",
+    "quantization",
+    "full_scale",
+)
+NOT_NEGATIVE = (
+    "noise_density",
+    "bias_instability",
+    "random_walk",
+    "quantization",
+    "jitter",
+)
+POSITIVE = ("correlation_time", "full_scale", "bandwidth")
+
+
+@dataclass(frozen=True)
+class TriadErrors:
+    """Errors of one triad of sensors, the same meaning at every rate.
+
+    The unit u is rad/s for gyros and m/s² for accelerometers. Where an attribute is per axis, a
+    single number means the same on all three. `error_chain` says how and in which order they
+    act.
+
+    Attributes
+    ----------
+    noise_density : triad, u/√Hz
+        White noise: a sample that stands for an interval dt has the standard deviation
+        ``noise_density / √dt``, and the integral walks by ``noise_density √t``.
+    bias : triad, u
+    bias_instability : triad, u
+        Standard deviation of a stationary first-order Gauss-Markov process.
+    correlation_time : float, s
+        Of that process: its autocorrelation is ``exp(-|t| / correlation_time)``.
+    random_walk : triad, u/√s
+        The bias walks by ``random_walk √t`` from zero at the first sample.
+    trend : triad, u/s
+        Growth of the bias with time, zero at time zero.
+    scale : triad
+        Relative error of the scale factor: an axis reads ``1 + scale`` times its input.
+    misalignment : 3x3, rad
+        ``misalignment[i][j]``, i ≠ j, is the part of the input along body axis j that the sensor
+        of axis i feels (small angles; six cross-axis terms). The diagonal is zero: `scale` has it.
+    g_sensitivity : 3x3, u per m/s²
+        Of gyros: what axis i reads for a specific force along body axis j.
+    nonlinearity_2, nonlinearity_3 : triad
+        Error of second and third order, relative to full scale, at an input of full scale.
+    quantization : triad, u
+        Step of the output; zero is none. For an increment sensor that is read as a mean rate,
+        the step of the increment times the rate; no remainder is carried over.
+    full_scale : triad, u
+        The output is held within ± this.
+    bandwidth : float, Hz
+        Frequency at which a single-pole low-pass between motion and sampler has fallen to
+        1/√2 (-3 dB). Noise and drifts are those of the output, and do not pass it.
+    jitter : float, s
+        Standard deviation of the sampling instant about the stamp.
+
+    Raises
+    ------
+    ConfigError
+        A number is not finite or out of range, or the nonlinearity would fold the range onto
+        itself.
+    """
+
+    noise_density: TriadLike = ZERO
+    bias: TriadLike = ZERO
+    bias_instability: TriadLike = ZERO
+    correlation_time: float = math.inf
+    random_walk: TriadLike = ZERO
+    trend: TriadLike = ZERO
+    scale: TriadLike = ZERO
+    misalignment: Sequence[Sequence[float]] = NO_MATRIX
+    g_sensitivity: Sequence[Sequence[float]] = NO_MATRIX
+    nonlinearity_2: TriadLike = ZERO
+    nonlinearity_3: TriadLike = ZERO
+    quantization: TriadLike = ZERO
+    full_scale: TriadLike = math.inf
+    bandwidth: float = math.inf
+    jitter: float = 0.0
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            given = getattr(self, f.name)
+            try:
+                value = _plain(f.name, given)
+            except (TypeError, ValueError):
+                raise _refused(
+                    f.name, f"{given!r} has not the right shape", _shape(f.name)
+                ) from None
+            object.__setattr__(self, f.name, value)
+            _check_range(f.name, value)
+        _check_matrix(self.misalignment)
+        _check_curve(self)
+
+    def axis(self, name: str) -> Triad:
+        """Return a per-axis attribute as three numbers."""
+        value: Triad = getattr(self, name)
+        return value
+
+
+@dataclass(frozen=True)
+class ImuErrors:
+    """Errors of an inertial measurement unit.
+
+    Attributes
+    ----------
+    gyro : TriadErrors
+        In rad/s; free of errors, if not given.
+    accel : TriadErrors, optional
+        In m/s²; None is an accelerometer free of errors.
+    """
+
+    gyro: TriadErrors = field(default_factory=TriadErrors)
+    accel: TriadErrors | None = None
+
+
+def _plain(name: str, value: Any) -> float | Triad | Matrix:
+    if name in TRIADS:
+        return _triad(value)
+    if name in ("misalignment", "g_sensitivity"):
+        first, second, third = value
+        return (_row(first), _row(second), _row(third))
+    return float(value)
+
+
+def _triad(value: Any) -> Triad:
+    if isinstance(value, int | float):
+        return (float(value), float(value), float(value))
+    return _row(value)
+
+
+def _row(value: Any) -> Triad:
+    x, y, z = value
+    return (float(x), float(y), float(z))
+
+
+def _shape(name: str) -> str:
+    if name in TRIADS:
+        return "give one number, or three: x, y, z"
+    if name in ("misalignment", "g_sensitivity"):
+        return "give three rows of three numbers"
+    return "give one number"
+
+
+def _numbers(value: Any) -> list[float]:
+    if isinstance(value, tuple):
+        return [number for part in value for number in _numbers(part)]
+    return [float(value)]
+
+
+def _check_range(name: str, value: Any) -> None:
+    for number in _numbers(value):
+        if math.isnan(number) or (math.isinf(number) and name not in POSITIVE):
+            raise _refused(name, f"{number} is no finite number", "give a finite number")
+        if name in POSITIVE and number <= 0.0:
+            raise _refused(name, f"{number:g} is not positive", "leave it out where there is none")
+        if name in NOT_NEGATIVE and number < 0.0:
+            raise _refused(name, f"{number:g} is negative", "give zero or more")
+        if name == "scale" and number <= -1.0:
+            raise _refused(name, f"{number:g} leaves no signal", "give more than -1")
+
+
+def _check_matrix(misalignment: Sequence[Sequence[float]]) -> None:
+    for i, row in enumerate(misalignment):
+        if row[i] != 0.0:
+            raise _refused(
+                "misalignment",
+                f"element ({i + 1}, {i + 1}) is {row[i]:g}",
+                "the diagonal is the scale factor's: give it as scale",
+            )
+        if sum(abs(x) for x in row) >= 1.0:
+            raise _refused(
+                "misalignment",
+                f"row {i + 1} sums to {sum(abs(x) for x in row):g} rad",
+                "give small angles; turn the axes of the log for a mounting",
+            )
+
+
+def _check_curve(errors: TriadErrors) -> None:
+    """The slope ``1 + s + 2 n2 x + 3 n3 x²`` must stay positive on [-1, 1]."""
+    axes = zip(
+        errors.axis("scale"),
+        errors.axis("nonlinearity_2"),
+        errors.axis("nonlinearity_3"),
+        errors.axis("full_scale"),
+        strict=True,
+    )
+    for s, n2, n3, full in axes:
+        if n2 == 0.0 and n3 == 0.0:
+            continue
+        if math.isinf(full):
+            raise _refused(
+                "full_scale", "a nonlinearity is relative to it, and there is none", "give it"
+            )
+        places = [-1.0, 1.0]
+        if n3 != 0.0 and abs(n2) < abs(3.0 * n3):
+            places.append(-n2 / (3.0 * n3))
+        least = min(1.0 + s + 2.0 * n2 * x + 3.0 * n3 * x * x for x in places)
+        if least <= 0.0:
+            raise _refused(
+                "nonlinearity",
+                f"the slope falls to {least:.3g} of nominal within the range",
+                "a sensor that reads two inputs alike cannot be compensated: give less",
+            )
+
+
+def _refused(name: str, what: str, remedy: str) -> ConfigError:
+    return ConfigError(what, quantity=name, remedy=remedy)

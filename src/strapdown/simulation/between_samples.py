@@ -1,0 +1,88 @@
+"""A quantity that is known at every instant, as a sampler behind a low-pass or a mean sees it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.sensors.low_pass import time_constant
+
+Array = NDArray[np.float64]
+Quantity = Callable[[Array], Array]
+
+# Gauss-Legendre nodes in each stretch: exact for polynomials of twice as many orders less one.
+MEAN_NODES = 8
+FILTER_NODES = 6
+# exp(-40) is less than the rounding of what it is added to.
+MEMORY = 40.0  # time constants
+# Instants that are evaluated together, for the sake of memory.
+TOGETHER = 200_000
+
+
+def mean_over(quantity: Quantity, starts: Array, ends: Array) -> Array:
+    """Mean over each interval, by Gauss-Legendre quadrature with 8 nodes, (n, 3).
+
+    Exact for polynomials up to order 15; of a sine with one period in the interval, to 1e-9.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(MEAN_NODES)
+    parts = []
+    for chunk in _chunks(starts.size, MEAN_NODES):
+        a, b = starts[chunk, None], ends[chunk, None]
+        at = 0.5 * (a + b) + 0.5 * (b - a) * nodes
+        values = quantity(at.ravel()).reshape(*at.shape, 3)
+        parts.append(0.5 * np.einsum("nmk,m->nk", values, weights))
+    return np.concatenate(parts)
+
+
+def low_passed(quantity: Quantity, instants: Array, bandwidth: float) -> Array:
+    """Output of a single-pole low-pass at increasing instants, (n, 3).
+
+    Parameters
+    ----------
+    quantity : callable
+        From (n,) instants to (n, 3) values.
+    instants : ndarray, (n,), s
+        At rest with the value at the first instant, until then.
+    bandwidth : float, Hz
+        -3 dB frequency.
+
+    Returns
+    -------
+    ndarray, (n, 3)
+        ``y1 = exp(-dt/τ) y0 + ∫ exp(-(t1 - s)/τ) u(s) ds/τ`` from instant to instant, the
+        integral by Gauss-Legendre quadrature with 6 nodes in stretches no longer than τ. In
+        other words, the motion is evaluated at 6 or more instants a sample and time constant.
+        Smooth motion is exact to rounding; a jump of u is spread over the stretch that it falls
+        in.
+    """
+    if math.isinf(bandwidth):
+        return quantity(instants)
+    from strapdown._kernels.recursion import first_order
+
+    tau = time_constant(bandwidth)
+    steps = np.diff(instants)
+    window = np.minimum(steps, MEMORY * tau)
+    stretches = max(1, math.ceil(float(window.max()) / tau))
+    nodes, weights = np.polynomial.legendre.leggauss(FILTER_NODES)
+    # Places within the window from 0 to 1, and their weights.
+    place = ((np.arange(stretches)[:, None] + 0.5 * (1.0 + nodes)) / stretches).ravel()
+    weight = np.tile(0.5 * weights, stretches) / stretches
+    parts = [np.empty((0, 3))]
+    for chunk in _chunks(steps.size, place.size):
+        back = window[chunk, None] * (1.0 - place)
+        values = quantity((instants[1:][chunk, None] - back).ravel()).reshape(*back.shape, 3)
+        share = weight * np.exp(-back / tau) * window[chunk, None] / tau
+        parts.append(np.einsum("nm,nmk->nk", share, values))
+    out = np.empty((instants.size, 3))
+    out[:1] = quantity(instants[:1])
+    drive = np.ascontiguousarray(np.concatenate(parts))
+    first_order(np.exp(-steps / tau), drive, out[0].copy(), out[1:])
+    return out
+
+
+def _chunks(count: int, each: int) -> list[slice]:
+    rows = max(1, TOGETHER // each)
+    return [slice(k, k + rows) for k in range(0, count, rows)]

@@ -1,0 +1,192 @@
+"""Samples of gyros and accelerometers that move in a known way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.error_chain import apply, jitter
+from strapdown.sensors.error_draws import child
+from strapdown.sensors.low_pass import mean_of_filtered
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.simulation.between_samples import Quantity, low_passed, mean_over
+from strapdown.simulation.motion import Motion
+from strapdown.tables import SAMPLINGS, attitude_table, imu_table
+
+Array = NDArray[np.float64]
+
+# What a few gigabytes of memory hold with everything that is made of them.
+MOST_SAMPLES = 5_000_000
+# Places of the triads in the tree of seeds.
+GYRO_SEED, ACCEL_SEED = 0, 1
+
+
+def simulate_imu(
+    motion: Motion,
+    errors: ImuErrors,
+    *,
+    rate: float,
+    sampling: str = "instantaneous",
+    seed: int = 0,
+    source: str | None = None,
+    accelerometer: bool = True,
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Sample a motion.
+
+    Parameters
+    ----------
+    motion : Motion
+    errors : ImuErrors
+        Put on in the order of `sensors.error_chain`. Jitter and low-pass act on the motion
+        itself, which is evaluated at the jittered instants and between the samples.
+    rate : float, Hz
+        Samples fall on ``k / rate``, from zero to the last that is within the motion.
+    sampling : {'instantaneous', 'mean'}
+        The value at each stamp, or the mean over the interval that ends there: of rates exact,
+        from the motion's angle; of specific force by Gauss-Legendre quadrature with 8 nodes.
+        Before time zero there is no motion: the first row of means holds the value at zero.
+    seed : int
+        Of everything that is random; the same seed gives the same samples on every machine.
+    source : str, optional
+        Name for messages.
+    accelerometer : bool
+        Whether there is one.
+
+    Returns
+    -------
+    imu : DataFrame
+        Imu table, body axes: rad/s and, with an accelerometer, the specific force
+        ``C_nb^T (a_n - g_n)`` in m/s² with the standard gravity straight down.
+    truth : DataFrame
+        Attitude table at the same stamps, exact.
+
+    Raises
+    ------
+    ConfigError
+        The rate is not positive or gives fewer than two samples, `sampling` is unknown, or the
+        jitter is too large for the rate.
+    """
+    time = _stamps(motion, rate, sampling)
+    step = 1.0 / rate
+
+    def force(t: Array) -> Array:
+        return specific_force(motion, t)
+
+    wants_force = accelerometer or bool(np.any(np.asarray(errors.gyro.g_sensitivity)))
+    plain = _force(motion, force, TriadErrors(), time, step, sampling, 0) if wants_force else None
+    gyro_seed, accel_seed = child(seed, GYRO_SEED), child(seed, ACCEL_SEED)
+    gyro = apply(
+        errors.gyro,
+        time,
+        _rate(motion, errors.gyro, time, step, sampling, gyro_seed),
+        sampling=sampling,
+        seed=gyro_seed,
+        specific_force=plain,
+        sampled=True,
+    )
+    accel = plain if accelerometer else None
+    if accel is not None and errors.accel is not None:
+        own = errors.accel
+        if own.jitter > 0.0 or np.isfinite(own.bandwidth):
+            accel = _force(motion, force, own, time, step, sampling, accel_seed)
+        accel = apply(
+            own,
+            time,
+            accel,
+            sampling=sampling,
+            seed=accel_seed,
+            specific_force=plain,
+            sampled=True,
+        )
+    return (
+        imu_table(time, gyro, accel, sampling=sampling, source=source),
+        attitude_table(time, motion.attitude(time), source=source),
+    )
+
+
+def specific_force(motion: Motion, time: Array) -> Array:
+    """What an ideal accelerometer reads in body axes, ``C_nb^T (a_n - g_n)``, (n, 3), m/s²."""
+    upward = motion.acceleration(time) - np.array([0.0, 0.0, STANDARD_GRAVITY])
+    return rotation.rotate(rotation.conjugate(motion.attitude(time)), upward)
+
+
+def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
+    if sampling not in SAMPLINGS:
+        raise ConfigError(
+            f"'{sampling}' is no kind of sampling",
+            quantity="sampling",
+            remedy=f"use {' or '.join(SAMPLINGS)}",
+        )
+    if not (np.isfinite(rate) and rate * motion.duration >= 1.0):
+        raise ConfigError(
+            f"{rate:g} Hz gives fewer than two samples in {motion.duration:g} s",
+            quantity="rate",
+            remedy=f"use at least {1.0 / motion.duration:.3g} Hz",
+        )
+    # The last sample still belongs where rounding puts the product just under a whole number.
+    count = int(np.floor(rate * motion.duration * (1.0 + 1e-12))) + 1
+    if count > MOST_SAMPLES:
+        raise ConfigError(
+            f"{rate:g} Hz gives {count} samples in {motion.duration:g} s",
+            quantity="rate",
+            remedy=f"use at most {MOST_SAMPLES / motion.duration:.3g} Hz",
+        )
+    return np.arange(count) / rate
+
+
+def _instants(
+    motion: Motion, errors: TriadErrors, time: Array, seed: int | np.random.SeedSequence
+) -> Array:
+    """When the sampler really looks; the motion is known from zero to its end."""
+    if errors.jitter == 0.0:
+        return time
+    steps = np.full(time.size, time[1] - time[0])
+    return np.clip(time + jitter(errors, steps, seed), 0.0, motion.duration)
+
+
+def _rate(
+    motion: Motion,
+    errors: TriadErrors,
+    time: Array,
+    step: float,
+    sampling: str,
+    seed: int | np.random.SeedSequence,
+) -> Array:
+    at = _instants(motion, errors, time, seed)
+    if sampling == "instantaneous":
+        return low_passed(motion.rate, at, errors.bandwidth)
+    angle = motion.angle(at)
+    mean = np.vstack([motion.rate(at[:1]), np.diff(angle, axis=0) / step])
+    return _filtered_mean(motion.rate, at, mean, step, errors.bandwidth)
+
+
+def _force(
+    motion: Motion,
+    force: Quantity,
+    errors: TriadErrors,
+    time: Array,
+    step: float,
+    sampling: str,
+    seed: int | np.random.SeedSequence,
+) -> Array:
+    at = _instants(motion, errors, time, seed)
+    if sampling == "instantaneous":
+        return low_passed(force, at, errors.bandwidth)
+    mean = np.vstack([force(at[:1]), mean_over(force, at[:-1], at[1:])])
+    if errors.jitter > 0.0:
+        # The sensor divides what it has gathered by the interval that it knows of.
+        mean[1:] *= np.diff(at)[:, None] / step
+    return _filtered_mean(force, at, mean, step, errors.bandwidth)
+
+
+def _filtered_mean(
+    quantity: Quantity, at: Array, mean: Array, step: float, bandwidth: float
+) -> Array:
+    if np.isinf(bandwidth):
+        return mean
+    ends = low_passed(quantity, at, bandwidth)
+    return mean_of_filtered(ends, mean, np.full(at.size, step), bandwidth)
