@@ -37,7 +37,13 @@ class Clock:
     unit: str | None
 
 
-def join(logs: Sequence[RawLog], name: str, files: tuple[Path, ...] | None = None) -> RawLog:
+def join(
+    logs: Sequence[RawLog],
+    name: str,
+    files: tuple[Path, ...] | None = None,
+    *,
+    rows_of_member: bool = False,
+) -> RawLog:
     """Bring an accelerometer and a magnetometer to the stamps of the gyro.
 
     Values between two samples lie on the straight line between them; nothing is extrapolated.
@@ -50,6 +56,9 @@ def join(logs: Sequence[RawLog], name: str, files: tuple[Path, ...] | None = Non
         Of the whole, for messages.
     files : tuple of Path, optional
         Every file that was read; if not given, those of the logs.
+    rows_of_member : bool
+        Call the whole by the gyro's log, which stands in a folder or an archive, because rows
+        are counted in that.
 
     Returns
     -------
@@ -112,7 +121,7 @@ def join(logs: Sequence[RawLog], name: str, files: tuple[Path, ...] | None = Non
     everything = tuple(dict.fromkeys(f for log in logs for f in log.files))
     rows = np.arange(1, keep.size + 1) if gyro.rows is None else gyro.rows
     return RawLog(
-        name=name,
+        name=gyro.name if rows_of_member else name,
         files=files or everything,
         columns={n: c[keep] for n, c in columns.items()},
         rows=rows[keep],

@@ -67,7 +67,8 @@ def read(path: Path) -> RawLog:
         elif _sensors(member):
             files.append(member.file)
             logs.append(_log(member))
-    raw = join(_without_empty(logs), name, tuple(dict.fromkeys(files)))
+    unique = tuple(dict.fromkeys(files))
+    raw = join(_without_empty(logs), name, unique, rows_of_member=True)
     raw.findings[:0] = findings
     return raw
 

@@ -53,7 +53,7 @@ def read(path: Path) -> RawLog:
             quantity="gyro",
             remedy="unpack it and give the log in it, or call the tables gyro.csv, accel.csv",
         )
-    return join([_log(m) for m in tables], name)
+    return join([_log(m) for m in tables], name, rows_of_member=True)
 
 
 def _triad(member: Member) -> str | None:

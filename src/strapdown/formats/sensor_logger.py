@@ -93,7 +93,7 @@ def read(path: Path) -> RawLog:
     for kind in MAGS[:1]:
         if kind in sensors:
             logs.append(_log(sensors[kind], "mag", "uT"))
-    raw = join(logs, name, files)
+    raw = join(logs, name, files, rows_of_member=path.suffix.lower() != ".json")
     raw.findings[:0] = findings
     return raw
 
