@@ -74,14 +74,14 @@ def test_frames_and_axes_agree_with_velocity_and_gravity(folder, recording):
     assert -f[2] == pytest.approx(9.67, abs=0.03)  # "2 % low"
     assert np.hypot(f[0], f[1]) < 0.5  # from 7.9 to 11.5 m/s in a minute, and a hill
     change = np.ptp(np.unwrap(recording.truth["heading"], period=360.0)[[0, -1]])
-    assert change == pytest.approx(0.6, abs=0.15)
+    assert change < 0.7  # "heading changes 0.6 deg in all"
 
 
 def test_gyro_alone_keeps_the_attitude(folder):
     plain = bench_attitude(folder)
     # A bias that Android estimates is good to a tenth of a deg/s or so; it adds up over 60 s.
     score = {s.algorithm: s for s in plain.scores}["quaternion"]
-    assert 0.1 < score.final_deg < 6.0
+    assert 0.1 < score.error_deg < 6.0
     # What is left at the end, given back evenly as a bias, shows what is not bias.
     truth = plain.truth
     run = next(r for r in plain.runs if r.algorithm == "quaternion")
@@ -94,5 +94,5 @@ def test_gyro_alone_keeps_the_attitude(folder):
     text = ",".join(f"{b:.9f}" for b in bias) + " deg/s"
     left = {s.algorithm: s for s in bench_attitude(folder, gyro_bias=text).scores}["quaternion"]
     # The heading changes by 0.6 deg in all, so that body axes hardly turn and the bias is even.
-    assert left.final_deg < 0.1
-    assert left.largest_deg < 1.5
+    assert left.error_deg < 0.1
+    assert left.max_deg < 1.5

@@ -97,10 +97,11 @@ def _find(path: Path, *parts: str) -> Path | None:
 def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> RawLog:
     label = f"{name}/{value.name if value.suffix else kind}"
     time, values = npy.load(t, f"{name}/{t.name}"), npy.load(value, label)
-    if time.ndim != 1 or values.shape != (time.size, 3) or values.dtype.kind not in "iuf":
+    kinds = time.dtype.kind + values.dtype.kind
+    if time.ndim != 1 or values.shape != (time.size, 3) or not set(kinds) <= set("iuf"):
         raise DataError(
-            f"stamps have the shape {time.shape} and values {values.shape}, where (n,) and (n, 3) "
-            "were expected",
+            f"stamps have the shape {time.shape} and values {values.shape} of {values.dtype}, where "
+            "numbers of the shapes (n,) and (n, 3) were expected",
             file=label,
             quantity=triad,
             remedy="get the segment again from its source",
@@ -126,14 +127,21 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
         return None, ()
     times, positions, q_ed = (npy.load(f, f"{name}/{f.name}") for f in files)
     shapes = (times.shape, positions.shape, q_ed.shape)
-    if times.ndim != 1 or shapes[1:] != ((times.size, 3), (times.size, 4)):
+    kinds = "".join(array.dtype.kind for array in (times, positions, q_ed))
+    if (
+        times.ndim != 1
+        or shapes[1:] != ((times.size, 3), (times.size, 4))
+        or not set(kinds) <= set("iuf")
+    ):
         raise DataError(
-            f"times, positions, orientations have the shapes {', '.join(map(str, shapes))}",
+            f"times, positions, orientations have the shapes {', '.join(map(str, shapes))}, or are "
+            "no numbers",
             file=f"{name}/{files[2].name}",
             quantity="attitude",
             remedy="get the segment again from its source",
         )
-    norm = np.linalg.norm(q_ed, axis=1)
+    # Squares of numbers that no unit quaternion holds need not be representable.
+    norm = np.linalg.norm(np.where(np.abs(q_ed) < 2.0, q_ed, np.nan), axis=1)
     q_ne = ned_from_ecef(positions)
     good = np.isfinite(q_ne).all(axis=1) & np.isfinite(times) & (np.abs(norm - 1.0) < 0.01)
     order = np.flatnonzero(good)[np.argsort(times[good], kind="stable")]

@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 _A = 6378137.0
 _F = 1.0 / 298.257223563
 _E2 = _F * (2.0 - _F)
+# Farther out no vehicle goes, and powers leave the range of doubles in the end.
+_FARTHEST = 1e9  # m
 
 
 def latitude_longitude(position: ArrayLike) -> tuple[Array, Array]:
@@ -24,14 +26,16 @@ def latitude_longitude(position: ArrayLike) -> tuple[Array, Array]:
     ----------
     position : array_like, (n, 3), m
         Earth-centred, earth-fixed; farther than 43 km from the centre, inside of which the
-        normal to the ellipsoid is not unique.
+        normal to the ellipsoid is not unique, and nearer than 1e9 m.
 
     Returns
     -------
     latitude, longitude : ndarray, (n,), rad
-        NaN inside.
+        NaN elsewhere.
     """
-    x, y, z = np.asarray(position, dtype=np.float64).reshape(-1, 3).T
+    places = np.array(position, dtype=np.float64).reshape(-1, 3)
+    places[~(np.abs(places) < _FARTHEST).all(axis=1)] = np.nan
+    x, y, z = places.T
     e4 = _E2 * _E2
     p = (x * x + y * y) / (_A * _A)
     q = (1.0 - _E2) * z * z / (_A * _A)

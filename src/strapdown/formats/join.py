@@ -264,14 +264,15 @@ def _onto(
         what = f"it has values for {covered} of the {int(known.sum())} samples of the gyro"
         _leave_out(log.name, triad, what, findings)
         return None, known
-    findings.append(
-        Finding(
-            f"interpolated to {covered} stamps of the gyro, which are not its own; the farthest "
-            f"is {distance:.3g} s from the sample nearest to it",
-            file=log.name,
-            quantity=triad,
+    if distance > 0:
+        findings.append(
+            Finding(
+                f"interpolated to {covered} stamps of the gyro, which are not its own; the "
+                f"farthest is {distance:.3g} s from the sample nearest to it",
+                file=log.name,
+                quantity=triad,
+            )
         )
-    )
     if gaps := find_gaps(stamps):
         longest = max(gaps, key=lambda g: g.length)
         findings.append(

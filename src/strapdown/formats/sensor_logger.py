@@ -35,8 +35,8 @@ from strapdown.formats.recording import RawLog
 TIME = ("time", "ns")
 GYROS = ("Gyroscope", "GyroscopeUncalibrated")
 ACCELS = ("TotalAcceleration", "Accelerometer", "Gravity", "AccelerometerUncalibrated")
-MAGS = ("Magnetometer", "MagnetometerUncalibrated")
-SENSORS = (*GYROS, *ACCELS, *MAGS)
+MAG = "Magnetometer"
+SENSORS = (*GYROS, *ACCELS, MAG)
 METADATA = "Metadata"
 # A second download of a file is called "Gyroscope (1)" or "Gyroscope-2".
 _COPY = re.compile(r"[\s_-]*(\(\d+\)|\d+)$")
@@ -88,11 +88,19 @@ def read(path: Path) -> RawLog:
     else:
         members = members_of(path) if path.is_dir() or path.suffix.lower() == ".zip" else []
         sensors, meta, files = _from_members(members or [file_member(path)])
+    if not any(kind in sensors for kind in GYROS):
+        raise DataError(
+            f"no gyroscope in it; of what is read here it holds: {', '.join(sensors) or 'nothing'}",
+            file=name,
+            quantity="gyro",
+            remedy="record with the gyroscope switched on; give the folder or archive, and not a "
+            "table of it",
+        )
     findings: list[Finding] = []
-    logs = [*_gyro(sensors, findings), *_force(sensors, meta, name, findings)]
-    for kind in MAGS[:1]:
-        if kind in sensors:
-            logs.append(_log(sensors[kind], "mag", "uT"))
+    logs = [_gyro(sensors, findings), *_force(sensors, meta, name, findings)]
+    # The uncalibrated field has the phone's own in it.
+    if MAG in sensors:
+        logs.append(_log(sensors[MAG], "mag", "uT"))
     raw = join(logs, name, files, rows_of_member=path.suffix.lower() != ".json")
     raw.findings[:0] = findings
     return raw
@@ -224,10 +232,8 @@ def _log(sensor: Sensor, triad: str, unit: str | None) -> RawLog:
     )
 
 
-def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> list[RawLog]:
-    kind = next((k for k in GYROS if k in sensors), None)
-    if kind is None:
-        return []
+def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
+    kind = next(k for k in GYROS if k in sensors)
     if kind == GYROS[1]:
         findings.append(
             Finding(
@@ -237,7 +243,7 @@ def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> list[RawLog]:
                 quantity="gyro",
             )
         )
-    return [_log(sensors[kind], "gyro", "rad/s")]
+    return _log(sensors[kind], "gyro", "rad/s")
 
 
 def _force(

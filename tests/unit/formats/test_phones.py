@@ -396,3 +396,15 @@ def test_a_faulty_row_of_a_member_is_named_by_member_and_row(tmp_path):
     lines[7] = lines[7] + ",1"
     with pytest.raises(DataError, match=r"rec\.zip/Gyroscope\.csv, row 8: 6 fields"):
         read_log(zipped(tmp_path / "rec.zip", {"Gyroscope.csv": "\n".join(lines)}))
+
+
+def test_a_folder_of_an_export_runs_and_runs_again_from_its_copy(tmp_path, run_cli):
+    members = {
+        "Gyroscope.csv": px_gyro(),
+        "meta/time.csv": '"event","experiment time","system time"\n"START",0,1\n"PAUSE",1.2,2.2\n',
+    }
+    source = in_folder(tmp_path / "raw", members)
+    assert run_cli("attitude", source, "--out", tmp_path / "out").code == 0
+    copy = tmp_path / "out" / "inputs" / "log" / "raw"
+    assert {p.relative_to(copy).as_posix() for p in copy.rglob("*.csv")} == set(members)
+    assert run_cli("verify", tmp_path / "out").code == 0
