@@ -13,6 +13,7 @@ from strapdown.formats import (
     comma2k19,
     csv,
     hdf5,
+    join,
     matlab,
     mpu6050,
     npy_folder,
@@ -24,7 +25,6 @@ from strapdown.formats import (
     sensorstream,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.join import join, with_columns
 from strapdown.formats.recording import RawLog, ReadOptions, Recording
 
 __all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_joined", "read_log", "read_raw"]
@@ -140,7 +140,7 @@ def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None)
     logs = [read_raw(Path(path)) for path in paths]
     if len(logs) == 1:
         return assemble(logs[0], asked)
-    raw = join(with_columns(logs, asked), " + ".join(log.name for log in logs))
+    raw = join.join(join.with_columns(logs, asked), " + ".join(log.name for log in logs))
     return assemble(raw, dataclasses.replace(asked, columns={}))
 
 

@@ -100,7 +100,7 @@ def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> R
     kinds = time.dtype.kind + values.dtype.kind
     if time.ndim != 1 or values.shape != (time.size, 3) or not set(kinds) <= set("iuf"):
         raise DataError(
-            f"stamps have the shape {time.shape} and values {values.shape} of {values.dtype}, where "
+            f"stamps have the shape {time.shape} and values {values.shape} of {values.dtype}; "
             "numbers of the shapes (n,) and (n, 3) were expected",
             file=label,
             quantity=triad,

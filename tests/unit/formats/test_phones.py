@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from strapdown.exceptions import DataError
-from strapdown.formats import READERS, read_log, read_raw
+from strapdown.formats import READERS, join, read_log, read_raw
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO
 
@@ -408,3 +408,21 @@ def test_a_folder_of_an_export_runs_and_runs_again_from_its_copy(tmp_path, run_c
     copy = tmp_path / "out" / "inputs" / "log" / "raw"
     assert {p.relative_to(copy).as_posix() for p in copy.rglob("*.csv")} == set(members)
     assert run_cli("verify", tmp_path / "out").code == 0
+
+
+@pytest.mark.parametrize("known", [False, True])
+def test_a_magnetometer_is_handed_through_and_stated_where_it_is_a_quantity(
+    tmp_path, monkeypatch, known
+):
+    mag = [f"mag_{a}" for a in "xyz"]
+    others = [q for q in join.QUANTITIES if q not in mag]
+    monkeypatch.setattr(join, "QUANTITIES", [*others, *(mag if known else [])])
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(ss_lines((4, 5))) + "\n")
+    raw = read_raw(path)
+    field = [f"magnetic field/{a}" for a in "xyz"]
+    assert np.array_equal(np.column_stack([raw.columns[f] for f in field]), 10 * FORCE)
+    said_of = {q: u for q, u in raw.stated.values()}
+    assert {q: u for q, u in said_of.items() if q in mag} == (
+        dict.fromkeys(mag, "uT") if known else {}
+    )
