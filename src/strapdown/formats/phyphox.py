@@ -68,7 +68,7 @@ def read(path: Path) -> RawLog:
             files.append(member.file)
             logs.append(_log(member))
     unique = tuple(dict.fromkeys(files))
-    raw = join(_without_empty(logs), name, unique, rows_of_member=True)
+    raw = join(_mention_linear(logs), name, unique, rows_of_member=True)
     raw.findings[:0] = findings
     return raw
 
@@ -96,8 +96,8 @@ def _log(member: Member) -> RawLog:
     return raw
 
 
-def _without_empty(logs: list[RawLog]) -> list[RawLog]:
-    """A table with the gyro and another sensor in it stands as it is; the rest may hold none."""
+def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
+    """Say of tables that hold none of the three that they are not used."""
     wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):

@@ -422,7 +422,7 @@ def test_a_magnetometer_is_handed_through_and_stated_where_it_is_a_quantity(
     raw = read_raw(path)
     field = [f"magnetic field/{a}" for a in "xyz"]
     assert np.array_equal(np.column_stack([raw.columns[f] for f in field]), 10 * FORCE)
-    said_of = {q: u for q, u in raw.stated.values()}
+    said_of = dict(raw.stated.values())
     assert {q: u for q, u in said_of.items() if q in mag} == (
         dict.fromkeys(mag, "uT") if known else {}
     )
