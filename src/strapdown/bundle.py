@@ -220,7 +220,7 @@ def _manifest(
         # The name that was given; a link's target may have lost its ending.
         place = root / (item.path.name or item.path.resolve().name)
         for file, digest in zip(item.files, item.digests, strict=True):
-            name = place / file.name if item.path.is_dir() else place
+            name = place / file.relative_to(item.path) if item.path.is_dir() else place
             if copy:
                 (staging / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(file, staging / name)

@@ -125,6 +125,65 @@ def no_hdf5(folder: Path) -> Path:
     return folder / "log.h5"
 
 
+def _sensor_logger(values: str, start: int = 1_707_663_721_345_109_200) -> str:
+    """A sensor's table as Sensor Logger writes it; synthetic."""
+    head = "time,seconds_elapsed,z,y,x"
+    return "\n".join(
+        [head, *(f"{start + 10_000_000 * k},{0.01 * k:.2f},{values}" for k in range(50))]
+    )
+
+
+def recording_zip(**members: str) -> Callable[[Path], Path]:
+    """A zip as an application on a phone exports it."""
+
+    def make(folder: Path) -> Path:
+        with zipfile.ZipFile(folder / "rec.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in members.items():
+                archive.writestr(f"{name}.csv", content)
+        return folder / "rec.zip"
+
+    return make
+
+
+def cut_zip(folder: Path) -> Path:
+    path = recording_zip(Gyroscope=_sensor_logger("0.1,0.2,0.3"))(folder)
+    path.write_bytes(path.read_bytes()[:-40])
+    return path
+
+
+def sensorstream(number: int, line: str) -> Callable[[Path], Path]:
+    """A file of Sensorstream IMU+GPS in which one line is replaced."""
+    lines = [f"{890 + 0.01 * k:.2f}, 3, 0.1, 0.2, 9.8, 4, 0.1, 0.2, 0.3" for k in range(50)]
+    lines[number] = line
+    return lambda folder: text(folder / "log.csv", lines, None)
+
+
+def sensors_on_two_clocks(folder: Path) -> Path:
+    (folder / "rec").mkdir()
+    text(folder / "rec" / "gyro.csv", rows(), HEADER)
+    head = "time_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
+    text(folder / "rec" / "accel.csv", rows(start=1.7e9), head)
+    return folder / "rec"
+
+
+def cut_array(folder: Path) -> Path:
+    (folder / "rec").mkdir()
+    np.save(folder / "rec" / "gyro_rad_s.npy", np.ones((50, 3)))
+    path = folder / "rec" / "gyro_rad_s.npy"
+    path.write_bytes(path.read_bytes()[:-100])
+    return folder / "rec"
+
+
+def no_parquet(folder: Path) -> Path:
+    (folder / "log.parquet").write_bytes(b"PAR1" + bytes(100))
+    return folder / "log.parquet"
+
+
+def cut_json(folder: Path) -> Path:
+    (folder / "rec.json").write_text('[\n{"sensor": "Gyroscope", "time": "1", "x": "0"},\n{"sen')
+    return folder / "rec.json"
+
+
 @dataclass(frozen=True)
 class Case:
     """One bad input.
@@ -274,4 +333,48 @@ CASES = [
     Case("An archive of Python objects", pickled),
     Case("A damaged MATLAB file", no_matlab),
     Case("A damaged HDF5 file", no_hdf5),
+    Case("An archive of a phone that was cut", cut_zip),
+    Case("An archive of something else", recording_zip(Contacts="name,number")),
+    Case(
+        "A recording of a phone without a gyroscope",
+        recording_zip(Accelerometer=_sensor_logger("9.8,0.2,0.3")),
+    ),
+    Case(
+        "An empty member of an archive",
+        recording_zip(Gyroscope=_sensor_logger("0.1,0.2,0.3"), Gravity=""),
+    ),
+    Case(
+        "A member of an archive with text among the numbers",
+        recording_zip(Gyroscope=_sensor_logger("0.1,0.2,0.3").replace("0.07,0.1", "0.07,n/a")),
+    ),
+    Case(
+        "A phone of unknown platform",
+        recording_zip(
+            Gyroscope=_sensor_logger("0.1,0.2,0.3"),
+            Accelerometer=_sensor_logger("0.1,0.2,0.3"),
+            Gravity=_sensor_logger("9.8,0,0"),
+        ),
+        fails=False,
+    ),
+    Case(
+        "A sensor that runs for half of the recording",
+        recording_zip(
+            Gyroscope=_sensor_logger("0.1,0.2,0.3"),
+            TotalAcceleration="\n".join(_sensor_logger("9.8,0.2,0.3").splitlines()[:26]),
+        ),
+        fails=False,
+    ),
+    Case("Sensors on two clocks", sensors_on_two_clocks),
+    Case("Records that were cut", cut_json),
+    Case(
+        "A line of Sensorstream that is none",
+        sensorstream(30, "890.30, 3, 0.1, 0.2, 9.8, 4, 0.1, 0.2"),
+    ),
+    Case(
+        "A line of Sensorstream without a gyroscope",
+        sensorstream(30, "890.30, 3, 0.1, 0.2, 9.8"),
+        fails=False,
+    ),
+    Case("An array that was cut", cut_array),
+    Case("A damaged Parquet file", no_parquet),
 ]

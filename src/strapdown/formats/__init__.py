@@ -2,16 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.formats import broad, csv, hdf5, matlab, mpu6050, npz
+from strapdown.formats import (
+    broad,
+    comma2k19,
+    csv,
+    hdf5,
+    join,
+    matlab,
+    mpu6050,
+    npy_folder,
+    npz,
+    parquet,
+    phyphox,
+    sensor_folder,
+    sensor_logger,
+    sensorstream,
+)
 from strapdown.formats.assemble import assemble
 from strapdown.formats.recording import RawLog, ReadOptions, Recording
 
-__all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_log", "read_raw"]
+__all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_joined", "read_log", "read_raw"]
 
 
 @dataclass(frozen=True)
@@ -27,8 +43,21 @@ class Reader:
 READERS: dict[str, Reader] = {
     "mpu6050": Reader("folder of an MPU-6050 in MATLAB files", mpu6050.detect, mpu6050.read),
     "broad": Reader("BROAD trial, HDF5 with optical truth", broad.detect, broad.read),
+    "comma2k19": Reader(
+        "comma2k19 segment, with its pose as truth", comma2k19.detect, comma2k19.read
+    ),
+    "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, sensorstream.read),
+    "sensor-logger": Reader(
+        "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, sensor_logger.read
+    ),
+    "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, phyphox.read),
+    "sensor-folder": Reader(
+        "folder or zip of one text table a sensor", sensor_folder.detect, sensor_folder.read
+    ),
+    "npy-folder": Reader("folder of NumPy arrays (.npy)", npy_folder.detect, npy_folder.read),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, csv.read),
     "npz": Reader("NumPy archive (.npz)", npz.detect, npz.read),
+    "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, parquet.read),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, hdf5.read),
     "matlab": Reader("MATLAB up to v7 (.mat)", matlab.detect, matlab.read),
 }
@@ -82,6 +111,37 @@ def read_raw(path: Path) -> RawLog:
         file=path.name,
         remedy=f"give one of: {kinds}",
     )
+
+
+def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None) -> Recording:
+    """Read logs of single sensors, with one clock, into one recording.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        One of them has the gyro, on whose stamps the others are interpolated.
+    options : ReadOptions, optional
+        What the user says about them; columns are named as they stand in their log, or as
+        ``log/column``.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, an option names what is in none of them, or two of them have the
+        same quantity.
+    DataError
+        A log cannot be used, none has a gyro, or their clocks have no time in common.
+    """
+    asked = options or ReadOptions()
+    logs = [read_raw(Path(path)) for path in paths]
+    if len(logs) == 1:
+        return assemble(logs[0], asked)
+    raw = join.join(join.with_columns(logs, asked), " + ".join(log.name for log in logs))
+    return assemble(raw, dataclasses.replace(asked, columns={}))
 
 
 def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:

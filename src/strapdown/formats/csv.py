@@ -50,14 +50,37 @@ def read(path: Path) -> RawLog:
     DataError
         The file is empty, holds a header alone, or is no text.
     """
-    text, findings = _decoded(path)
+    return parse(path.read_bytes(), path.name, (path,))
+
+
+def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
+    """Read the columns of a text table that is a file, or a member of an archive.
+
+    Parameters
+    ----------
+    data : bytes
+    name : str
+        For messages.
+    files : tuple of Path
+        Where it stands.
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        As `read`.
+    """
+    text, findings = decoded(data, name)
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in itertools.takewhile(_is_comment, numbered)]
     numbered = numbered[len(comments) :]
     if not numbered:
         raise DataError(
             "the file holds comments alone" if comments else "the file is empty",
-            file=path.name,
+            file=name,
             remedy="check that the recording was saved and copied whole",
         )
     separator = _separator(numbered[0][1])
@@ -72,17 +95,17 @@ def read(path: Path) -> RawLog:
         if not numbered:
             raise DataError(
                 "a header, and no data under it",
-                file=path.name,
+                file=name,
                 row=head[0],
                 remedy="check that the recording was saved and copied whole",
             )
-    rows, lines = _whole_lines(numbered, len(names), separator, text, path.name, findings)
+    rows, lines = _whole_lines(numbered, len(names), separator, text, name, findings)
     columns = _parse(lines, len(names), separator)
     meta = {m[1]: m[2] for c in comments if (m := _META.match(c))}
     sampling, axes = meta.get("sampling"), meta.get("axes")
     return RawLog(
-        name=path.name,
-        files=(path,),
+        name=name,
+        files=files,
         columns=dict(zip(_unique(names), columns, strict=True)),
         rows=np.array(rows),
         units=units,
@@ -92,21 +115,27 @@ def read(path: Path) -> RawLog:
     )
 
 
-def _decoded(path: Path) -> tuple[str, list[Finding]]:
-    data = path.read_bytes()
+def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
+    """Text of a file, and what was found on the way to it.
+
+    Raises
+    ------
+    DataError
+        It is no text.
+    """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace"), []
     if b"\0" in data[:4096]:
         raise DataError(
             "no text: it holds zero bytes",
-            file=path.name,
+            file=name,
             remedy="give the file its own ending (.mat, .h5, .npz)",
         )
     try:
         return data.decode("utf-8-sig"), []
     except UnicodeDecodeError as error:
         what = f"byte {error.start} is not UTF-8; read as Windows-1252"
-        return data.decode("cp1252", "replace"), [Finding(what, file=path.name)]
+        return data.decode("cp1252", "replace"), [Finding(what, file=name)]
 
 
 def _is_comment(numbered: tuple[int, str]) -> bool:

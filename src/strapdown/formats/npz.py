@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
+from strapdown.formats.npy import read_array
 from strapdown.formats.recording import RawLog
 
 
@@ -58,32 +59,7 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> NDArr
     name = info.filename[:-4]
     refuse_lie(info.file_size, info.compress_size, name, file)
     with archive.open(info) as stream:
-        version = np.lib.format.read_magic(stream)
-        header = (
-            np.lib.format.read_array_header_1_0
-            if version == (1, 0)
-            else np.lib.format.read_array_header_2_0
-        )
-        shape, fortran, dtype = header(stream)
-        if dtype.hasobject:
-            raise DataError(
-                "it holds Python objects, which are not loaded: they could run code",
-                file=file,
-                quantity=name,
-                remedy="save numbers alone",
-            )
-        count = int(np.prod([int(n) for n in shape], dtype=object))
-        stored = info.file_size - stream.tell()
-        if count * dtype.itemsize != stored:
-            raise DataError(
-                f"it claims {count} values of {dtype.itemsize} bytes, and {stored} bytes are "
-                "stored",
-                file=file,
-                quantity=name,
-                remedy="the archive is damaged or made to mislead; get it again from its source",
-            )
-        data = np.frombuffer(stream.read(), dtype=dtype)
-    return data.reshape(shape, order="F" if fortran else "C")
+        return read_array(stream, info.file_size, name, file)
 
 
 def write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:

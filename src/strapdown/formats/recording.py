@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -81,8 +82,8 @@ class RawLog:
     rows : ndarray of int, or None
         Row of the file in which each sample stands, counted from 1; None where sample k stands
         in row k + 1.
-    stated : dict of str to (str, str)
-        For a known recording: column to (quantity, unit).
+    stated : dict of str to (str, str or None)
+        For a known recording: column to (quantity, unit); None where it does not say the unit.
     units : dict of str to str
         Column to unit, where the file states it apart from the name.
     rate : float or None
@@ -97,7 +98,7 @@ class RawLog:
     files: tuple[Path, ...]
     columns: dict[str, NDArray[Any]]
     rows: NDArray[np.int64] | None = None
-    stated: dict[str, tuple[str, str]] = field(default_factory=dict)
+    stated: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
     sampling: str | None = None

@@ -1,0 +1,372 @@
+"""Logs of single sensors, each with its own stamps, joined on the stamps of the gyro."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats.columns import QUANTITIES
+from strapdown.formats.find_columns import Column, find_columns
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.tables import find_gaps
+
+__all__ = ["at_stamps", "clock_of", "in_seconds", "join", "known_only", "with_columns"]
+
+Array = NDArray[np.float64]
+AXES = "xyz"
+TRIADS = ("accel", "mag")
+# A sensor that has values for less of the gyro's samples than this is left out; of more, the
+# gyro's samples outside it are.
+COVERED = 0.9
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Stamps as they stand in a log, and their unit where it is known."""
+
+    ticks: NDArray[Any]
+    unit: str | None
+
+
+def join(
+    logs: Sequence[RawLog],
+    name: str,
+    files: tuple[Path, ...] | None = None,
+    *,
+    rows_of_member: bool = False,
+) -> RawLog:
+    """Bring an accelerometer and a magnetometer to the stamps of the gyro.
+
+    Values between two samples lie on the straight line between them; nothing is extrapolated.
+
+    Parameters
+    ----------
+    logs : sequence of RawLog
+        One of them has the gyro. Their clocks count from the same moment, in whatever unit.
+    name : str
+        Of the whole, for messages.
+    files : tuple of Path, optional
+        Every file that was read; if not given, those of the logs.
+    rows_of_member : bool
+        Call the whole by the gyro's log, which stands in a folder or an archive, because rows
+        are counted in that.
+
+    Returns
+    -------
+    RawLog
+        The rows of the gyro's log, less those for which another sensor has no value; columns
+        are called ``log/column``. What was interpolated, over how far, and what was left out
+        stands in its findings.
+
+    Raises
+    ------
+    DataError
+        No log has a gyro; clocks have no time in common; a value is no number; axes differ.
+    ConfigError
+        Two logs have the same quantity.
+    """
+    found = [find_columns(log, ReadOptions()) for log in logs]
+    k = _with_gyro(logs, found, name)
+    gyro, own = logs[k], found[k]
+    label = _short(gyro)
+    columns = {f"{label}/{n}": c for n, c in gyro.columns.items()}
+    stated: dict[str, tuple[str, str | None]] = {
+        f"{label}/{c.source}": (q, c.unit) for q, c in own.items()
+    }
+    findings = [f for log in logs for f in log.findings]
+    keep = np.ones(len(next(iter(gyro.columns.values()))), dtype=bool)
+    given = {triad: gyro.name for triad in TRIADS if f"{triad}_x" in own}
+    for log, theirs in zip(logs, found, strict=True):
+        if log is gyro:
+            continue
+        for triad in TRIADS:
+            if any(f"{triad}_{a}" not in theirs for a in AXES):
+                continue
+            if triad in given:
+                raise ConfigError(
+                    f"it is in {given[triad]} and in {log.name}",
+                    file=name,
+                    quantity=triad,
+                    remedy="give one of them",
+                )
+            given[triad] = log.name
+            values, inside = _onto(gyro, own, log, theirs, triad, findings)
+            if values is None:
+                continue
+            if f"{triad}_x" in QUANTITIES:
+                keep &= inside
+            for j, a in enumerate(AXES):
+                column = theirs[f"{triad}_{a}"]
+                source = f"{_short(log)}/{column.source}"
+                columns[source] = values[:, j]
+                stated[source] = (f"{triad}_{a}", column.unit)
+    if lost := int((~keep).sum()):
+        findings.append(
+            Finding(
+                f"{lost} of {keep.size} rows left out, for which another sensor has no value: "
+                "nothing is extrapolated",
+                file=gyro.name,
+                row=gyro.row(int(np.argmin(keep))),
+            )
+        )
+    everything = tuple(dict.fromkeys(f for log in logs for f in log.files))
+    rows = np.arange(1, keep.size + 1) if gyro.rows is None else gyro.rows
+    return RawLog(
+        name=gyro.name if rows_of_member else name,
+        files=files or everything,
+        columns={n: c[keep] for n, c in columns.items()},
+        rows=rows[keep],
+        stated=known_only(stated),
+        units={f"{label}/{n}": u for n, u in gyro.units.items()},
+        rate=gyro.rate,
+        sampling=gyro.sampling,
+        axes=_one_of("axes", logs, name),
+        findings=findings,
+    )
+
+
+def known_only(stated: dict[str, tuple[str, str | None]]) -> dict[str, tuple[str, str | None]]:
+    """Leave out the quantities that nothing is made of here."""
+    return {source: said for source, said in stated.items() if said[0] in QUANTITIES}
+
+
+def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
+    """Stamps of a log.
+
+    Raises
+    ------
+    DataError
+        There are none, or they are no numbers.
+    """
+    if "time" not in found:
+        raise DataError(
+            "no column was recognised as time, and logs are joined on it; it has: "
+            f"{', '.join(log.columns)}",
+            file=log.name,
+            quantity="time",
+            remedy="name the column with its unit, as in time_s",
+        )
+    ticks, dated = ticks_of(log, found["time"])
+    return Clock(ticks, "ns" if dated else found["time"].unit)
+
+
+def in_seconds(clock: Clock, origin: Clock) -> Array:
+    """Seconds since the first stamp of another clock; whole ticks are subtracted exactly."""
+    first = origin.ticks[np.argmax(np.isfinite(origin.ticks.astype(np.float64)))]
+    ours, theirs = TIME_UNITS[clock.unit or "s"], TIME_UNITS[origin.unit or "s"]
+    if clock.unit == origin.unit:
+        return np.asarray((_wide(clock.ticks) - _wide(first)).astype(np.float64) * ours)
+    return np.asarray(clock.ticks.astype(np.float64) * ours - float(first) * theirs)
+
+
+def at_stamps(time: Array, own: Array, values: Array) -> tuple[Array, NDArray[np.bool_], float]:
+    """Values on the straight line between the samples on each side of a stamp.
+
+    Parameters
+    ----------
+    time : ndarray, (n,)
+        Where values are wanted.
+    own : ndarray, (m,)
+        Increasing stamps of the samples.
+    values : ndarray, (m, 3)
+
+    Returns
+    -------
+    values : ndarray, (n, 3)
+        NaN before the first sample and after the last.
+    inside : ndarray of bool, (n,)
+    distance : float
+        The largest from a stamp inside to the sample nearest to it.
+    """
+    inside = (time >= own[0]) & (time <= own[-1])
+    out = np.column_stack(
+        [np.interp(time, own, values[:, k], left=np.nan, right=np.nan) for k in range(3)]
+    )
+    after = np.clip(np.searchsorted(own, time[inside]), 1, max(own.size - 1, 1))
+    near = np.minimum(
+        np.abs(time[inside] - own[after - 1]),
+        np.abs(own[np.minimum(after, own.size - 1)] - time[inside]),
+    )
+    return out, inside, float(near.max(initial=0.0))
+
+
+def _with_gyro(logs: Sequence[RawLog], found: Sequence[dict[str, Column]], name: str) -> int:
+    have = [k for k, f in enumerate(found) if all(f"gyro_{a}" in f for a in AXES)]
+    if len(have) == 1:
+        return have[0]
+    if have:
+        raise ConfigError(
+            f"{' and '.join(logs[k].name for k in have)} have one each",
+            file=name,
+            quantity="gyro",
+            remedy="give one of them",
+        )
+    held = "; ".join(f"{_short(log)} ({', '.join(log.columns)})" for log in logs)
+    raise DataError(
+        f"no gyroscope in it; it holds: {held or 'no sensor that is read here'}",
+        file=name,
+        quantity="gyro",
+        remedy="record with the gyroscope switched on, and export it with the rest",
+    )
+
+
+def _onto(
+    gyro: RawLog,
+    own: dict[str, Column],
+    log: RawLog,
+    theirs: dict[str, Column],
+    triad: str,
+    findings: list[Finding],
+) -> tuple[Array | None, NDArray[np.bool_]]:
+    """A triad at the stamps of the gyro, and where it has values."""
+    values = np.column_stack(
+        [numbers(log, theirs[f"{triad}_{a}"], f"{triad}_{a}").astype(np.float64) for a in AXES]
+    )
+    origin, clock = clock_of(gyro, own), clock_of(log, theirs)
+    if (origin.unit is None) != (clock.unit is None):
+        mute = gyro if origin.unit is None else log
+        raise DataError(
+            "its stamps have no unit, and those of the other sensors have",
+            file=mute.name,
+            quantity="time",
+            remedy="name its column of stamps with the unit, as in time_s",
+        )
+    time, stamps = in_seconds(origin, origin), in_seconds(clock, origin)
+    known = np.isfinite(time)
+    stamps, values = _in_order(stamps, values, log.name, triad, findings)
+    if stamps.size == time.size and np.array_equal(stamps, time):
+        return values, np.ones(time.size, dtype=bool)
+    if not stamps.size or not known.any():
+        _leave_out(log.name, triad, "it holds no number", findings)
+        return None, known
+    out, inside, distance = at_stamps(time, stamps, values)
+    if not inside.any():
+        start = np.nanmin(time)
+        raise DataError(
+            f"its stamps run from {stamps[0] - start:.6g} to {stamps[-1] - start:.6g} s after the "
+            f"first of the gyro, whose log is {np.nanmax(time) - start:.6g} s long: the clocks do "
+            "not count from the same moment",
+            file=log.name,
+            quantity="time",
+            remedy="export all sensors on one clock, or give the gyro's file alone",
+        )
+    covered = int(inside.sum())
+    if covered < COVERED * known.sum():
+        what = f"it has values for {covered} of the {int(known.sum())} samples of the gyro"
+        _leave_out(log.name, triad, what, findings)
+        return None, known
+    if distance > 0:
+        findings.append(
+            Finding(
+                f"interpolated to {covered} stamps of the gyro, which are not its own; the "
+                f"farthest is {distance:.3g} s from the sample nearest to it",
+                file=log.name,
+                quantity=triad,
+            )
+        )
+    if gaps := find_gaps(stamps):
+        longest = max(gaps, key=lambda g: g.length)
+        findings.append(
+            Finding(
+                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in it, the longest "
+                f"{longest.length:.3g} s; its values in them are straight lines",
+                file=log.name,
+                quantity=triad,
+                remedy="do not level on them" if triad == "accel" else None,
+            )
+        )
+    # A stamp of the gyro that is no number is refused, or repaired, with the gyro's own.
+    return np.where(known[:, None], out, 0.0), inside | ~known
+
+
+def _leave_out(name: str, triad: str, what: str, findings: list[Finding]) -> None:
+    findings.append(Finding(f"left out: {what}", file=name, quantity=triad))
+
+
+def _in_order(
+    stamps: Array, values: Array, name: str, triad: str, findings: list[Finding]
+) -> tuple[Array, Array]:
+    """Samples with increasing stamps, without those that are no numbers."""
+    use = np.isfinite(stamps) & np.isfinite(values).all(axis=1)
+    order = np.flatnonzero(use)[np.argsort(stamps[use], kind="stable")]
+    order = order[np.diff(stamps[order], prepend=-np.inf) > 0]
+    if lost := stamps.size - order.size:
+        findings.append(
+            Finding(
+                f"{lost} of {stamps.size} samples not used: no number in them, or a stamp that "
+                "another has",
+                file=name,
+                quantity=triad,
+            )
+        )
+    return stamps[order], values[order]
+
+
+def _one_of(what: str, logs: Sequence[RawLog], name: str) -> str | None:
+    said = {log.axes: log.name for log in logs if log.axes}
+    if len(said) > 1:
+        raise DataError(
+            "; ".join(f"{file} says {axes}" for axes, file in said.items()),
+            file=name,
+            quantity=what,
+            remedy="turn one of them into the axes of the other",
+        )
+    return next(iter(said), None)
+
+
+def _short(log: RawLog) -> str:
+    return PurePosixPath(log.name).name
+
+
+def _wide(ticks: Any) -> Any:
+    """Whole numbers of the widest kind, so that a difference does not overflow."""
+    array = np.asarray(ticks)
+    return array.astype(np.int64) if array.dtype.kind in "iub" else array.astype(np.float64)
+
+
+def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
+    """Logs with the columns that the user named, as if the logs stated them.
+
+    Parameters
+    ----------
+    logs : sequence of RawLog
+    options : ReadOptions
+        A column is named as it stands in its log, or as ``log/column``.
+
+    Returns
+    -------
+    list of RawLog
+
+    Raises
+    ------
+    ConfigError
+        A column that is in no log was named.
+    """
+    asked: list[dict[str, str]] = [{} for _ in logs]
+    for quantity, source in options.columns.items():
+        for log, its in zip(logs, asked, strict=True):
+            plain = source.removeprefix(f"{_short(log)}/")
+            if plain in log.columns:
+                its[quantity] = plain
+        if not any(quantity in its for its in asked):
+            raise ConfigError(
+                f"no log has a column '{source}'",
+                file=", ".join(log.name for log in logs),
+                quantity=f"--columns {quantity}",
+                remedy=f"they have: {'; '.join(', '.join(log.columns) for log in logs)}",
+            )
+    out = []
+    for log, its in zip(logs, asked, strict=True):
+        found = find_columns(log, dataclasses.replace(options, columns=its))
+        stated = {c.source: (q, c.unit) for q, c in found.items()}
+        out.append(dataclasses.replace(log, stated=stated) if its else log)
+    return out

@@ -1,0 +1,155 @@
+"""Files of a folder, or members of a zip archive, read alike."""
+
+from __future__ import annotations
+
+import codecs
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from strapdown.exceptions import DataError
+from strapdown.formats.arrays import refuse_lie
+
+__all__ = ["Member", "is_container", "members_of", "peek"]
+
+HEAD = 4096  # bytes, of which the first line is told
+
+
+@dataclass(frozen=True)
+class Member:
+    """A file of a folder, or a member of an archive.
+
+    Attributes
+    ----------
+    name : str
+        Path inside, with slashes.
+    label : str
+        For messages: what was given and the name.
+    file : Path
+        The file on disk that holds it.
+    archived : bool
+    """
+
+    name: str
+    label: str
+    file: Path
+    archived: bool
+
+    @property
+    def stem(self) -> str:
+        """Last part of the name without its ending."""
+        return PurePosixPath(self.name).stem
+
+    @property
+    def suffix(self) -> str:
+        """Ending of the name, in small letters."""
+        return PurePosixPath(self.name).suffix.lower()
+
+    def read(self) -> bytes:
+        """Whole content.
+
+        Raises
+        ------
+        DataError
+            It cannot be read, or claims more than is stored.
+        """
+        return self._bytes(-1)
+
+    def first_line(self) -> str:
+        """First line that is not blank, or as much of it as `HEAD` bytes hold.
+
+        Raises
+        ------
+        DataError
+            As `read`.
+        """
+        data = self._bytes(HEAD)
+        wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+        text = data.decode("utf-16" if wide else "utf-8-sig", "replace")
+        return next((line for line in text.splitlines() if line.strip()), "")
+
+    def _bytes(self, count: int) -> bytes:
+        try:
+            if not self.archived:
+                with self.file.open("rb") as stream:
+                    return stream.read(count)
+            with zipfile.ZipFile(self.file) as archive:
+                info = archive.getinfo(self.name)
+                refuse_lie(info.file_size, info.compress_size, self.name, self.file.name)
+                with archive.open(info) as member:
+                    return member.read(count)
+        except DataError:
+            raise
+        except Exception as error:  # a damaged archive can break any of the decoders
+            raise DataError(
+                f"it cannot be read: {error or type(error).__name__}",
+                file=self.label,
+                remedy="export the recording again, or copy it again",
+            ) from None
+
+
+def is_container(path: Path) -> bool:
+    """Tell whether this is a folder or is called a zip archive."""
+    return path.is_dir() or (path.is_file() and path.suffix.lower() == ".zip")
+
+
+def members_of(path: Path) -> list[Member]:
+    """List the files of a folder and of its folder ``meta``, or the members of an archive.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    list of Member
+        In the order of their names; what a Mac adds to archives is left out.
+
+    Raises
+    ------
+    DataError
+        The archive is damaged.
+    """
+    whole = path.resolve().name
+    if path.is_dir():
+        found = sorted(p for f in (path, path / "meta") if f.is_dir() for p in f.iterdir())
+        return [
+            Member(name, f"{whole}/{name}", p, False)
+            for p in found
+            if p.is_file() and not (name := p.relative_to(path).as_posix()).startswith(".")
+        ]
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = sorted({i.filename for i in archive.infolist() if not i.is_dir()})
+    except Exception as error:  # zipfile raises more than BadZipFile on damaged archives
+        raise DataError(
+            f"the archive cannot be read: {error or type(error).__name__}",
+            file=whole,
+            remedy="export the recording again, or copy it again",
+        ) from None
+    return [
+        Member(n, f"{whole}/{n}", path, True)
+        for n in names
+        if not any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(n).parts)
+    ]
+
+
+def peek(path: Path) -> list[Member]:
+    """Members, or none where it is no container or cannot be read; for telling formats apart."""
+    try:
+        return members_of(path) if is_container(path) else []
+    except (DataError, OSError):
+        return []
+
+
+def first_line(member: Member) -> str:
+    """First line of a member, or nothing where it cannot be read; for telling formats apart."""
+    try:
+        return member.first_line()
+    except DataError:
+        return ""
+
+
+def file_member(path: Path) -> Member:
+    """A file on its own as a member."""
+    return Member(path.name, path.name, path, False)

@@ -1,0 +1,104 @@
+"""Single NumPy arrays, in files or in archives; nothing in them is ever executed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+
+MAGIC = b"\x93NUMPY"
+
+
+def is_npy(path: Path) -> bool:
+    """Tell by its first bytes whether a file is a NumPy array."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC
+
+
+def load(path: Path, label: str) -> NDArray[Any]:
+    """Load the array of a file.
+
+    Parameters
+    ----------
+    path : Path
+    label : str
+        For messages.
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    DataError
+        It is damaged, claims more than it holds, or holds Python objects.
+    """
+    try:
+        with path.open("rb") as stream:
+            return read_array(stream, path.stat().st_size, None, label)
+    except DataError:
+        raise
+    except Exception as error:  # a damaged header can break the parser that NumPy uses for it
+        raise DataError(
+            f"the array cannot be read: {error or type(error).__name__}",
+            file=label,
+            remedy="copy it again; it must come from numpy.save, with numbers alone",
+        ) from None
+
+
+def read_array(stream: BinaryIO | Any, size: int, name: str | None, file: str) -> NDArray[Any]:
+    """Read an array from a stream.
+
+    Parameters
+    ----------
+    stream : file object
+    size : int, bytes
+        What is stored, header included.
+    name : str or None
+        Of the array, for messages.
+    file : str
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    DataError
+        It claims another size than is stored, or holds Python objects.
+    ValueError
+        The header is damaged.
+    """
+    version = np.lib.format.read_magic(stream)
+    header = (
+        np.lib.format.read_array_header_1_0
+        if version == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
+    shape, fortran, dtype = header(stream)
+    if dtype.hasobject:
+        raise DataError(
+            "it holds Python objects, which are not loaded: they could run code",
+            file=file,
+            quantity=name,
+            remedy="save numbers alone",
+        )
+    count = int(np.prod([int(n) for n in shape], dtype=object))
+    stored = size - stream.tell()
+    if count * dtype.itemsize != stored:
+        raise DataError(
+            f"it claims {count} values of {dtype.itemsize} bytes, and {stored} bytes are stored",
+            file=file,
+            quantity=name,
+            remedy="the archive is damaged or made to mislead; get it again from its source"
+            if name
+            else "the file is cut or damaged; copy it again",
+        )
+    data = np.frombuffer(stream.read(), dtype=dtype)
+    return data.reshape(shape, order="F" if fortran else "C")

@@ -1,0 +1,118 @@
+"""Parquet tables: columns, lists of three, structures; units where fields state them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.formats.arrays import raw_log, refuse_lie
+from strapdown.formats.recording import RawLog
+
+SUFFIXES = (".parquet", ".pq")
+MAGIC = b"PAR1"
+UNITS = (b"unit", b"units")
+
+
+def detect(path: Path) -> bool:
+    """Tell by its first bytes, or by its name."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        return stream.read(len(MAGIC)) == MAGIC or path.suffix.lower() in SUFFIXES
+
+
+def read(path: Path) -> RawLog:
+    """Read the numeric columns of a table.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Columns of structures are called ``structure.field``, those of lists of one length
+        ``list[0]``, ``list[1]`` …; missing values are NaN. The metadata ``unit`` or ``units``
+        of a field and ``sampling``, ``axes`` and a rate among those of the table are understood.
+
+    Raises
+    ------
+    DataError
+        It is damaged, or claims far more than it holds.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with pq.ParquetFile(path) as file:
+            rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
+            refuse_lie(rows * width * 8, path.stat().st_size, "table", path.name)
+            table = file.read()
+        while any(pa.types.is_struct(field.type) for field in table.schema):
+            table = table.flatten()
+        arrays = {n: _array(table.column(k)) for k, n in enumerate(table.column_names)}
+    except DataError:
+        raise
+    except Exception as error:  # a damaged file can break any of the decoders it goes through
+        raise DataError(
+            f"the table cannot be read: {str(error).splitlines()[0] if str(error) else 'damaged'}",
+            file=path.name,
+            remedy="the file is cut or damaged; copy it again",
+        ) from None
+    meta = {_text(k): _text(v) for k, v in (table.schema.metadata or {}).items()}
+    return raw_log(path, {n: a for n, a in arrays.items() if a is not None}, _units(table), meta)
+
+
+def _units(table: Any) -> dict[str, str]:
+    found = {}
+    for field in table.schema:
+        for key in UNITS:
+            if key in (field.metadata or {}):
+                found[field.name] = _text(field.metadata[key])
+    return found
+
+
+def _array(column: Any) -> NDArray[Any] | None:
+    """Numbers, dates, or rows of numbers; None for what is neither."""
+    import pyarrow as pa
+
+    kind = column.type
+    if pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
+        return _rows(column)
+    if pa.types.is_dictionary(kind):
+        return _array(column.cast(kind.value_type))
+    if pa.types.is_decimal(kind):
+        column, kind = column.cast(pa.float64()), pa.float64()
+    if pa.types.is_integer(kind) and column.null_count:
+        column, kind = column.cast(pa.float64()), pa.float64()
+    if pa.types.is_timestamp(kind) and not column.null_count:
+        dates: NDArray[Any] = column.cast(pa.timestamp("ns")).to_numpy()
+        return dates
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+        values: NDArray[Any] = column.to_numpy()
+        return values
+    return None
+
+
+def _rows(column: Any) -> NDArray[Any] | None:
+    """Lists of one length as rows of an array; a missing list is a row of NaN."""
+    import pyarrow as pa
+
+    if not (
+        pa.types.is_integer(column.type.value_type) or pa.types.is_floating(column.type.value_type)
+    ):
+        return None
+    lists = column.to_pylist()
+    widths = {len(row) for row in lists if row is not None}
+    if len(widths) != 1:
+        return None
+    empty = [np.nan] * widths.pop()
+    return np.array([empty if row is None else row for row in lists], dtype=np.float64)
+
+
+def _text(value: bytes) -> str:
+    return value.decode("utf-8", "replace")

@@ -1,0 +1,136 @@
+"""What logs of phones have in common: axes, and acceleration that was taken apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats.find_columns import Column
+from strapdown.formats.join import Clock, at_stamps, in_seconds
+from strapdown.formats.numbers import numbers
+from strapdown.formats.recording import RawLog
+
+# The phone's own axes point right, to the top edge, and out of the screen. It is taken to lie on
+# its back with the top edge forward: forward is y, right is x, down is -z.
+AXES = "y,x,-z"
+XYZ = "xyz"
+
+
+def sensor_log(
+    name: str,
+    file: Path,
+    columns: Mapping[str, NDArray[Any]],
+    triad: str,
+    unit: str | None,
+    *,
+    time: tuple[str, str],
+    xyz: tuple[str, str, str] = ("x", "y", "z"),
+    rows: NDArray[np.int64] | None = None,
+    findings: list[Finding] | None = None,
+) -> RawLog:
+    """The log of one sensor of a phone.
+
+    Parameters
+    ----------
+    name : str
+        For messages.
+    file : Path
+    columns : mapping of str to ndarray, (n,)
+    triad : str
+        ``gyro``, ``accel`` or ``mag``.
+    unit : str or None
+        None where it is not known.
+    time : (str, str)
+        Column of the stamps and their unit.
+    xyz : (str, str, str)
+        Columns of the three axes.
+    rows : ndarray of int, optional
+    findings : list of Finding, optional
+
+    Returns
+    -------
+    RawLog
+    """
+    return RawLog(
+        name=name,
+        files=(file,),
+        columns=dict(columns),
+        rows=rows,
+        stated={time[0]: ("time", time[1])}
+        | {column: (f"{triad}_{axis}", unit) for column, axis in zip(xyz, XYZ, strict=True)},
+        axes=AXES,
+        findings=findings or [],
+    )
+
+
+def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
+    """Specific force from acceleration without gravity and gravity, each in the phone's own sense.
+
+    Parameters
+    ----------
+    linear, gravity : RawLog
+        As `sensor_log` makes them, of the triad ``accel``, in one unit.
+
+    Returns
+    -------
+    RawLog
+        The sum, at the stamps of `linear` at which there is a gravity.
+
+    Raises
+    ------
+    DataError
+        The two have no time in common, or a value is no number.
+    """
+    clocks, values = [], []
+    for log in (linear, gravity):
+        columns = {q: Column(s, u, "") for s, (q, u) in log.stated.items()}
+        clocks.append(Clock(numbers(log, columns["time"], "time"), columns["time"].unit))
+        found = [numbers(log, columns[f"accel_{a}"], f"accel_{a}") for a in XYZ]
+        values.append(np.column_stack(found).astype(np.float64))
+    time, own = (in_seconds(clock, clocks[0]) for clock in clocks)
+    if time.shape == own.shape and np.array_equal(time, own):
+        inside, distance, at = np.ones(time.size, dtype=bool), 0.0, values[1]
+    else:
+        use = np.isfinite(own) & np.isfinite(values[1]).all(axis=1)
+        order = np.flatnonzero(use)[np.argsort(own[use], kind="stable")]
+        if not order.size:
+            raise DataError(
+                "it holds no number",
+                file=gravity.name,
+                quantity="accel",
+                remedy="give the gyro's file alone",
+            )
+        at, inside, distance = at_stamps(time, own[order], values[1][order])
+    if not inside.any():
+        raise DataError(
+            f"it and {linear.name} have no time in common",
+            file=gravity.name,
+            quantity="time",
+            remedy="export both sensors of one recording, or give the gyro's file alone",
+        )
+    what = f"specific force is the sum of {linear.name} and {gravity.name}"
+    if distance > 0:
+        what += f", interpolated to the stamps of the first over at most {distance:.3g} s"
+    total = (values[0] + at)[inside]
+    rows = np.arange(1, time.size + 1) if linear.rows is None else linear.rows
+    time_column = next(s for s, (q, _) in linear.stated.items() if q == "time")
+    sources = [next(s for s, (q, _) in linear.stated.items() if q == f"accel_{a}") for a in XYZ]
+    return RawLog(
+        name=linear.name,
+        files=tuple(dict.fromkeys([*linear.files, *gravity.files])),
+        columns={time_column: linear.columns[time_column][inside]}
+        | {source: total[:, k] for k, source in enumerate(sources)},
+        rows=rows[inside],
+        stated=linear.stated,
+        axes=linear.axes,
+        findings=[
+            *linear.findings,
+            *gravity.findings,
+            Finding(what, file=linear.name, quantity="accel"),
+        ],
+    )

@@ -1,0 +1,138 @@
+"""phyphox (RWTH Aachen): its CSV export, as a file or as a zip or folder with one CSV a sensor.
+
+Columns say quantity and unit, as in ``"Time (s)","Gyroscope x (rad/s)"``; separator and decimal
+sign are as chosen at the export. ``meta/time.csv`` has the starts and pauses. Units and the
+meaning of the sensors are those of https://github.com/phyphox/phyphox-docs,
+docs/file-format/input.md: gyroscope in rad/s, accelerometer in m/s² with gravity (9.81 at rest),
+linear acceleration without it, magnetic field in µT; axes are Android's.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.join import join
+from strapdown.formats.members import Member, file_member, first_line, members_of, peek
+from strapdown.formats.phones import AXES, XYZ
+from strapdown.formats.recording import RawLog
+
+_TIME = re.compile(r"time \(s\)", re.I)
+_TRIADS = {
+    "gyro": (re.compile(r"gyroscope ([xyz]) \(rad/s\)", re.I), "rad/s"),
+    "accel": (re.compile(r"acceleration ([xyz]) \(m/s(?:\^2|²|2)\)", re.I), "m/s2"),
+    "mag": (re.compile(r"magnetic field ([xyz]) \([µμu]T\)", re.I), "uT"),
+}
+_LINEAR = re.compile(r"linear acceleration ([xyz]) \(m/s(?:\^2|²|2)\)", re.I)
+_EVENTS = "meta/time.csv"
+
+
+def detect(path: Path) -> bool:
+    """Tell by a header that names stamps and a sensor as phyphox does."""
+    members = peek(path)
+    if path.is_file() and path.suffix.lower() in csv.SUFFIXES:
+        members = [file_member(path)]
+    return any(_sensors(m) for m in members)
+
+
+def read(path: Path) -> RawLog:
+    """Read gyro, specific force and magnetic field, and join them on the stamps of the gyro.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        A file is damaged, or there is no gyroscope.
+    """
+    name = path.resolve().name
+    members = [file_member(path)] if path.is_file() else []
+    if path.is_dir() or path.suffix.lower() == ".zip":
+        members = members_of(path)
+    logs, files, findings = [], [], []
+    for member in members:
+        if member.name.endswith(_EVENTS):
+            files.append(member.file)
+            findings += _pauses(member)
+        elif _sensors(member):
+            files.append(member.file)
+            logs.append(_log(member))
+    unique = tuple(dict.fromkeys(files))
+    raw = join(_mention_linear(logs), name, unique, rows_of_member=True)
+    raw.findings[:0] = findings
+    return raw
+
+
+def _sensors(member: Member) -> bool:
+    if member.suffix not in csv.SUFFIXES:
+        return False
+    fields = [f.strip().strip('"') for f in re.split(r"[\t;,]", first_line(member))]
+    patterns = [p for p, _ in _TRIADS.values()] + [_LINEAR]
+    return any(_TIME.fullmatch(f) for f in fields) and any(
+        p.fullmatch(f) for f in fields for p in patterns
+    )
+
+
+def _log(member: Member) -> RawLog:
+    raw = csv.parse(member.read(), member.label, (member.file,))
+    stated: dict[str, tuple[str, str | None]] = {}
+    for column in raw.columns:
+        if _TIME.fullmatch(column):
+            stated[column] = ("time", "s")
+        for triad, (pattern, unit) in _TRIADS.items():
+            if match := pattern.fullmatch(column):
+                stated[column] = (f"{triad}_{match[1].lower()}", unit)
+    raw.stated, raw.axes = stated, AXES
+    return raw
+
+
+def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
+    """Say of tables that hold none of the three that they are not used."""
+    wanted = {f"{triad}_{a}" for triad in _TRIADS for a in XYZ}
+    for log in logs:
+        if not any(q in wanted for q, _ in log.stated.values()):
+            log.findings.append(
+                Finding(
+                    "left out: it is acceleration without gravity",
+                    file=log.name,
+                    quantity="accel",
+                    remedy="record 'Acceleration (with g)' for levelling",
+                )
+            )
+    return logs
+
+
+def _pauses(member: Member) -> list[Finding]:
+    """Pauses of the recording, in which its clock stood still."""
+    try:
+        table = csv.parse(member.read(), member.label, (member.file,)).columns
+        events = [str(e).strip('"') for e in table["event"]]
+        clock = np.asarray(table["experiment time"], dtype=np.float64)
+        wall = np.asarray(table["system time"], dtype=np.float64)
+    except (DataError, KeyError, ValueError, TypeError):
+        return [Finding("left out: it has no starts and pauses", file=member.label)]
+    out = []
+    for k in range(1, len(events)):
+        if events[k - 1] == "PAUSE" and events[k] == "START":
+            out.append(
+                Finding(
+                    f"the recording stood still for {wall[k] - wall[k - 1]:.3g} s at "
+                    f"{clock[k]:.6g} s of its own clock, which does not count that: what was "
+                    "turned then is not in it",
+                    file=member.label,
+                    row=k + 2,
+                    quantity="time",
+                    remedy="split the log there, or put a reference point on each side",
+                )
+            )
+    return out

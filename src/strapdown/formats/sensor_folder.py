@@ -1,0 +1,78 @@
+"""Folders and zip archives of one text table a sensor, as ``gyro.csv`` and ``accel.csv``."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+from strapdown.exceptions import DataError
+from strapdown.formats import csv
+from strapdown.formats.columns import read_name
+from strapdown.formats.find_columns import find_columns
+from strapdown.formats.join import join
+from strapdown.formats.members import Member, members_of, peek
+from strapdown.formats.recording import RawLog, ReadOptions
+
+_TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
+_AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
+
+
+def detect(path: Path) -> bool:
+    """Tell by the names of its tables whether one is a gyro's; an archive is always taken."""
+    if path.is_file():
+        return path.suffix.lower() == ".zip"
+    return any(_triad(m) == "gyro" for m in peek(path))
+
+
+def read(path: Path) -> RawLog:
+    """Read each sensor's table, and join them on the stamps of the gyro.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Columns that are called x, y, z belong to the sensor that their table is named after.
+
+    Raises
+    ------
+    DataError
+        The archive or a table is damaged, or there is no gyro.
+    """
+    name = path.resolve().name
+    members = members_of(path)
+    tables = [m for m in members if _triad(m)]
+    if not any(_triad(m) == "gyro" for m in tables):
+        held = ", ".join(m.name for m in members[:6]) + (" …" if len(members) > 6 else "")
+        raise DataError(
+            f"no table of a gyro in it; it holds: {held or 'nothing'}",
+            file=name,
+            quantity="gyro",
+            remedy="unpack it and give the log in it, or call the tables gyro.csv, accel.csv",
+        )
+    return join([_log(m) for m in tables], name, rows_of_member=True)
+
+
+def _triad(member: Member) -> str | None:
+    if member.suffix not in csv.SUFFIXES:
+        return None
+    said = read_name(member.stem).quantity or member.stem.lower()
+    return _TRIADS.get(said)
+
+
+def _log(member: Member) -> RawLog:
+    raw = csv.parse(member.read(), member.label, (member.file,))
+    triad = _triad(member)
+    plain = {n: m[1].lower() for n in raw.columns if (m := _AXIS.fullmatch(n.strip()))}
+    if sorted(plain.values()) != ["x", "y", "z"]:
+        return raw
+    stated: dict[str, tuple[str, str | None]] = {
+        c.source: (q, c.unit) for q, c in find_columns(raw, ReadOptions()).items()
+    }
+    for column, axis in plain.items():
+        unit = read_name(column).unit or read_name(member.stem).unit
+        stated[column] = (f"{triad}_{axis}", unit)
+    return dataclasses.replace(raw, stated=stated)

@@ -1,0 +1,298 @@
+"""Sensor Logger (Kelvin Choi; iOS and Android): zip, folder, single CSV, or JSON.
+
+The layout, units and axes are those of its documentation,
+https://github.com/tszheichoi/awesome-sensor-logger: README.md (files, stamps, JSON, metadata),
+UNITS.md, COORDINATES.md and CROSSPLATFORM.md. What matters here:
+
+- ``time`` counts nanoseconds since 1970, ``seconds_elapsed`` seconds since the start; axes are
+  written in the order z, y, x; each sensor has stamps of its own.
+- ``Accelerometer`` is without gravity. ``TotalAcceleration``, with it, is written on Android
+  alone; elsewhere it is the sum of ``Accelerometer`` and ``Gravity``.
+- On iOS these have the opposite sign: gravity of a phone lying on its back is -z, on Android +z.
+  With "Standardise Units & Frames" (1.29 and later; ``standardisation`` in Metadata) iOS follows
+  Android.
+- ``AccelerometerUncalibrated`` is with gravity; on iOS in g unless standardised, else in m/s².
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.join import join
+from strapdown.formats.members import Member, file_member, first_line, members_of, peek
+from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.recording import RawLog
+
+TIME = ("time", "ns")
+GYROS = ("Gyroscope", "GyroscopeUncalibrated")
+ACCELS = ("TotalAcceleration", "Accelerometer", "Gravity", "AccelerometerUncalibrated")
+MAG = "Magnetometer"
+SENSORS = (*GYROS, *ACCELS, MAG)
+METADATA = "Metadata"
+# A second download of a file is called "Gyroscope (1)" or "Gyroscope-2".
+_COPY = re.compile(r"[\s_-]*(\(\d+\)|\d+)$")
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """Samples of one sensor as the recording holds them."""
+
+    name: str
+    file: Path
+    columns: dict[str, NDArray[Any]]
+    rows: NDArray[np.int64] | None
+    findings: list[Finding]
+
+
+def detect(path: Path) -> bool:
+    """Tell by the header of a sensor's file, or by the first record of a JSON file."""
+    if path.is_file() and path.suffix.lower() == ".json":
+        with path.open("rb") as stream:
+            head = stream.read(4096).decode("utf-8-sig", "replace")
+        return head.lstrip().startswith("[") and '"sensor"' in head
+    members = peek(path)
+    if path.is_file() and path.suffix.lower() == ".csv":
+        members = [file_member(path)]
+    return any(_sensor(m) in SENSORS and _has_header(m) for m in members)
+
+
+def read(path: Path) -> RawLog:
+    """Read gyro, specific force and magnetic field, and join them on the stamps of the gyro.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        A file is damaged, or there is no gyroscope.
+    """
+    name = path.resolve().name
+    if path.suffix.lower() == ".json" and path.is_file():
+        sensors, meta = _from_json(path)
+        files: tuple[Path, ...] = (path,)
+    else:
+        members = members_of(path) if path.is_dir() or path.suffix.lower() == ".zip" else []
+        sensors, meta, files = _from_members(members or [file_member(path)])
+    if not any(kind in sensors for kind in GYROS):
+        raise DataError(
+            f"no gyroscope in it; of what is read here it holds: {', '.join(sensors) or 'nothing'}",
+            file=name,
+            quantity="gyro",
+            remedy="record with the gyroscope switched on; give the folder or archive, and not a "
+            "table of it",
+        )
+    findings: list[Finding] = []
+    logs = [_gyro(sensors, findings), *_force(sensors, meta, name, findings)]
+    # The uncalibrated field has the phone's own in it.
+    if MAG in sensors:
+        logs.append(_log(sensors[MAG], "mag", "uT"))
+    raw = join(logs, name, files, rows_of_member=path.suffix.lower() != ".json")
+    raw.findings[:0] = findings
+    return raw
+
+
+def _sensor(member: Member) -> str:
+    return _COPY.sub("", member.stem) if member.suffix == ".csv" else ""
+
+
+def _has_header(member: Member) -> bool:
+    fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
+    return {"time", "seconds_elapsed", "x", "y", "z"} <= fields
+
+
+def _from_members(
+    members: list[Member],
+) -> tuple[dict[str, Sensor], dict[str, str], tuple[Path, ...]]:
+    sensors: dict[str, Sensor] = {}
+    meta: dict[str, str] = {}
+    files = []
+    for member in members:
+        kind = _sensor(member)
+        if kind not in SENSORS and kind.lower() != METADATA.lower():
+            continue
+        if kind in sensors:
+            raise DataError(
+                f"it and {sensors[kind].name} are both {kind}",
+                file=member.label,
+                remedy="keep one recording in the folder or archive",
+            )
+        data = member.read()
+        files.append(member.file)
+        if kind not in SENSORS:
+            table = csv.parse(data, member.label, (member.file,)).columns
+            meta = {n.strip().lower(): str(c[0]) for n, c in table.items()}
+            continue
+        table_of = csv.parse(data, member.label, (member.file,))
+        _require(member.label, table_of.columns)
+        sensors[kind] = Sensor(
+            member.label, member.file, table_of.columns, table_of.rows, table_of.findings
+        )
+    return sensors, meta, tuple(dict.fromkeys(files))
+
+
+def _require(name: str, columns: dict[str, NDArray[Any]]) -> None:
+    missing = [n for n in ("time", "x", "y", "z") if n not in columns]
+    if missing:
+        raise DataError(
+            f"no column {', '.join(missing)}; it has: {', '.join(columns) or 'none'}",
+            file=name,
+            remedy="export the recording again",
+        )
+
+
+def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
+    text, found = csv.decoded(path.read_bytes(), path.name)
+    try:
+        records = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise DataError(
+            f"no JSON from there on: {error.msg}",
+            file=path.name,
+            row=error.lineno,
+            remedy="the file is cut or was edited; export the recording again",
+        ) from None
+    except RecursionError:
+        records = None
+    if not isinstance(records, list) or not all(isinstance(r, dict) for r in records):
+        raise DataError(
+            "it is not a list of records",
+            file=path.name,
+            remedy="export the recording again as JSON",
+        )
+    groups: dict[str, list[int]] = {}
+    meta: dict[str, str] = {}
+    for k, record in enumerate(records):
+        kind = str(record.get("sensor", ""))
+        if kind == METADATA:
+            meta |= {str(n).lower(): str(v) for n, v in record.items()}
+        elif kind in SENSORS:
+            groups.setdefault(kind, []).append(k)
+    sensors = {}
+    for kind, where in groups.items():
+        columns = {n: _values(path, records, where, kind, n) for n in ("time", "x", "y", "z")}
+        rows = np.array(where) + 1
+        sensors[kind] = Sensor(f"{path.name}/{kind}", path, columns, rows, found)
+        found = []
+    return sensors, meta
+
+
+def _values(
+    path: Path, records: list[dict[str, Any]], where: list[int], kind: str, name: str
+) -> NDArray[Any]:
+    """Values of one field, which are written as text; stamps stay whole numbers."""
+    out: list[float] = []
+    for k in where:
+        value = records[k].get(name)
+        try:
+            out.append(int(value) if name == "time" else float(value))  # type: ignore[arg-type]
+        except (TypeError, ValueError, OverflowError):
+            raise DataError(
+                f"'{value}' is not a number (field '{name}' of that record)",
+                file=f"{path.name}/{kind}",
+                row=k + 1,
+                quantity=name,
+                remedy="correct or delete that record; rows count the records of the file",
+            ) from None
+    try:
+        return np.array(out, dtype=np.int64 if name == "time" else np.float64)
+    except OverflowError:
+        raise DataError(
+            "a stamp has more than 64 bits",
+            file=f"{path.name}/{kind}",
+            quantity="time",
+            remedy="export the recording again",
+        ) from None
+
+
+def _log(sensor: Sensor, triad: str, unit: str | None) -> RawLog:
+    return sensor_log(
+        sensor.name,
+        sensor.file,
+        sensor.columns,
+        triad,
+        unit,
+        time=TIME,
+        rows=sensor.rows,
+        findings=sensor.findings,
+    )
+
+
+def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
+    kind = next(k for k in GYROS if k in sensors)
+    if kind == GYROS[1]:
+        findings.append(
+            Finding(
+                "there is no Gyroscope; GyroscopeUncalibrated is read, from which the phone has "
+                "taken no bias",
+                file=sensors[kind].name,
+                quantity="gyro",
+            )
+        )
+    return _log(sensors[kind], "gyro", "rad/s")
+
+
+def _force(
+    sensors: dict[str, Sensor], meta: dict[str, str], name: str, findings: list[Finding]
+) -> list[RawLog]:
+    """Specific force, from whichever files there are; its sign by the platform."""
+    total, linear, gravity, raw = ACCELS
+    platform = meta.get("platform", "").strip().lower()
+    # Only Android writes acceleration with gravity.
+    if not platform and total in sensors:
+        platform = "android"
+    standard = meta.get("standardisation", "").strip().lower() == "true"
+    known = platform in ("android", "ios")
+    turned = platform == "ios" and not standard
+    unit = ("-m/s2" if turned else "m/s2") if known else None
+    if total in sensors:
+        logs = [_log(sensors[total], "accel", unit)]
+    elif linear in sensors and gravity in sensors:
+        parts = [_log(sensors[k], "accel", unit) for k in (linear, gravity)]
+        logs = [force_of(*parts)]
+    elif raw in sensors:
+        logs = [_log(sensors[raw], "accel", "-g" if turned else unit)]
+    else:
+        if linear in sensors:
+            findings.append(
+                Finding(
+                    "left out: it is without gravity, and there is no Gravity beside it",
+                    file=sensors[linear].name,
+                    quantity="accel",
+                    remedy="record Gravity too",
+                )
+            )
+        return []
+    if not known:
+        findings.append(
+            Finding(
+                "the platform is not known, and iOS writes acceleration with the opposite sign",
+                file=name,
+                quantity="accel",
+                remedy="keep Metadata.csv beside it, or state --accel-unit: m/s2 for Android or "
+                "standardised frames; for iOS -m/s2, and -g for AccelerometerUncalibrated",
+            )
+        )
+    elif turned:
+        findings.append(
+            Finding(
+                "written on iOS without standardised frames: its sign is turned",
+                file=name,
+                quantity="accel",
+            )
+        )
+    return logs

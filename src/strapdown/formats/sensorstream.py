@@ -1,0 +1,160 @@
+"""Sensorstream IMU+GPS (Android, Axel Lorenz): its CSV files, and its UDP lines kept in a file.
+
+A line is a stamp in seconds and blocks in any subset: ``timestamp, id, v1, v2, v3, id, …``. A
+block has three values but for pressure and battery temperature, which have one. There is no
+header; a blank may follow each comma.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats.csv import SUFFIXES, decoded
+from strapdown.formats.join import join
+from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.recording import RawLog
+
+# Number of values in a block, by its id: 1 GPS, 3 accelerometer, 4 gyroscope, 5 magnetic field,
+# 6 GPS in ECEF, 7 GPS velocity, 81 orientation, 82 linear acceleration, 83 gravity, 84 rotation
+# vector, 85 pressure, 86 battery temperature.
+WIDTHS = {1: 3, 3: 3, 4: 3, 5: 3, 6: 3, 7: 3, 81: 3, 82: 3, 83: 3, 84: 3, 85: 1, 86: 1}
+NAMES = {3: "accelerometer", 4: "gyroscope", 5: "magnetic field", 82: "linear", 83: "gravity"}
+TRIADS = {3: ("accel", "m/s2"), 4: ("gyro", "rad/s"), 5: ("mag", "uT")}
+_ID = re.compile(r"\d+")
+_LOOKED_AT = 20  # lines, by which the format is told
+
+Blocks = dict[int, tuple[float, ...]]
+
+
+def detect(path: Path) -> bool:
+    """Tell by the first lines of a text file whether each is a stamp and blocks."""
+    if not path.is_file() or path.suffix.lower() not in SUFFIXES:
+        return False
+    with path.open("rb") as stream:
+        data = stream.read(16384)
+    try:
+        text = decoded(data, path.name)[0]
+    except DataError:
+        return False
+    lines = [line for line in text.splitlines()[:_LOOKED_AT] if line.strip()]
+    # A line at the end of what was read may be cut.
+    lines = lines[:-1] if len(lines) > 1 else lines
+    ids = set()
+    for line in lines:
+        parsed = _parse(line)
+        if parsed is None:
+            return False
+        ids |= set(parsed[1])
+    return bool(ids & {3, 4, 82, 83})
+
+
+def read(path: Path) -> RawLog:
+    """Read the blocks of each sensor, and join them on the stamps of the gyro.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        A line without a gyro is no sample of it; an accelerometer or a magnetic field that is
+        not in the lines of the gyro is interpolated to their stamps.
+
+    Raises
+    ------
+    DataError
+        A line is not of the format, or no line has a gyro.
+    """
+    text, findings = decoded(path.read_bytes(), path.name)
+    numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
+    seen: dict[int, list[tuple[int, float, tuple[float, ...]]]] = {}
+    for k, (row, line) in enumerate(numbered):
+        parsed = _parse(line)
+        if parsed is None:
+            if k == len(numbered) - 1 and k and not text.endswith(("\n", "\r")):
+                findings.append(
+                    Finding("the last line is cut; it was left out", file=path.name, row=row)
+                )
+                break
+            raise DataError(
+                f"'{_shown(line)}' is not a stamp and blocks of an id and its values",
+                file=path.name,
+                row=row,
+                remedy="correct or delete that row",
+            )
+        for kind, values in parsed[1].items():
+            seen.setdefault(kind, []).append((row, parsed[0], values))
+    if 4 not in seen:
+        raise DataError(
+            f"no line has a gyroscope (id 4); it has the ids {', '.join(map(str, sorted(seen)))}",
+            file=path.name,
+            quantity="gyro",
+            remedy="switch the gyroscope on in the app and record again",
+        )
+    if without := len(numbered) - len(seen[4]):
+        findings.append(
+            Finding(
+                f"{without} of {len(numbered)} lines have no gyroscope and are no samples of it",
+                file=path.name,
+                quantity="gyro",
+            )
+        )
+    logs = [_log(path, seen, kind, *TRIADS[kind]) for kind in (4, 3, 5) if kind in seen]
+    if 3 not in seen and {82, 83} <= set(seen):
+        linear, gravity = (_log(path, seen, kind, "accel", "m/s2") for kind in (82, 83))
+        logs.append(force_of(linear, gravity))
+    raw = join(logs, path.name, (path,))
+    raw.findings[:0] = findings
+    return raw
+
+
+def _log(
+    path: Path,
+    seen: dict[int, list[tuple[int, float, tuple[float, ...]]]],
+    kind: int,
+    triad: str,
+    unit: str,
+) -> RawLog:
+    lines = seen[kind]
+    values = np.array([v for _, _, v in lines])
+    columns = {"time": np.array([t for _, t, _ in lines])}
+    columns |= {axis: values[:, j] for j, axis in enumerate("xyz")}
+    return sensor_log(
+        f"{path.name}/{NAMES[kind]}",
+        path,
+        columns,
+        triad,
+        unit,
+        time=("time", "s"),
+        rows=np.array([row for row, _, _ in lines]),
+    )
+
+
+def _parse(line: str) -> tuple[float, Blocks] | None:
+    """Stamp and blocks of a line; None where it has another form."""
+    fields = [f.strip() for f in line.split(",")]
+    if fields and not fields[-1]:
+        fields.pop()
+    blocks: Blocks = {}
+    try:
+        stamp = float(fields[0])
+        k = 1
+        while k < len(fields):
+            kind = int(fields[k]) if _ID.fullmatch(fields[k]) else 0
+            width = WIDTHS.get(kind, 0)
+            if not width or kind in blocks or k + width >= len(fields):
+                return None
+            blocks[kind] = tuple(float(f) for f in fields[k + 1 : k + 1 + width])
+            k += 1 + width
+    except (ValueError, IndexError):
+        return None
+    return stamp, blocks
+
+
+def _shown(line: str) -> str:
+    return line if len(line) <= 60 else f"{line[:60]}…"

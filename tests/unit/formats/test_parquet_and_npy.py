@@ -1,0 +1,256 @@
+"""Parquet tables and folders of NumPy arrays."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.spatial.transform import Rotation
+
+from strapdown import rotation
+from strapdown.exceptions import DataError
+from strapdown.formats import READERS, read_log, read_raw
+from strapdown.formats.earth_frame import latitude_longitude, ned_from_ecef
+from strapdown.formats.recording import ReadOptions
+from strapdown.tables import ACCEL, GYRO, QUATERNION
+
+N = 80
+T = np.round(np.arange(N) * 0.01, 2)
+RATE = np.column_stack([0.1 + T, -0.2 * T, 0.3 * np.ones(N)])
+FORCE = np.column_stack([0.4 * T, 0.2 - T, -9.8 + 0.1 * T])
+
+
+def reader_of(path):
+    return next(name for name, reader in READERS.items() if reader.detect(path))
+
+
+# --- Parquet ----------------------------------------------------------------------------
+
+
+def table(columns, units=(), meta=None):
+    fields, arrays = [], []
+    for name, values in columns.items():
+        array = values if isinstance(values, pa.Array) else pa.array(values)
+        unit = dict(units).get(name)
+        fields.append(pa.field(name, array.type, metadata={"unit": unit} if unit else None))
+        arrays.append(array)
+    return pa.Table.from_arrays(arrays, schema=pa.schema(fields, metadata=meta))
+
+
+def flat():
+    return {"t": T} | {f"g{a}": RATE[:, k] for k, a in enumerate("xyz")} | {"note": ["x"] * N}
+
+
+def test_parquet_columns_and_units_of_fields(tmp_path):
+    units = {"t": "s", "gx": "deg/s", "gy": "deg/s", "gz": "deg/s"}
+    meta = {"sampling": "mean", "axes": "forward-right-down"}
+    path = tmp_path / "log.data"
+    pq.write_table(table(flat(), units.items(), meta), path)
+    assert reader_of(path) == "parquet"
+    recording = read_log(path)
+    assert np.array_equal(recording.imu[GYRO], RATE * (np.pi / 180.0))
+    assert np.array_equal(recording.imu.index, T)
+    assert recording.imu.attrs.get("sampling", "mean") == "mean"
+    assert not any("taken as" in f.what for f in recording.findings)
+
+
+def test_parquet_lists_structures_dates_and_dictionaries(tmp_path):
+    stamps = np.datetime64("2026-03-01T12:00:00", "ns") + (T * 1e9).astype("timedelta64[ns]")
+    structure = pa.StructArray.from_arrays(
+        [pa.array(FORCE[:, k]) for k in range(3)], names=["x", "y", "z"]
+    )
+    columns = {
+        "time": pa.array(stamps),
+        "gyro": pa.array(RATE.tolist(), pa.list_(pa.float64(), 3)),
+        "accel": structure,
+    }
+    path = tmp_path / "log.parquet"
+    pq.write_table(table(columns), path)
+    raw = read_raw(path)
+    assert set(raw.columns) == {"time", *(f"gyro[{k}]" for k in range(3))} | {
+        f"accel.{a}" for a in "xyz"
+    }
+    recording = read_log(path, ReadOptions(gyro_unit="rad/s", accel_unit="m/s2"))
+    assert np.array_equal(recording.imu[GYRO], RATE)
+    assert np.array_equal(recording.imu[ACCEL], FORCE)
+
+
+def test_parquet_missing_values_are_missing(tmp_path):
+    columns = flat()
+    columns["gx"] = pa.array([None if k == 5 else 7 for k in range(N)], pa.int64())
+    path = tmp_path / "log.parquet"
+    pq.write_table(table(columns), path)
+    with pytest.raises(DataError, match=r"log\.parquet, row 6, gyro_x: nan"):
+        read_log(path, ReadOptions(gyro_unit="rad/s"))
+
+
+@pytest.mark.parametrize("keep", [3, 200, -30])
+def test_parquet_that_was_cut(tmp_path, keep):
+    path = tmp_path / "log.parquet"
+    pq.write_table(table(flat()), path)
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(DataError, match=r"log\.parquet: the table cannot be read"):
+        read_log(path)
+
+
+def test_parquet_that_claims_far_more_than_it_holds(tmp_path):
+    path = tmp_path / "log.parquet"
+    zeros = np.zeros(10_000_000)
+    pq.write_table(pa.table({"t": zeros, "gx": zeros}), path, compression="zstd")
+    assert path.stat().st_size < 160_000
+    with pytest.raises(DataError, match="it claims 160000000 bytes"):
+        read_raw(path)
+
+
+# --- folders of arrays ------------------------------------------------------------------
+
+
+def test_a_folder_of_arrays(tmp_path):
+    for name, array in {"time": T, "gyro": RATE, "accel_m_s2": FORCE, "fs": 100.0}.items():
+        np.save(tmp_path / f"{name}.npy", array)
+    np.save(tmp_path / "gps.npy", np.zeros((7, 2)))
+    assert reader_of(tmp_path) == "npy-folder"
+    with pytest.raises(DataError, match="the unit is not stated"):
+        read_log(tmp_path)
+    recording = read_log(tmp_path, ReadOptions(gyro_unit="rad/s"))
+    assert np.array_equal(recording.imu[GYRO], RATE)
+    assert np.array_equal(recording.imu[ACCEL], FORCE)
+    assert np.array_equal(recording.imu.index, T)
+    assert any("gps[0] (7 values)" in f.what for f in recording.findings)
+    assert len(recording.files) == 5
+
+
+@pytest.mark.parametrize(
+    ("damage", "message"),
+    [
+        (lambda b: b[:300], r"gyro\.npy: it claims 240 values of 8 bytes, and 172 bytes"),
+        (lambda b: b[:7], r"gyro\.npy: the array cannot be read"),
+        (lambda b: b"hello", r"gyro\.npy: the array cannot be read"),
+        (lambda b: b"", r"gyro\.npy: the array cannot be read"),
+        (lambda b: b.replace(b"(80, 3)", b"(80,30)"), r"gyro\.npy: it claims 2400 values"),
+    ],
+)
+def test_a_damaged_array(tmp_path, damage, message):
+    stream = io.BytesIO()
+    np.save(stream, RATE)
+    (tmp_path / "gyro.npy").write_bytes(damage(stream.getvalue()))
+    np.save(tmp_path / "t.npy", T)
+    with pytest.raises(DataError, match=message):
+        read_log(tmp_path)
+
+
+def test_an_array_of_python_objects_is_not_loaded(tmp_path):
+    np.save(tmp_path / "gyro.npy", np.array([{"run": "me"}, None], dtype=object))
+    with pytest.raises(DataError, match="could run code"):
+        read_log(tmp_path)
+
+
+# --- north, east and down ---------------------------------------------------------------
+
+
+def ecef(latitude, longitude, height):
+    """The definition: along the normal from the ellipsoid (WGS 84)."""
+    a, f = 6378137.0, 1.0 / 298.257223563
+    e2 = f * (2.0 - f)
+    n = a / np.sqrt(1.0 - e2 * np.sin(latitude) ** 2)
+    return np.column_stack(
+        [
+            (n + height) * np.cos(latitude) * np.cos(longitude),
+            (n + height) * np.cos(latitude) * np.sin(longitude),
+            (n * (1.0 - e2) + height) * np.sin(latitude),
+        ]
+    )
+
+
+def test_latitude_and_longitude_invert_their_definition():
+    latitude = np.radians(np.linspace(-90.0, 90.0, 181))
+    longitude = np.radians(np.linspace(-179.5, 179.5, 181))
+    for height in (-1e4, 0.0, 1e4, 1e6, 3e7):
+        found = latitude_longitude(ecef(latitude, longitude, height))
+        # Coordinates of 6e6 m are known to 1e-9 m, an angle of 2e-16; conditioned by 1/e² of
+        # the cube root at worst, 150, it stays under 1e-13.
+        assert np.allclose(found[0], latitude, rtol=0, atol=1e-13)
+        poles = np.abs(np.cos(latitude)) < 1e-12
+        assert np.allclose(found[1][~poles], longitude[~poles], rtol=0, atol=1e-13)
+    assert np.isnan(latitude_longitude([[0.0, 0.0, 0.0]])[0]).all()
+
+
+def test_north_east_and_down_are_those_of_scipy():
+    latitude, longitude = np.radians([52.5, -33.9, 0.0, 89.0]), np.radians([13.4, 151.2, -78.5, 5])
+    q = ned_from_ecef(ecef(latitude, longitude, 120.0))
+    # About z by the longitude, then about y by -(latitude + 90 deg), takes ECEF to NED axes.
+    turns = Rotation.from_euler("ZY", np.column_stack([longitude, -latitude - np.pi / 2]))
+    assert np.allclose(rotation.dcm_from_quaternion(q), turns.inv().as_matrix(), atol=1e-13)
+
+
+# --- comma2k19 --------------------------------------------------------------------------
+
+RATE_TRUE = np.array([0.02, -0.05, 0.3])
+PLACE = np.radians([37.7, -122.4])
+FRAMES = np.arange(0.0, 8.0, 0.05)
+
+
+def segment(folder, flat):
+    """A device that turns at one rate, as the arrays of a segment; synthetic."""
+    q_ne = ned_from_ecef(ecef(PLACE[:1], PLACE[1:], 10.0))[0]
+    t = np.arange(0.003, 7.9, 0.0096)
+    start = rotation.quaternion_from_euler([1.0, -4.0, 30.0])
+    q_nd = rotation.compose(
+        start, rotation.quaternion_from_rotation_vector(np.outer(FRAMES, RATE_TRUE))
+    )
+    arrays = {
+        ("IMU", "gyro", "t"): 46408.0 + t,
+        ("IMU", "gyro", "value"): np.tile(RATE_TRUE, (t.size, 1)),
+        ("IMU", "accelerometer", "t"): 46408.0 + t,
+        ("IMU", "accelerometer", "value"): np.tile([0.0, 0.0, -9.81], (t.size, 1)),
+        ("IMU", "magnetometer", "t"): 46408.0 + FRAMES,
+        ("IMU", "magnetometer", "value"): np.tile([20.0, 0.0, 40.0], (FRAMES.size, 1)),
+        ("global_pose", "frame_times"): 46408.0 + FRAMES,
+        ("global_pose", "frame_positions"): np.tile(
+            ecef(PLACE[:1], PLACE[1:], 10.0), (FRAMES.size, 1)
+        ),
+        ("global_pose", "frame_orientations"): rotation.compose(rotation.conjugate(q_ne), q_nd),
+    }
+    folder.mkdir()
+    for parts, array in arrays.items():
+        if flat:
+            np.save(folder / ("__".join(parts) + ".npy"), array)
+            continue
+        root = folder / "processed_log" if parts[0] == "IMU" else folder
+        root.joinpath(*parts).parent.mkdir(parents=True, exist_ok=True)
+        with root.joinpath(*parts).open("wb") as stream:
+            np.save(stream, array)
+    return t, start
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_comma2k19(tmp_path, flat):
+    folder = tmp_path / "10"
+    t, start = segment(folder, flat)
+    assert reader_of(folder) == "comma2k19"
+    recording = read_log(folder)
+    assert np.array_equal(recording.imu.index, 46408.0 + t)
+    assert np.array_equal(recording.imu[GYRO], np.tile(RATE_TRUE, (t.size, 1)))
+    assert len(recording.files) == 9
+    turned = np.outer(recording.truth.index - 46408.0, RATE_TRUE)
+    expected = rotation.compose(start, rotation.quaternion_from_rotation_vector(turned))
+    # Stamps of 46408 s are known to 7e-12 s; the rate is 0.3 rad/s.
+    angle = rotation.rotation_angle(recording.truth[QUATERNION].to_numpy(), expected)
+    assert np.degrees(np.max(angle)) < 1e-6
+    # Each frame has the sample nearest to it; the last two have the same one.
+    nearest = np.abs(t[:, None] - FRAMES).argmin(axis=0)
+    assert len(recording.truth) == recording.scored.sum() == np.unique(nearest).size
+
+
+def test_comma2k19_of_another_shape_is_refused(tmp_path):
+    folder = tmp_path / "10"
+    segment(folder, True)
+    np.save(folder / "IMU__gyro__value.npy", np.zeros((5, 3)))
+    with pytest.raises(DataError, match=r"10/IMU__gyro__value\.npy, gyro: stamps have the shape"):
+        read_log(folder)
+    (folder / "IMU__gyro__value.npy").unlink()
+    with pytest.raises(DataError, match="the values of the gyro are not there"):
+        read_log(folder)
