@@ -6,6 +6,7 @@ In words, on the command line or one to a line in a file::
     9.0 same as 5.0 sd 0.5
     end 2 turns about z since start
     12.5 roll 0 pitch 0 heading 90
+    12.5 roll 0 pitch 0
 
 Instants are seconds of the log's own time, or ``start`` and ``end``. Angles are degrees. Axes
 are the body's, x forward, y right, z down, or their names: ``about up`` is ``about -z``;
@@ -18,6 +19,7 @@ import re
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
@@ -26,7 +28,13 @@ from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeRun, Score
 from strapdown.tables import EULER, THETA, references_table
 
-__all__ = ["in_words", "parse_reference", "references_from_words", "score_references"]
+__all__ = [
+    "in_words",
+    "parse_reference",
+    "references_from_words",
+    "score_references",
+    "with_tilt",
+]
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
 _INSTANT = rf"(?:{_NUMBER}(?:\s*s)?|start|end)"
@@ -50,8 +58,8 @@ _FORMS = (
         re.I,
     ),
     re.compile(
-        rf"(?P<at>{_INSTANT})\s+roll\s+(?P<roll>{_NUMBER})\s+pitch\s+(?P<pitch>{_NUMBER})\s+"
-        rf"heading\s+(?P<heading>{_NUMBER}){_SD}",
+        rf"(?P<at>{_INSTANT})\s+roll\s+(?P<roll>{_NUMBER})\s+pitch\s+(?P<pitch>{_NUMBER})"
+        rf"(?:\s+heading\s+(?P<heading>{_NUMBER}))?{_SD}",
         re.I,
     ),
 )
@@ -112,7 +120,10 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
         axis, sign = _axis(said["axis"], text)
         row |= {"kind": "turns", "axis": axis, "turns": sign * float(said["turns"])}
     elif "roll" in said:
-        row |= {"kind": "known"} | {e: float(said[e]) for e in EULER}
+        # Without a heading it is the direction of gravity in the body.
+        known = [e for e in EULER if said[e] is not None]
+        kind = "known" if len(known) == len(EULER) else "tilt"
+        row |= {"kind": kind} | {e: float(said[e]) for e in known}
     else:
         row["kind"] = "same"
     return row
@@ -162,6 +173,8 @@ def in_words(row: pd.Series) -> str:
     if row["kind"] == "turns":
         plural = "" if abs(row["turns"]) == 1 else "s"
         return f"{at} s: {row['turns']:g} turn{plural} about body {row['axis']} since {since} s"
+    if row["kind"] == "tilt":
+        return f"{at} s: roll {row['roll']:g}°, pitch {row['pitch']:g}°, whatever the heading"
     angles = ", ".join(f"{e} {row[e]:g}°" for e in EULER)
     return f"{at} s: {angles}"
 
@@ -183,7 +196,8 @@ def score_references(
     -------
     tuple of Score
         One a reference point: the rotation angle between computed and known attitude
-        (``|log(C_est^T C_ref)|``).
+        (``|log(C_est^T C_ref)|``); for a tilt the angle between computed and known direction
+        of gravity.
 
     Raises
     ------
@@ -193,7 +207,8 @@ def score_references(
     begin = float(run.attitude.index[0])
     scores = []
     for number, (_, row) in enumerate(references.iterrows(), start=1):
-        instants = [float(row["time"])] + ([] if row["kind"] == "known" else [float(row["since"])])
+        alone = row["kind"] in ("known", "tilt")
+        instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
         if min(instants) < begin:
             raise DataError(
                 f"{in_words(row)}, and the computed attitude begins at {begin:.9g} s",
@@ -205,6 +220,8 @@ def score_references(
         turned = expected = None
         if row["kind"] == "known":
             known = rotation.quaternion_from_euler([float(row[e]) for e in EULER])
+        elif row["kind"] == "tilt":
+            known = with_tilt(q_at[0], float(row["roll"]), float(row["pitch"]))
         elif row["kind"] == "same":
             known = q_at[1]
         else:
@@ -226,6 +243,37 @@ def score_references(
             )
         )
     return tuple(scores)
+
+
+def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]:
+    """Turn an attitude the shortest way to a roll and a pitch.
+
+    Parameters
+    ----------
+    q_nb : array_like, (4,)
+    roll, pitch : float, deg
+
+    Returns
+    -------
+    ndarray, (4,)
+        The attitude nearest to `q_nb` among those of this roll and pitch. The angle between
+        the two is the angle between their directions of gravity in the body, because the
+        least rotation that leads from one direction to another is about an axis square to
+        both.
+    """
+    down = np.array([0.0, 0.0, 1.0])
+    known = rotation.quaternion_from_euler([roll, pitch, 0.0])
+    here = rotation.rotate(rotation.conjugate(q_nb), down)
+    there = rotation.rotate(rotation.conjugate(known), down)
+    across, along = np.cross(there, here), float(there @ here)
+    size = float(np.sqrt(across @ across))
+    if size < 1e-12 and along < 0.0:
+        # Upside down: every axis square to gravity will do.
+        across = np.cross(there, np.eye(3)[int(np.argmin(np.abs(there)))])
+        axis, angle = across / np.sqrt(across @ across), np.pi
+    else:
+        axis, angle = across / max(size, 1e-300), float(np.arctan2(size, along))
+    return rotation.compose(q_nb, rotation.quaternion_from_rotation_vector(axis * angle))
 
 
 def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:

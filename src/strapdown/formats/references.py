@@ -124,6 +124,8 @@ def _from_csv(path: Path) -> list[str]:
                 f"{value('time_s')} {value('turns')} turns about {value('axis')} since "
                 f"{value('since_s')}"
             )
+        elif kind == "tilt":
+            text = f"{value('time_s')} roll {value('roll_deg')} pitch {value('pitch_deg')}"
         elif kind == "known":
             text = (
                 f"{value('time_s')} roll {value('roll_deg')} pitch {value('pitch_deg')} heading "
@@ -135,7 +137,7 @@ def _from_csv(path: Path) -> list[str]:
                 file=path.name,
                 row=file_row,
                 quantity="kind",
-                remedy="use known, same or turns",
+                remedy="use known, tilt, same or turns",
             )
         sd = row.get("sd_deg")
         words.append(text if sd is None or pd.isna(sd) else f"{text} sd {sd}")
