@@ -36,8 +36,8 @@ __all__ = [
     "with_tilt",
 ]
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
-_INSTANT = rf"(?:{_NUMBER}(?:\s*s)?|start|end)"
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+INSTANT = rf"(?:{NUMBER}(?:\s*s)?|start|end)"
 _AXIS_NAMES = {
     "x": ("x", 1.0),
     "y": ("y", 1.0),
@@ -49,17 +49,17 @@ _AXIS_NAMES = {
     "left": ("y", -1.0),
     "up": ("z", -1.0),
 }
-_SD = rf"(?:\s+sd\s+(?P<sd>{_NUMBER}))?"
+_SD = rf"(?:\s+sd\s+(?P<sd>{NUMBER}))?"
 _FORMS = (
-    re.compile(rf"(?P<at>{_INSTANT})\s+same\s+as\s+(?P<since>{_INSTANT}){_SD}", re.I),
+    re.compile(rf"(?P<at>{INSTANT})\s+same\s+as\s+(?P<since>{INSTANT}){_SD}", re.I),
     re.compile(
-        rf"(?P<at>{_INSTANT})\s+(?P<turns>{_NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
-        rf"since\s+(?P<since>{_INSTANT}){_SD}",
+        rf"(?P<at>{INSTANT})\s+(?P<turns>{NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
+        rf"since\s+(?P<since>{INSTANT}){_SD}",
         re.I,
     ),
     re.compile(
-        rf"(?P<at>{_INSTANT})\s+roll\s+(?P<roll>{_NUMBER})\s+pitch\s+(?P<pitch>{_NUMBER})"
-        rf"(?:\s+heading\s+(?P<heading>{_NUMBER}))?{_SD}",
+        rf"(?P<at>{INSTANT})\s+roll\s+(?P<roll>{NUMBER})\s+pitch\s+(?P<pitch>{NUMBER})"
+        rf"(?:\s+heading\s+(?P<heading>{NUMBER}))?{_SD}",
         re.I,
     ),
 )
@@ -96,7 +96,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     if match is None:
         raise ConfigError(f"'{text}' is not understood", quantity="reference", remedy=_HOW)
     said = match.groupdict()
-    row: dict[str, object] = {"time": _instant(said["at"], start, end, text)}
+    row: dict[str, object] = {"time": instant(said["at"], start, end, text)}
     if said.get("sd"):
         row["sd"] = float(said["sd"])
         if not float(said["sd"]) > 0.0:
@@ -106,7 +106,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
                 remedy="leave sd out, or give degrees",
             )
     if "since" in said:
-        row["since"] = _instant(said["since"], start, end, text)
+        row["since"] = instant(said["since"], start, end, text)
         since, at = row["since"], row["time"]
         assert isinstance(since, float) and isinstance(at, float)
         # An interval whose ends are words is as long as the log, which is not known here yet.
@@ -129,7 +129,27 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     return row
 
 
-def _instant(word: str, start: float, end: float, text: str) -> float:
+def instant(word: str, start: float, end: float, text: str) -> float:
+    """Read an instant of a sentence.
+
+    Parameters
+    ----------
+    word : str
+        ``start``, ``end``, or seconds.
+    start, end : float, s
+        What the words stand for, and the span in which it must lie.
+    text : str
+        The sentence, for messages.
+
+    Returns
+    -------
+    float, s
+
+    Raises
+    ------
+    DataError
+        It lies outside the span.
+    """
     if word.lower() in ("start", "end"):
         return start if word.lower() == "start" else end
     value = float(word.lower().rstrip("s "))

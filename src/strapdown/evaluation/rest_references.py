@@ -18,10 +18,10 @@ Array = NDArray[np.float64]
 
 __all__ = ["ACCEL_BIAS_SD", "same_pose_candidates", "tilt_references", "tilt_sd_deg"]
 
-#: Standard deviation of the bias of each accelerometer, m/s², as data sheets of a class state
-#: it: a consumer MEMS 50 mg at most and taken for 1.7 sigma (MPU-6050, revision 3.4, section
-#: 6.2), an industrial MEMS 5 mg (ADIS16465: 1.4 to 2.0 mg typical, turn-on to turn-on), a
-#: tactical one 1 mg, a navigation one 50 µg.
+#: Standard deviation that is assumed for the bias of each accelerometer, m/s², by class of
+#: sensor. Consumer: the MPU-6050 may be 50 mg off in x and y and 80 mg in z (data sheet 3.4,
+#: section 6.2), taken as the ends of an even spread, 28 to 46 mg. The others are the usual order
+#: of magnitude, 5 mg, 1 mg and 50 µg: state what your data sheet says instead.
 ACCEL_BIAS_SD = {"consumer": 0.3, "industrial": 0.05, "tactical": 0.01, "navigation": 0.0005}
 
 # Two poses count as one where gravity agrees to so many standard deviations of the noise, and
