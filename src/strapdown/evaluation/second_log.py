@@ -157,8 +157,8 @@ class _Fit:
             design = jacobian.reshape(-1, 9) @ free
             # Columns differ by six orders of size.
             size = np.sqrt((design**2).sum(axis=0))
-            found, *_ = np.linalg.lstsq(design / size, left.ravel(), rcond=None)
-            change = free @ (found / size)
+            scaled = design / size
+            change = free @ (np.linalg.solve(scaled.T @ scaled, scaled.T @ left.ravel()) / size)
             state = _moved(state, change)
             if np.abs(change[TURN]).max() < 1e-10 and abs(change[OFFSET]) < 1e-9:
                 break
