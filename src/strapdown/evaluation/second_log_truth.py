@@ -12,11 +12,11 @@ from strapdown.evaluation.differences import attitude_at
 from strapdown.exceptions import DataError
 from strapdown.increments import increments_from_imu
 from strapdown.results import SecondLog
-from strapdown.tables import GYRO, attitude_table
+from strapdown.tables import GYRO, attitude_table, check_imu, imu_table
 
 Array = NDArray[np.float64]
 
-__all__ = ["second_clock", "truth_from_second_log"]
+__all__ = ["first_clock", "second_clock", "truth_from_second_log"]
 
 
 def second_clock(aligned: SecondLog, time: ArrayLike) -> Array:
@@ -33,6 +33,23 @@ def second_clock(aligned: SecondLog, time: ArrayLike) -> Array:
     """
     t = np.asarray(time, dtype=np.float64)
     out: Array = t + aligned.offset + 1e-6 * aligned.drift_ppm * (t - aligned.middle)
+    return out
+
+
+def first_clock(aligned: SecondLog, time: ArrayLike) -> Array:
+    """Turn instants of the second clock into those of the first: `second_clock` reversed.
+
+    Parameters
+    ----------
+    aligned : SecondLog
+    time : array_like, (n,), s
+
+    Returns
+    -------
+    ndarray, (n,), s
+    """
+    since = np.asarray(time, dtype=np.float64) - aligned.middle - aligned.offset
+    out: Array = aligned.middle + since / (1.0 + 1e-6 * aligned.drift_ppm)
     return out
 
 
@@ -89,15 +106,20 @@ def truth_from_second_log(
             remedy="turn both about a second axis in the log, or compare the rate about that "
             "axis alone",
         )
+    check_imu(second)
     if attitude is None:
-        imu = second.copy()
-        imu.attrs = dict(second.attrs)
-        imu[GYRO] = second[GYRO].to_numpy(dtype=np.float64) - np.asarray(gyro_bias)
+        # On the first clock: a second clock that runs fast would count every turn too large.
+        imu = imu_table(
+            first_clock(aligned, second.index),
+            second[GYRO].to_numpy(dtype=np.float64) - np.asarray(gyro_bias),
+            sampling=second.attrs["sampling"],
+            source=second.attrs.get("source"),
+        )
         table = run_attitude(Quaternion(), increments_from_imu(imu)).attitude
     else:
         table = attitude
     stamps = first.index.to_numpy(dtype=np.float64)
-    there = second_clock(aligned, stamps)
+    there = stamps if attitude is None else second_clock(aligned, stamps)
     inside = (there >= table.index[0]) & (there <= table.index[-1])
     if inside.sum() < 2:
         raise DataError(

@@ -8,7 +8,7 @@ import pytest
 from strapdown import rotation
 from strapdown.evaluation.clock_alignment import coarse_offset
 from strapdown.evaluation.second_log import align_second_log
-from strapdown.evaluation.second_log_truth import second_clock, truth_from_second_log
+from strapdown.evaluation.second_log_truth import first_clock, second_clock, truth_from_second_log
 from strapdown.exceptions import DataError
 from strapdown.tables import QUATERNION, attitude_table, imu_table
 
@@ -189,6 +189,8 @@ def test_an_attitude_of_the_second_log_is_taken_over():
     error = rotation.rotation_angle(truth[QUATERNION].to_numpy(), exact).max()
     assert error < bound + 5e-3 * np.sqrt(3)
     assert second_clock(found, [found.middle])[0] == found.middle + found.offset
+    # There and back, to a few roundings of 60 s.
+    assert first_clock(found, second_clock(found, u)) == pytest.approx(u, abs=1e-13)
 
 
 def test_one_axis_only_is_said():
