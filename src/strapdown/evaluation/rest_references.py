@@ -20,7 +20,7 @@ __all__ = ["ACCEL_BIAS_SD", "same_pose_candidates", "tilt_references", "tilt_sd_
 
 #: Standard deviation that is assumed for the bias of each accelerometer, m/s², by class of
 #: sensor. Consumer: the MPU-6050 may be 50 mg off in x and y and 80 mg in z (data sheet 3.4,
-#: section 6.2), taken as the ends of an even spread, 28 to 46 mg. The others are the usual order
+#: section 6.2), taken as the ends of an even spread, 29 to 46 mg. The others are the usual order
 #: of magnitude, 5 mg, 1 mg and 50 µg: state what your data sheet says instead.
 ACCEL_BIAS_SD = {"consumer": 0.3, "industrial": 0.05, "tactical": 0.01, "navigation": 0.0005}
 

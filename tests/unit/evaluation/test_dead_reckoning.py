@@ -11,6 +11,7 @@ from strapdown.evaluation.dead_reckoning import dead_reckon, growth_laws
 from strapdown.evaluation.place_references import is_place, parse_place
 from strapdown.evaluation.place_scores import SensorErrors, score_places
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats.references import read_reference_words
 from strapdown.results import AttitudeRun
 from strapdown.sensors.rest import rest_between
 from strapdown.tables import ACCEL, attitude_table, imu_table
@@ -220,6 +221,17 @@ def test_instants_that_are_no_rests_are_refused(text, message):
     run, imu, rests = bench(*motion((0, 0, 0)))
     with pytest.raises(DataError, match=message):
         score_places(run, [parse_place(text, 0, 12)], imu, rests)
+
+
+def test_files_may_hold_places(tmp_path):
+    (tmp_path / "a.txt").write_text("12.5 same place as 3.0\nend same as start\n")
+    assert read_reference_words(tmp_path / "a.txt") == [
+        "12.5 same place as 3.0",
+        "end same as start",
+    ]
+    (tmp_path / "b.txt").write_text("12.5 moved 1 2 ft since 3\n")
+    with pytest.raises(DataError, match=r"b.txt, row 1, reference: .* not understood"):
+        read_reference_words(tmp_path / "b.txt")
 
 
 def test_a_log_without_acceleration_is_refused():
