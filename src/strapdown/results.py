@@ -15,14 +15,20 @@ __all__ = [
     "AttitudeBench",
     "AttitudeRun",
     "Cost",
+    "GyroBiasCourse",
     "InputFiles",
     "PeerRun",
+    "PositionScore",
     "Reading",
     "RestStretch",
+    "SamePose",
     "Score",
+    "SecondLog",
     "Share",
     "Trials",
 ]
+
+Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -84,13 +90,80 @@ class RestStretch:
         Mean of each gyro over it: its bias, where the Earth's 15 deg/h does not matter.
     gyro_sd : tuple of float, rad/s
     accel_mean : tuple of float or None, m/s²
+    gyro_mean_sd : tuple of float or None, rad/s
+        How well the mean is known: from the scatter of the means of its parts, so that
+        shaking and slow wandering count, and not from the samples as if each were new.
+    accel_sd, accel_mean_sd : tuple of float or None, m/s²
+        As for the gyro.
+    grade : {'still', 'shaking', 'stated'}
+        Quiet within the noise of the sensor; shaken about one attitude, so that only the
+        means are those of a rest; or taken from the user's word.
     """
 
     start: float
     end: float
-    gyro_mean: tuple[float, float, float]
-    gyro_sd: tuple[float, float, float]
-    accel_mean: tuple[float, float, float] | None
+    gyro_mean: Triple
+    gyro_sd: Triple
+    accel_mean: Triple | None
+    gyro_mean_sd: Triple | None = None
+    accel_sd: Triple | None = None
+    accel_mean_sd: Triple | None = None
+    grade: str = "still"
+
+
+@dataclass(frozen=True)
+class GyroBiasCourse:
+    """The bias of a gyro over a log, from its rests.
+
+    Attributes
+    ----------
+    time : tuple of float, s
+        Middle of each rest.
+    mean, sd : tuple of three float a rest, rad/s
+        Bias at each rest, and how well it is known.
+    average, average_sd : tuple of float, rad/s
+        Over the rests, weighted by how well each is known. The sd is widened where the rests
+        scatter by more than their own.
+    drift, drift_sd : tuple of float or None, rad/s²
+        Slope of a line through the rests; None for a single one.
+    scatter : tuple of float or None
+        Root of the mean square distance of the rests from the average, in units of their own
+        sd: near 1 for a bias that stays, far above for one that wanders. None for a single
+        one.
+    """
+
+    time: tuple[float, ...]
+    mean: tuple[Triple, ...]
+    sd: tuple[Triple, ...]
+    average: Triple
+    average_sd: Triple
+    drift: Triple | None
+    drift_sd: Triple | None
+    scatter: Triple | None
+
+
+@dataclass(frozen=True)
+class SamePose:
+    """Two rests at which gravity had the same direction in the body.
+
+    Attributes
+    ----------
+    time, since : float, s
+        Instants within the two rests, the later one first.
+    apart_deg, sd_deg : float
+        Angle between the two directions, and its standard deviation by the noise.
+    words : str
+        The reference point that it would be, as the command line takes it.
+    caveat : str
+        What must be known besides, before it is one.
+    """
+
+    time: float
+    since: float
+    apart_deg: float
+    sd_deg: float
+    words: str
+    caveat: str
 
 
 @dataclass(frozen=True)
@@ -126,6 +199,123 @@ class Score:
     expected_deg: float | None = None
     sd_deg: float | None = None
     reference: int | None = None
+
+
+@dataclass(frozen=True)
+class PositionScore:
+    """How a position dead-reckoned between rests compares with what is known of it.
+
+    Attributes
+    ----------
+    algorithm : str
+        Whose attitude turned the specific force.
+    against : str
+        The reference in words.
+    time, since : float, s
+        The instants that it compares.
+    legs : int
+        Stretches between two rests that were reckoned one after the other.
+    seconds : float
+        Their lengths together, in s: what the errors grow with.
+    moved_m, moved_corrected_m : tuple of float, m
+        Displacement along the axes of the run's local level, without and with the velocity at
+        the end of each leg brought to zero.
+    expected_m : tuple of float, m
+    error_m, corrected_error_m : float, m
+        Distance from what is expected.
+    end_velocity_m_s : float, m/s
+        The largest velocity that was left at the end of a leg, where it should be zero.
+    sd_m, corrected_sd_m, end_velocity_sd_m_s : float
+        What the stated errors of the sensors and of the start lead to, root mean square of
+        the length, first order.
+    reference_sd_m : float or None
+        How well the reference itself is known.
+    gravity_m_s2 : float
+        What was taken off along the vertical.
+    """
+
+    algorithm: str
+    against: str
+    time: float
+    since: float
+    legs: int
+    seconds: float
+    moved_m: Triple
+    moved_corrected_m: Triple
+    expected_m: Triple
+    error_m: float
+    corrected_error_m: float
+    end_velocity_m_s: float
+    sd_m: float
+    corrected_sd_m: float
+    end_velocity_sd_m_s: float
+    reference_sd_m: float | None
+    gravity_m_s2: float
+
+
+@dataclass(frozen=True)
+class SecondLog:
+    """How the log of a second sensor on the same body lies to the first.
+
+    The model is ``omega_1(t) = scale R_12 omega_2(u) + bias`` with
+    ``u = t + offset + drift (t - middle)``; every ``sd`` is one standard deviation from the
+    residuals, with their correlation in time.
+
+    Attributes
+    ----------
+    start, end : float, s
+        What both logs cover, on the first one's clock.
+    middle : float, s
+        Instant of the first clock for which `offset` holds.
+    offset, offset_sd : float, s
+        Second clock less first clock.
+    drift_ppm, drift_sd_ppm : float
+        How much faster the second clock runs, in parts per million.
+    mounting : tuple of four float
+        ``q_12``: turns a vector from the second sensor's axes into the first one's.
+    mounting_deg : tuple of float, deg
+        The same as roll, pitch, heading.
+    mounting_sd_deg : tuple of float, deg
+        About the first sensor's axes; infinite where it cannot be told.
+    bias, bias_sd : tuple of float, rad/s
+        Bias of the first less (scaled, turned) bias of the second, in the first one's axes.
+    scale, scale_sd : float
+        Scale of the first over that of the second.
+    axis : tuple of float or None
+        Where the body turned about one axis only: that axis, in the first sensor's axes. The
+        mounting about it is then the least turn that fits, and not known.
+    correlation : float
+        Share of the rates that the two have in common at the coarse offset, 1 at best.
+    runner_up : float
+        The same for the best other offset.
+    residual : float, rad/s
+        Root mean square of what is left, all axes together, after smoothing.
+    smoothing : float, s
+        Standard deviation of the Gaussian that both were smoothed with before the fit.
+    cells : int
+        Points that were fitted.
+    """
+
+    start: float
+    end: float
+    middle: float
+    offset: float
+    offset_sd: float
+    drift_ppm: float
+    drift_sd_ppm: float
+    mounting: tuple[float, float, float, float]
+    mounting_deg: Triple
+    mounting_sd_deg: Triple
+    bias: Triple
+    bias_sd: Triple
+    scale: float
+    scale_sd: float
+    axis: Triple | None
+    correlation: float
+    runner_up: float
+    residual: float
+    smoothing: float
+    cells: int
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ Increments              ``time`` s, its end    ``dt`` s, ``theta_x..z`` rad, ``d
                                                (change of the rate over the step times `dt`)
 Attitude                ``time`` s             ``q_w q_x q_y q_z`` (body to local level) and
                                                ``roll pitch heading`` deg
-References              none                   ``time`` s, ``kind`` (``known``, ``same``,
-                                               ``turns``), ``since`` s, ``roll pitch heading``
-                                               deg, ``turns``, ``axis``, ``sd`` deg
+References              none                   ``time`` s, ``kind`` (``known``, ``tilt``,
+                                               ``same``, ``turns``), ``since`` s, ``roll pitch
+                                               heading`` deg, ``turns``, ``axis``, ``sd`` deg
 ======================  =====================  ===================================================
 """
 
@@ -44,7 +44,7 @@ QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
 EULER = ["roll", "pitch", "heading"]
 REFERENCE = ["time", "kind", "since", *EULER, "turns", "axis", "sd"]
 SAMPLINGS = ("instantaneous", "mean")
-REFERENCE_KINDS = ("known", "same", "turns")
+REFERENCE_KINDS = ("known", "tilt", "same", "turns")
 
 __all__ = [
     "Gap",
@@ -400,7 +400,8 @@ def references_table(rows: Sequence[dict[str, object]], source: str | None = Non
     ----------
     rows : sequence of dict
         Each with ``time`` (s) and ``kind``. ``known`` adds ``roll``, ``pitch``, ``heading``
-        in deg; ``same`` adds ``since`` (s), the instant whose attitude it shares; ``turns``
+        in deg; ``tilt`` adds ``roll`` and ``pitch`` only, the direction of gravity; ``same``
+        adds ``since`` (s), the instant whose attitude it shares; ``turns``
         adds ``since``, ``turns`` (whole or not; positive right-handed) and ``axis`` (``x``,
         ``y``, ``z`` of the body, forward-right-down). ``sd`` in deg is how well it is known.
     source : str, optional
@@ -440,6 +441,7 @@ def check_references(table: pd.DataFrame) -> None:
     _check_columns(table, REFERENCE, source)
     needs = {
         "known": ["time", *EULER],
+        "tilt": ["time", "roll", "pitch"],
         "same": ["time", "since"],
         "turns": ["time", "since", "turns"],
     }

@@ -6,6 +6,7 @@ In words, on the command line or one to a line in a file::
     9.0 same as 5.0 sd 0.5
     end 2 turns about z since start
     12.5 roll 0 pitch 0 heading 90
+    12.5 roll 0 pitch 0
 
 Instants are seconds of the log's own time, or ``start`` and ``end``. Angles are degrees. Axes
 are the body's, x forward, y right, z down, or their names: ``about up`` is ``about -z``;
@@ -18,6 +19,7 @@ import re
 
 import numpy as np
 import pandas as pd
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
@@ -26,10 +28,16 @@ from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeRun, Score
 from strapdown.tables import EULER, THETA, references_table
 
-__all__ = ["in_words", "parse_reference", "references_from_words", "score_references"]
+__all__ = [
+    "in_words",
+    "parse_reference",
+    "references_from_words",
+    "score_references",
+    "with_tilt",
+]
 
-_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
-_INSTANT = rf"(?:{_NUMBER}(?:\s*s)?|start|end)"
+NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?"
+INSTANT = rf"(?:{NUMBER}(?:\s*s)?|start|end)"
 _AXIS_NAMES = {
     "x": ("x", 1.0),
     "y": ("y", 1.0),
@@ -41,17 +49,17 @@ _AXIS_NAMES = {
     "left": ("y", -1.0),
     "up": ("z", -1.0),
 }
-_SD = rf"(?:\s+sd\s+(?P<sd>{_NUMBER}))?"
+_SD = rf"(?:\s+sd\s+(?P<sd>{NUMBER}))?"
 _FORMS = (
-    re.compile(rf"(?P<at>{_INSTANT})\s+same\s+as\s+(?P<since>{_INSTANT}){_SD}", re.I),
+    re.compile(rf"(?P<at>{INSTANT})\s+same\s+as\s+(?P<since>{INSTANT}){_SD}", re.I),
     re.compile(
-        rf"(?P<at>{_INSTANT})\s+(?P<turns>{_NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
-        rf"since\s+(?P<since>{_INSTANT}){_SD}",
+        rf"(?P<at>{INSTANT})\s+(?P<turns>{NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
+        rf"since\s+(?P<since>{INSTANT}){_SD}",
         re.I,
     ),
     re.compile(
-        rf"(?P<at>{_INSTANT})\s+roll\s+(?P<roll>{_NUMBER})\s+pitch\s+(?P<pitch>{_NUMBER})\s+"
-        rf"heading\s+(?P<heading>{_NUMBER}){_SD}",
+        rf"(?P<at>{INSTANT})\s+roll\s+(?P<roll>{NUMBER})\s+pitch\s+(?P<pitch>{NUMBER})"
+        rf"(?:\s+heading\s+(?P<heading>{NUMBER}))?{_SD}",
         re.I,
     ),
 )
@@ -88,7 +96,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     if match is None:
         raise ConfigError(f"'{text}' is not understood", quantity="reference", remedy=_HOW)
     said = match.groupdict()
-    row: dict[str, object] = {"time": _instant(said["at"], start, end, text)}
+    row: dict[str, object] = {"time": instant(said["at"], start, end, text)}
     if said.get("sd"):
         row["sd"] = float(said["sd"])
         if not float(said["sd"]) > 0.0:
@@ -98,7 +106,7 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
                 remedy="leave sd out, or give degrees",
             )
     if "since" in said:
-        row["since"] = _instant(said["since"], start, end, text)
+        row["since"] = instant(said["since"], start, end, text)
         since, at = row["since"], row["time"]
         assert isinstance(since, float) and isinstance(at, float)
         # An interval whose ends are words is as long as the log, which is not known here yet.
@@ -112,13 +120,36 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
         axis, sign = _axis(said["axis"], text)
         row |= {"kind": "turns", "axis": axis, "turns": sign * float(said["turns"])}
     elif "roll" in said:
-        row |= {"kind": "known"} | {e: float(said[e]) for e in EULER}
+        # Without a heading it is the direction of gravity in the body.
+        known = [e for e in EULER if said[e] is not None]
+        kind = "known" if len(known) == len(EULER) else "tilt"
+        row |= {"kind": kind} | {e: float(said[e]) for e in known}
     else:
         row["kind"] = "same"
     return row
 
 
-def _instant(word: str, start: float, end: float, text: str) -> float:
+def instant(word: str, start: float, end: float, text: str) -> float:
+    """Read an instant of a sentence.
+
+    Parameters
+    ----------
+    word : str
+        ``start``, ``end``, or seconds.
+    start, end : float, s
+        What the words stand for, and the span in which it must lie.
+    text : str
+        The sentence, for messages.
+
+    Returns
+    -------
+    float, s
+
+    Raises
+    ------
+    DataError
+        It lies outside the span.
+    """
     if word.lower() in ("start", "end"):
         return start if word.lower() == "start" else end
     value = float(word.lower().rstrip("s "))
@@ -162,6 +193,8 @@ def in_words(row: pd.Series) -> str:
     if row["kind"] == "turns":
         plural = "" if abs(row["turns"]) == 1 else "s"
         return f"{at} s: {row['turns']:g} turn{plural} about body {row['axis']} since {since} s"
+    if row["kind"] == "tilt":
+        return f"{at} s: roll {row['roll']:g}°, pitch {row['pitch']:g}°, whatever the heading"
     angles = ", ".join(f"{e} {row[e]:g}°" for e in EULER)
     return f"{at} s: {angles}"
 
@@ -183,7 +216,8 @@ def score_references(
     -------
     tuple of Score
         One a reference point: the rotation angle between computed and known attitude
-        (``|log(C_est^T C_ref)|``).
+        (``|log(C_est^T C_ref)|``); for a tilt the angle between computed and known direction
+        of gravity.
 
     Raises
     ------
@@ -193,7 +227,8 @@ def score_references(
     begin = float(run.attitude.index[0])
     scores = []
     for number, (_, row) in enumerate(references.iterrows(), start=1):
-        instants = [float(row["time"])] + ([] if row["kind"] == "known" else [float(row["since"])])
+        alone = row["kind"] in ("known", "tilt")
+        instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
         if min(instants) < begin:
             raise DataError(
                 f"{in_words(row)}, and the computed attitude begins at {begin:.9g} s",
@@ -205,6 +240,8 @@ def score_references(
         turned = expected = None
         if row["kind"] == "known":
             known = rotation.quaternion_from_euler([float(row[e]) for e in EULER])
+        elif row["kind"] == "tilt":
+            known = with_tilt(q_at[0], float(row["roll"]), float(row["pitch"]))
         elif row["kind"] == "same":
             known = q_at[1]
         else:
@@ -226,6 +263,37 @@ def score_references(
             )
         )
     return tuple(scores)
+
+
+def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]:
+    """Turn an attitude the shortest way to a roll and a pitch.
+
+    Parameters
+    ----------
+    q_nb : array_like, (4,)
+    roll, pitch : float, deg
+
+    Returns
+    -------
+    ndarray, (4,)
+        The attitude nearest to `q_nb` among those of this roll and pitch. The angle between
+        the two is the angle between their directions of gravity in the body, because the
+        least rotation that leads from one direction to another is about an axis square to
+        both.
+    """
+    down = np.array([0.0, 0.0, 1.0])
+    known = rotation.quaternion_from_euler([roll, pitch, 0.0])
+    here = rotation.rotate(rotation.conjugate(q_nb), down)
+    there = rotation.rotate(rotation.conjugate(known), down)
+    across, along = np.cross(there, here), float(there @ here)
+    size = float(np.sqrt(across @ across))
+    if size < 1e-12 and along < 0.0:
+        # Upside down: every axis square to gravity will do.
+        across = np.cross(there, np.eye(3)[int(np.argmin(np.abs(there)))])
+        axis, angle = across / np.sqrt(across @ across), np.pi
+    else:
+        axis, angle = across / max(size, 1e-300), float(np.arctan2(size, along))
+    return rotation.compose(q_nb, rotation.quaternion_from_rotation_vector(axis * angle))
 
 
 def _turned(imu: pd.DataFrame, axis: int, since: float, until: float) -> float:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from strapdown.evaluation.place_references import is_place, parse_place
 from strapdown.evaluation.reference_points import parse_reference
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import csv, read_raw
@@ -20,7 +21,9 @@ from strapdown.formats.recording import Origin, ReadOptions
 __all__ = ["read_reference_words", "read_truth"]
 
 # What tells a sentence from the header of a table that has a column named roll.
-SENTENCE = re.compile(r"same[ -]as|turns?\s+about|^\S+\s*:?\s+roll[ =]+[-+\d.]", re.I)
+SENTENCE = re.compile(
+    r"same[ -](?:place[ -])?as|\smoved\s|turns?\s+about|^\S+\s*:?\s+roll[ =]+[-+\d.]", re.I
+)
 
 
 def read_reference_words(path: Path) -> list[str] | None:
@@ -72,7 +75,8 @@ def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[
         )
     for number, text in numbered:
         try:
-            parse_reference(text, -math.inf, math.inf)
+            read = parse_place if is_place(text) else parse_reference
+            read(text, -math.inf, math.inf)
         except ConfigError as error:
             raise DataError(
                 error.finding.what if what == "line" else f"{what} {number}: {error.finding.what}",
@@ -124,6 +128,8 @@ def _from_csv(path: Path) -> list[str]:
                 f"{value('time_s')} {value('turns')} turns about {value('axis')} since "
                 f"{value('since_s')}"
             )
+        elif kind == "tilt":
+            text = f"{value('time_s')} roll {value('roll_deg')} pitch {value('pitch_deg')}"
         elif kind == "known":
             text = (
                 f"{value('time_s')} roll {value('roll_deg')} pitch {value('pitch_deg')} heading "
@@ -135,7 +141,7 @@ def _from_csv(path: Path) -> list[str]:
                 file=path.name,
                 row=file_row,
                 quantity="kind",
-                remedy="use known, same or turns",
+                remedy="use known, tilt, same or turns",
             )
         sd = row.get("sd_deg")
         words.append(text if sd is None or pd.isna(sd) else f"{text} sd {sd}")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.exceptions import DataError
 from strapdown.results import RestStretch
 from strapdown.tables import ACCEL, GYRO
 
@@ -31,6 +34,8 @@ MAX_MEAN_RATE = 0.36  # rad/s
 SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
 # A sensor without noise (a simulation) is at rest where it reads a constant, to rounding.
 ROUNDING = 1e-9  # rad/s
+# Parts of a rest whose means tell how well the mean of the whole is known.
+LEAST_PARTS, MOST_PARTS = 4, 20
 
 
 def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
@@ -110,16 +115,88 @@ def _runs(still: NDArray[np.bool_], joined: NDArray[np.bool_]) -> list[tuple[int
     return runs
 
 
+def rest_between(
+    imu: pd.DataFrame, start: float, end: float, *, grade: str = "stated"
+) -> RestStretch:
+    """Take a stretch of a log for a rest, whatever it looks like.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table.
+    start, end : float, s
+        The samples from the one to the other, both included.
+    grade : str, optional
+        What to call it.
+
+    Returns
+    -------
+    RestStretch
+        Its ``*_mean_sd`` tell how far the means can be trusted: a hand that holds the sensor
+        shows there.
+
+    Raises
+    ------
+    DataError
+        There are fewer than five samples in it.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    a, b = int(np.searchsorted(time, start)), int(np.searchsorted(time, end, side="right"))
+    if b - a < LEAST_SAMPLES:
+        raise DataError(
+            f"{max(b - a, 0)} samples between {start:.9g} and {end:.9g} s, too few for a mean",
+            file=imu.attrs.get("source"),
+            quantity="rest",
+            remedy=f"name a stretch of at least {LEAST_SAMPLES} samples within the log",
+        )
+    gyro = imu[GYRO].to_numpy(dtype=np.float64)
+    accel = imu[ACCEL].to_numpy(dtype=np.float64) if set(ACCEL) <= set(imu.columns) else None
+    return replace(_stretch(time, gyro, accel, a, b), grade=grade)
+
+
+def sd_of_mean(time: Array, values: Array) -> Array:
+    """How well the mean of a stretch is known.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    values : ndarray, (n, k)
+
+    Returns
+    -------
+    ndarray, (k,)
+        The larger of ``sd / sqrt(n)``, which is right for white noise, and the same from the
+        means of 4 to 20 parts of at least half a second, which is right for noise that is
+        correlated over less than a part (batch means; Law and Kelton 1984,
+        doi:10.1287/opre.32.6.1241). A stretch of less than 2 s has the first only.
+    """
+    white = values.std(axis=0, ddof=1) / np.sqrt(len(values))
+    parts = min(MOST_PARTS, int((time[-1] - time[0]) / WINDOW))
+    if parts < LEAST_PARTS:
+        return np.asarray(white, dtype=np.float64)
+    edges = np.linspace(0, len(values), parts + 1).astype(np.int64)
+    if np.diff(edges).min() < 1:
+        return np.asarray(white, dtype=np.float64)
+    means = _window_mean(values, edges[:-1], edges[1:])
+    return np.asarray(np.maximum(white, means.std(axis=0, ddof=1) / np.sqrt(parts)))
+
+
 def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> RestStretch:
-    mean, sd = gyro[a:b].mean(axis=0), gyro[a:b].std(axis=0)
-    level = None if accel is None else accel[a:b].mean(axis=0)
+    force = None if accel is None else accel[a:b]
     return RestStretch(
         float(time[a]),
         float(time[b - 1]),
-        (float(mean[0]), float(mean[1]), float(mean[2])),
-        (float(sd[0]), float(sd[1]), float(sd[2])),
-        None if level is None else (float(level[0]), float(level[1]), float(level[2])),
+        _triple(gyro[a:b].mean(axis=0)),
+        _triple(gyro[a:b].std(axis=0)),
+        None if force is None else _triple(force.mean(axis=0)),
+        _triple(sd_of_mean(time[a:b], gyro[a:b])),
+        None if force is None else _triple(force.std(axis=0)),
+        None if force is None else _triple(sd_of_mean(time[a:b], force)),
     )
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])
 
 
 def _of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:

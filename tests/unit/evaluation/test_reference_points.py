@@ -63,7 +63,7 @@ def test_words(text, row):
         ("end 2 turns about w since start", ConfigError, "axis"),
         ("0.5 same as start", DataError, "runs from 1 to 9 s"),
         ("end same as 9.5", DataError, "runs from 1 to 9 s"),
-        ("end roll 0 pitch 0", ConfigError, "not understood"),
+        ("end roll 0 heading 0", ConfigError, "not understood"),
     ],
 )
 def test_words_that_cannot_be_used(text, error, message):
