@@ -10,6 +10,7 @@ import math
 __all__ = [
     "ACCEL_UNITS",
     "GYRO_UNITS",
+    "MAG_UNITS",
     "STANDARD_GRAVITY",
     "TIME_UNITS",
 ]
@@ -36,6 +37,15 @@ ACCEL_UNITS: dict[str, float] = {
     # Sensors that report gravity instead of specific force, as iOS does.
     "-m/s2": -1.0,
     "-g": -STANDARD_GRAVITY,
+}
+
+#: Factors to µT.
+MAG_UNITS: dict[str, float] = {
+    "uT": 1.0,
+    "nT": 1e-3,
+    "gauss": 100.0,
+    "mG": 0.1,
+    "T": 1e6,
 }
 
 #: Factors to s.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
 from strapdown.exceptions import ConfigError, nearest
 
 __all__ = [
@@ -45,6 +45,16 @@ TRIADS = {
         "specificforce",
         "a",
         "f",
+    ],
+    "mag": [
+        "mag",
+        "magn",
+        "magnetometer",
+        "magnetometers",
+        "magneticfield",
+        "imumag",
+        "compass",
+        "m",
     ],
 }
 TIMES = [
@@ -108,6 +118,11 @@ _SPELLINGS = {
     "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
     "g": "g g0 gs",
     "mg": "mg",
+    "uT": "ut µt μt microtesla",
+    "nT": "nt nanotesla",
+    "gauss": "gauss",
+    "mG": "mgauss milligauss",
+    "T": "tesla",
     "s": "s sec secs second seconds",
     "ms": "ms msec millis milliseconds",
     "us": "us µs μs usec micros microseconds",
@@ -216,7 +231,7 @@ def parse_unit(text: str, kind: str) -> str:
     Parameters
     ----------
     text : str
-    kind : {'gyro', 'accel', 'time'}
+    kind : {'gyro', 'accel', 'mag', 'time'}
 
     Returns
     -------
@@ -228,7 +243,7 @@ def parse_unit(text: str, kind: str) -> str:
     ConfigError
         It is no unit of that kind.
     """
-    known = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "time": TIME_UNITS}[kind]
+    known = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS, "time": TIME_UNITS}[kind]
     unit = UNIT_OF.get(text.strip().lower(), text)
     if unit not in known:
         raise ConfigError(
