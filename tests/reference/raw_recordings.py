@@ -24,9 +24,7 @@ class Bare:
     truth: tuple[tuple[str, str], ...] = ()
 
     def scaled(self, gyro: float = 1.0, accel: float = 1.0, time: float = 1.0) -> Bare:
-        return replace(
-            self, gyro=self.gyro * gyro, accel=self.accel * accel, time=self.time * time
-        )
+        return replace(self, gyro=self.gyro * gyro, accel=self.accel * accel, time=self.time * time)
 
     def log(self) -> RawLog:
         columns = {"time": self.time}
@@ -76,6 +74,7 @@ def phone(folder: Path) -> Bare:
         return np.load(folder / f"IMU__{name}.npy").astype(float)
 
     time, gyro = load("gyro__t"), load("gyro__value")
+
     def at(name: str) -> np.ndarray:
         t, v = load(f"{name}__t"), load(f"{name}__value")
         return np.column_stack([np.interp(time, t, v[:, k]) for k in range(3)])
@@ -101,7 +100,11 @@ def crash_heads(folder: Path) -> list[Bare]:
         gyr = [channel(rates + k) for k in range(3)]
         n = min(len(c) for c in acc + gyr)
         out.append(
-            Bare(name, gyr[0][:n, 0], np.column_stack([c[:n, 1] for c in gyr]),
-                 np.column_stack([c[:n, 1] for c in acc]))
+            Bare(
+                name,
+                gyr[0][:n, 0],
+                np.column_stack([c[:n, 1] for c in gyr]),
+                np.column_stack([c[:n, 1] for c in acc]),
+            )
         )
     return out

@@ -131,6 +131,8 @@ _SPELLINGS = {
     "deg": "deg ° degree degrees",
     "rad": "rad radian radians",
 }
+# The letter of gauss is that of gravity, too.
+_MAGNETIC = {"g": "gauss", "mg": "mG"}
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
@@ -183,6 +185,8 @@ def read_name(name: str) -> ColumnName:
         if said.quantity:
             break
     quantity = said.quantity
+    if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
+        said = ColumnName(quantity, _MAGNETIC[said.unit])
     if quantity in TRIADS and index in _AXES_BY_INDEX:
         quantity = f"{quantity}_{_AXES_BY_INDEX[index]}"
     if quantity == "time" and (

@@ -70,8 +70,9 @@ def infer_time_unit(stamps: NDArray[Any]) -> Inference:
     if not found:
         return Inference("time_unit", None, 1.0, ("time does not advance",), (), "--time-unit")
     step = mean_step(stamps)
-    return conclude("time_unit", dict(found), time_evidence(stamps, step, next(iter(found))),
-                    "--time-unit")
+    return conclude(
+        "time_unit", dict(found), time_evidence(stamps, step, next(iter(found))), "--time-unit"
+    )
 
 
 def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[str, ...]:
@@ -158,8 +159,14 @@ def infer_time_faults(stamps: NDArray[Any]) -> Inference:
         if usual < 0.5 * mean or (repeated > 0.3 * steps.size):
             faults.append("bursts")
     told = f"{steps.size} steps"
-    return Inference("time_faults", ", ".join(faults) or "none", 1.0 - 1e-4, (told,), (),
-                     "--repair" if faults else "")
+    return Inference(
+        "time_faults",
+        ", ".join(faults) or "none",
+        1.0 - 1e-4,
+        (told,),
+        (),
+        "--repair" if faults else "",
+    )
 
 
 def wrap_bits(before: float, step: float, usual: float) -> int | None:

@@ -65,13 +65,19 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
             usual,
         )
     spread = 1.4826 * float(np.median(np.abs(norms - usual))) / usual
-    # The median over m pieces is better than a piece, but what the motion adds is one-sided.
-    sd = np.hypot(_ERROR, 0.5 * spread) / np.log(10.0)
+    # The median over m pieces is better than a piece, but what the motion adds is one-sided. A
+    # log of few pieces does not know its spread, and a crash is shorter than one.
+    few = 2.0 / len(norms) if step else 0.4
+    sd = np.hypot(np.hypot(_ERROR, 0.5 * spread), few) / np.log(10.0)
     where = np.log10(usual)
     # Mean vectors without gravity are those of a random motion, whose norm spreads by 0.4 of
     # itself or more; a constant offset is possible, and small.
-    steady = min(spread / 0.3, 1.0) ** 2
-    direction = np.linalg.norm(pieces.mean(axis=0)) / usual
+    swings = min(spread / 0.3, 1.0) ** 2
+    direction = float(np.linalg.norm(pieces.mean(axis=0))) / usual
+    # What moves and has no gravity averages to nothing, for velocities stay bounded.
+    lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
+    # With gravity the motion of a hand or a car spreads it by a tenth.
+    calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.3
     weights: dict[tuple[str | None, str], float] = {}
 
     def add(unit: str | None, form: str, prior: float, density: float) -> None:
@@ -82,17 +88,25 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
         # A cubic tail, for what is shaken and spun more than its median spread tells.
         peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
-        add(unit, "rate", prior * _PRIOR_FORM["rate"], peak)
+        add(unit, "rate", prior * _PRIOR_FORM["rate"], calm * peak)
         si = usual * scale
         broad = 0.25 * min(1.0, 10.0 / si) ** 2 * min(1.0, si / 1e-3)
         offset = broad * min(1.0, 0.3 / si) ** 3  # constant, and yet not gravity
-        add(unit, "linear", prior * _PRIOR_FORM["linear"],
-            steady * broad + (1.0 - steady) * offset)
+        add(
+            unit,
+            "linear",
+            prior * _PRIOR_FORM["linear"],
+            swings * lasting * broad + (1.0 - swings) * offset,
+        )
         if step:
             off = (where - np.log10(STANDARD_GRAVITY * step / scale)) / sd
-            add(unit, "increment", prior * _PRIOR_FORM["increment"],
-                0.45 / sd / (1.0 + off * off / 3.0) ** 2)
-    add(None, "other", _PRIOR_FORM["other"], 1.0 / _DECADES)
+            add(
+                unit,
+                "increment",
+                prior * _PRIOR_FORM["increment"],
+                calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2,
+            )
+    add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
     found = posterior(weights)
     units = _summed(found, 0)
     forms = _summed(found, 1)
@@ -104,12 +118,18 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         told += ", which is gravity in none of m/s2, g, mg"
     evidence = (told,)
     gravity = posterior_of(
-        {"present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
-         "removed": forms.get("linear", 0.0), None: forms.get("other", 0.0)}
+        {
+            "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
+            "removed": forms.get("linear", 0.0),
+            None: forms.get("other", 0.0),
+        }
     )
     form = posterior_of(
-        {"rate": forms.get("rate", 0.0) + forms.get("linear", 0.0),
-         "increment": forms.get("increment", 0.0), None: forms.get("other", 0.0)}
+        {
+            "rate": forms.get("rate", 0.0) + forms.get("linear", 0.0),
+            "increment": forms.get("increment", 0.0),
+            None: forms.get("other", 0.0),
+        }
     )
     tell = (*evidence, f"the mean vector is {direction:.2g} of it")
     return (

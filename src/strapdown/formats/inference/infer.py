@@ -28,7 +28,7 @@ from strapdown.formats.recording import RawLog, ReadOptions
 
 Array = NDArray[np.float64]
 # Longer logs are looked at in parts: this many rows say all that there is to say.
-LARGEST = 60_000
+LARGEST = 40_000
 
 
 @dataclass(frozen=True)
@@ -84,9 +84,7 @@ def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, .
         if options.time_unit:
             unit = parse_unit(options.time_unit, "time")
     triads = {t: _triad(raw, found, t) for t in ("gyro", "accel", "mag")}
-    return infer_signals(
-        Signals(stamps, **triads, time_unit=unit, rate=options.rate or raw.rate)
-    )
+    return infer_signals(Signals(stamps, **triads, time_unit=unit, rate=options.rate or raw.rate))
 
 
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
@@ -125,10 +123,10 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         heard = [unit, form, gravity]
         if gravity.value == "present" and gravity.confidence > 0.9:
             heard.append(infer_up(accel, step))
-            heard.append(_sign(heard[-1]))
+            heard.append(_sign())
             assert signals.accel is not None
             force = signals.accel / usual
-        elif gravity.value is None and _steady(accel, step):
+        elif gravity.value is None and _steady(accel):
             # Gravity in a unit that is not known still turns as gravity does.
             assert signals.accel is not None
             force = signals.accel / usual
@@ -167,9 +165,7 @@ def _times(signals: Signals, stamps: NDArray[Any] | None) -> dict[str, float]:
     return time_unit_probabilities(stamps)
 
 
-def _step(
-    signals: Signals, stamps: NDArray[Any] | None, times: dict[str, float]
-) -> float | None:
+def _step(signals: Signals, stamps: NDArray[Any] | None, times: dict[str, float]) -> float | None:
     if stamps is not None and times:
         best = next(iter(times))
         step = mean_step(stamps) * TIME_UNITS[best]
@@ -177,20 +173,19 @@ def _step(
     return 1.0 / signals.rate if signals.rate else None
 
 
-def _steady(accel: Array, step: float | None) -> bool:
+def _steady(accel: Array) -> bool:
     """Whether the norm is that of one vector: it spreads by less than a fifth of itself."""
     norms = np.linalg.norm(accel, axis=1)
     return bool(np.std(norms) < 0.2 * np.mean(norms))
 
 
-def _sign(up: Inference) -> Inference:
+def _sign() -> Inference:
     """Which sign the accelerometer has: no motion tells it, only where its axes point does."""
     told = (
         "both signs turn alike in the body: only where an axis points can tell them apart",
         "a sensor that reports gravity (iOS) reads -1 g on the axis that points up",
     )
-    value = "reaction"
-    return Inference("accel_sign", value, 0.95, told, (("gravity", 0.05),), "--accel-unit")
+    return Inference("accel_sign", "reaction", 0.95, told, (("gravity", 0.05),), "--accel-unit")
 
 
 def _finite(values: NDArray[Any] | None) -> NDArray[Any] | None:

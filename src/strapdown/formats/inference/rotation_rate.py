@@ -148,7 +148,10 @@ def _evidence(
         turn = max(scales, key=lambda s: (s[1], s[0].signal))[0]
         best, left = turn.free()
         explained = 1.0 - left / turn.gram[9, 9]
-        norm = np.sqrt(float((best**2).sum()) / max(np.linalg.matrix_rank(best, tol=0.3 * np.abs(best).max()), 1))
+        name = next((n for n in _marginal(total, 2) if n), "x,y,z")
+        names, matrices = signed_permutations()
+        m = matrices[names.index(name)].reshape(9)
+        norm = float(m @ turn.gram[:9, 9] / max(m @ turn.gram[:9, :9] @ m, 1e-300))
         told.append(
             f"over {turn.half_width:g} s gravity turns by {np.degrees(turn.signal):.3g}° rms in the "
             f"accelerometer, and the gyro explains {100 * explained:.3g} % of that at "

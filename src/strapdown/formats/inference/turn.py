@@ -50,7 +50,9 @@ def signed_permutations() -> tuple[tuple[str, ...], Array]:
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
             names.append(
-                ",".join(("-" if s < 0 else "") + "xyz"[k] for k, s in zip(order, signs, strict=True))
+                ",".join(
+                    ("-" if s < 0 else "") + "xyz"[k] for k, s in zip(order, signs, strict=True)
+                )
             )
             matrices.append(np.eye(3)[list(order)] * np.array(signs)[:, None])
     return tuple(names), np.array(matrices)
