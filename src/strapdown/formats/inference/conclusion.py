@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -83,7 +83,7 @@ def posterior(log_weights: dict[K, float]) -> dict[K, float]:
 
 def conclude(
     quantity: str,
-    probabilities: dict[str | None, float],
+    probabilities: Mapping[str, float] | Mapping[str | None, float],
     evidence: tuple[str, ...],
     flag: str = "",
 ) -> Inference:

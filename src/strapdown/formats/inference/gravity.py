@@ -16,6 +16,12 @@ SCALES = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
 _PRIOR = {"m/s2": 0.6, "g": 0.37, "mg": 0.03}
 # How often a log under these names holds something else.
 _PRIOR_FORM = {"rate": 0.93, "linear": 0.03, "increment": 0.01, "other": 0.03}
+# Raw counts of 8 to 16 bits a gravity; 1024 is near enough to be taken for mg.
+_COUNTS = (256.0, 1024.0, 2048.0, 4096.0, 8192.0, 16384.0)
+_PRIOR_COUNTS = 0.03
+_BROKEN_COUNTS = 0.05  # how often counts have fractions
+# How often all numbers are whole in each unit.
+_WHOLE = {"m/s2": 1e-4, "g": 1e-4, "mg": 0.7}
 # Scale and offset of cheap sensors together: 3 % and 80 mg (MPU-6050 data sheet, section 6.2).
 _ERROR = 0.04  # of g
 _DECADES = 12.0  # the range of scales of what has no unit known here
@@ -26,7 +32,8 @@ def piece_means(values: Array, per_piece: int) -> Array:
     """Means over pieces of so many samples, (m, 3)."""
     count = max(len(values) // per_piece, 1)
     per_piece = min(per_piece, len(values))
-    return values[: count * per_piece].reshape(count, per_piece, -1).mean(axis=1)
+    whole = values[: count * per_piece].reshape(count, per_piece, -1)
+    return np.asarray(whole.mean(axis=1), dtype=np.float64)
 
 
 def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference, Inference, float]:
@@ -64,6 +71,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
             Inference("gravity", "removed", 0.5, nothing),
             usual,
         )
+    whole = bool((accel == np.round(accel)).all())
     spread = 1.4826 * float(np.median(np.abs(norms - usual))) / usual
     # The median over m pieces is better than a piece, but what the motion adds is one-sided. A
     # log of few pieces does not know its spread, and a crash is shorter than one.
@@ -84,7 +92,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         weights[unit, form] = float(np.log(max(prior * density, 1e-300)))
 
     for unit, scale in SCALES.items():
-        prior = _PRIOR[unit]
+        prior = _PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
         off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
         # A cubic tail, for what is shaken and spun more than its median spread tells.
         peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
@@ -106,10 +114,16 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
                 prior * _PRIOR_FORM["increment"],
                 calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2,
             )
+    for k, count in enumerate(_COUNTS):
+        off = (where - np.log10(count)) / sd
+        prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
+        add(None, f"counts {k}", prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2)
     add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
     found = posterior(weights)
     units = _summed(found, 0)
     forms = _summed(found, 1)
+    counted = sum(p for f, p in forms.items() if str(f).startswith("counts"))
+    forms["rate"] = forms.get("rate", 0.0) + counted
     told = f"the median norm of {PIECE} s means is {usual:.5g}, spread {100 * spread:.2g} %"
     best = next(iter(units))
     if best is not None:

@@ -139,7 +139,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         best = next(iter(times))
         told = time_evidence(stamps, mean_step(stamps), best)
         if signals.time_unit is None:
-            out.append(conclude("time_unit", dict(times), told, "--time-unit"))
+            out.append(conclude("time_unit", {**times}, told, "--time-unit"))
         else:
             stated = time_unit_probabilities(stamps)
             out.append(conclude("time_unit", dict(stated), told, "--time-unit"))

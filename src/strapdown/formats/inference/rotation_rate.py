@@ -15,8 +15,14 @@ Array = NDArray[np.float64]
 # How often a gyro without a stated unit is in each.
 _PRIOR = {"rad/s": 0.55, "deg/s": 0.43, "mdeg/s": 0.01, "mrad/s": 0.005, "deg/h": 0.005}
 _INCREMENTS = 0.01
-_OTHER = 0.02  # counts, turns a second: nothing known here
-_DECADES = 8.0
+_OTHER = 0.02  # turns a second and what else is not known here
+# Raw counts of a 16-bit sensor, deg/s each (data sheets of MPU-6050, BMI160, LSM6DS3): 2000 deg/s
+# full scale makes them 1.06 mrad/s, near enough to be taken for that.
+_COUNTS = [2000.0 / 32768.0 / 2.0**k for k in range(5)] + [0.00875, 0.0175, 0.035, 0.07]
+_PRIOR_COUNTS = 0.03
+# How often all numbers are whole in each unit; counts always are, but for averages of them.
+_WHOLE = {"rad/s": 1e-4, "deg/s": 0.01, "mrad/s": 0.1, "mdeg/s": 0.5, "deg/h": 0.2}
+_BROKEN_COUNTS = 0.05
 # Gyro and accelerometer of one device share their axes, as a rule; of what does not, a sense of
 # rotation that counts the other way and single reversed axes are as common as all else.
 _PRIOR_SAME = 0.9
@@ -25,9 +31,13 @@ _PRIOR_FREE = 0.05
 # The largest rate of a log, rad/s: from the bias of a good sensor to the full scale of a common
 # one (2000 deg/s); little lies below, and nearly nothing above.
 _QUIET, _FULL_SCALE = 3e-3, 25.0
-# A turn must move gravity by this much, and explain this much of its movement, to be evidence.
+# A turn must move gravity by this much, and one unit and one set of axes explain this much of its
+# movement, to be evidence; on scales on which it does not, the motion's acceleration is at work.
 LEAST_TURN = 0.02  # rad
-LEAST_EXPLAINED = 0.5
+LEAST_EXPLAINED = 0.85
+
+# Unit, form, axes (empty where the turn of gravity says nothing), unit of time.
+Hypothesis = tuple[str | None, str, str, str]
 
 
 def _log_magnitude(rate: float) -> float:
@@ -65,20 +75,25 @@ def infer_gyro(
         Weighed anew.
     """
     largest = float(np.quantile(np.linalg.norm(gyro, axis=1), 0.99)) if len(gyro) else 0.0
+    # Still sensors read zero in any unit; whole numbers say something where they vary.
+    whole = bool((gyro == np.round(gyro)).all()) and float(np.abs(gyro).max(initial=0.0)) >= 3.0
     names, matrices = signed_permutations()
-    weights: dict[tuple[str | None, str, str, str], float] = {}
+    weights: dict[Hypothesis, float] = {}
     scales: list[tuple[Turn, float]] = []
-    pooled: list[dict[tuple[str | None, str, str, str], float]] = []
     likely = {u: p for u, p in time_units.items() if p > 1e-3} or {"s": 1.0}
     base: dict[tuple[str | None, str, str], float] = {}
-    by_scale: dict[float, dict[tuple[str | None, str, str, str], float]] = {}
+    by_scale: dict[float, dict[Hypothesis, float]] = {}
     for tau, share in likely.items():
         factor = TIME_UNITS[tau]
         step = mean_step(ticks) * factor
         candidates: dict[tuple[str | None, str], tuple[float, float]] = {}
+        for k, count in enumerate(_COUNTS):
+            prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
+            candidates[None, f"counts {k}"] = (np.radians(count), prior)
         for unit, scale in GYRO_UNITS.items():
-            candidates[unit, "rate"] = (scale, _PRIOR[unit] * (1 - _INCREMENTS))
-            candidates[unit, "increment"] = (scale / step, _PRIOR[unit] * _INCREMENTS)
+            prior = _PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
+            candidates[unit, "rate"] = (scale, prior * (1 - _INCREMENTS))
+            candidates[unit, "increment"] = (scale / step, prior * _INCREMENTS)
         for key, (scale, prior) in candidates.items():
             base[key[0], key[1], tau] = float(
                 np.log(share * prior * (1 - _OTHER)) + _log_magnitude(largest * scale)
@@ -86,14 +101,16 @@ def infer_gyro(
         base[None, "other", tau] = float(np.log(share * _OTHER))
         found = turns(ticks * factor, gyro, force) if force is not None else ()
         for turn in found:
-            _, left = turn.free()
-            explained = 1.0 - left / max(turn.gram[9, 9], 1e-30)
-            if turn.signal < LEAST_TURN or explained < LEAST_EXPLAINED:
+            if turn.signal < LEAST_TURN:
+                continue
+            rows = {
+                k: turn.log_likelihoods(scale * matrices) for k, (scale, _) in candidates.items()
+            }
+            if max(float(e.max()) for _, e in rows.values()) < LEAST_EXPLAINED:
                 continue
             scales.append((turn, share))
             table = by_scale.setdefault(turn.half_width, {})
-            for key, (scale, _) in candidates.items():
-                logs, _explained = turn.log_likelihoods(scale * matrices)
+            for key, (logs, _) in rows.items():
                 for name, log in zip(names, logs.tolist(), strict=True):
                     same = _PRIOR_SAME if name == "x,y,z" else (1 - _PRIOR_SAME) / 47
                     table[key[0], key[1], name, tau] = (
@@ -113,24 +130,22 @@ def infer_gyro(
                 table[unit, form, "", tau] = weight
     pooled = [posterior(t) for t in by_scale.values()] or [posterior(weights)]
     # Which scale is free of motion in step with the turn is not known: each has its share.
-    share = 1.0 / len(pooled)
-    total: dict[tuple[str | None, str, str, str], float] = {}
-    for table in pooled:
-        for hypothesis, p in table.items():
-            total[hypothesis] = total.get(hypothesis, 0.0) + share * p
+    total: dict[Hypothesis, float] = {}
+    for probabilities in pooled:
+        for hypothesis, p in probabilities.items():
+            # Counts are rates, in no unit.
+            form = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
+            key4 = (hypothesis[0], form, hypothesis[2], hypothesis[3])
+            total[key4] = total.get(key4, 0.0) + p / len(pooled)
     evidence = _evidence(largest, scales, total)
-    units = _marginal(total, 0)
-    forms = _marginal(total, 1)
     axes = {k or None: v for k, v in _marginal(total, 2).items()}
-    unit = conclude("gyro_unit", units, evidence, "--gyro-unit")
-    form = conclude("gyro_form", forms, evidence)
+    said_unit = conclude("gyro_unit", _marginal(total, 0), evidence, "--gyro-unit")
+    said_form = conclude("gyro_form", _marginal(total, 1), evidence)
     times = {str(k): v for k, v in _marginal(total, 3).items()}
-    return unit, form, conclude("gyro_axes", axes, evidence, "--columns"), times
+    return said_unit, said_form, conclude("gyro_axes", axes, evidence, "--columns"), times
 
 
-def _marginal(
-    total: dict[tuple[str | None, str, str, str], float], key: int
-) -> dict[str | None, float]:
+def _marginal(total: dict[Hypothesis, float], key: int) -> dict[str | None, float]:
     out: dict[str | None, float] = {}
     for hypothesis, p in total.items():
         out[hypothesis[key]] = out.get(hypothesis[key], 0.0) + p
@@ -140,21 +155,21 @@ def _marginal(
 def _evidence(
     largest: float,
     scales: list[tuple[Turn, float]],
-    total: dict[tuple[str | None, str, str, str], float],
+    total: dict[Hypothesis, float],
 ) -> tuple[str, ...]:
     unit = next(iter(_marginal(total, 0)))
     told = []
     if scales:
         turn = max(scales, key=lambda s: (s[1], s[0].signal))[0]
-        best, left = turn.free()
+        _, left = turn.free()
         explained = 1.0 - left / turn.gram[9, 9]
         name = next((n for n in _marginal(total, 2) if n), "x,y,z")
         names, matrices = signed_permutations()
         m = matrices[names.index(name)].reshape(9)
         norm = float(m @ turn.gram[:9, 9] / max(m @ turn.gram[:9, :9] @ m, 1e-300))
         told.append(
-            f"over {turn.half_width:g} s gravity turns by {np.degrees(turn.signal):.3g}° rms in the "
-            f"accelerometer, and the gyro explains {100 * explained:.3g} % of that at "
+            f"over {turn.half_width:g} s gravity turns by {np.degrees(turn.signal):.3g}° rms in "
+            f"the accelerometer, and the gyro explains {100 * explained:.3g} % of that at "
             f"{norm:.4g} rad/s a unit"
         )
     else:

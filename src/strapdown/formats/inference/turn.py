@@ -26,8 +26,9 @@ Array = NDArray[np.float64]
 HALF_WIDTHS = (0.5, 1.0, 2.0, 4.0)  # s
 LEAST_WINDOWS = 3
 # A scale factor of 3 % and misalignments of 1 to 2 degrees are in the data sheets of consumer
-# sensors; a difference below that tells nothing.
-MODEL_ERROR = 0.03
+# sensors, and the acceleration of an arm in step with its turn adds its share; a difference below
+# that tells nothing. Units differ by far more.
+MODEL_ERROR = 0.1
 # Zero-rate output, one sigma (MPU-6050 data sheet: within 20 deg/s).
 BIAS_SD = 0.12  # rad/s
 # Below this an offset or a scale error of the accelerometer could turn the direction as much.
@@ -95,8 +96,8 @@ class Turn:
         """Logarithm of the likelihood of each (m, 3, 3) matrix k M, and what it explains.
 
         Relative to a gyro that predicts nothing, so that windows of different units of time
-        compare. The noise is not known; it is integrated out, which leaves the power -windows / 2 of the
-        sum of squares, to which the model's own error is added.
+        compare. The noise is not known; it is integrated out, which leaves the power
+        -windows / 2 of the sum of squares, to which the model's own error is added.
         """
         c = matrices.reshape(len(matrices), 9)
         a = np.einsum("ni,ij,nj->n", c, self.gram[:9, :9], c)
