@@ -21,10 +21,13 @@ class Bare:
     gyro: np.ndarray
     accel: np.ndarray
     mag: np.ndarray | None = None
-    truth: tuple[tuple[str, str], ...] = ()
 
     def scaled(self, gyro: float = 1.0, accel: float = 1.0, time: float = 1.0) -> Bare:
         return replace(self, gyro=self.gyro * gyro, accel=self.accel * accel, time=self.time * time)
+
+    def turned(self, matrix: np.ndarray) -> Bare:
+        mag = None if self.mag is None else self.mag @ matrix.T
+        return replace(self, gyro=self.gyro @ matrix.T, accel=self.accel @ matrix.T, mag=mag)
 
     def log(self) -> RawLog:
         columns = {"time": self.time}

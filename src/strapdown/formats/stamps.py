@@ -58,6 +58,7 @@ def read_stamps(
     row: Callable[[int], int],
     repair: bool,
     origin: Origin | None = None,
+    only_seconds: bool = False,
 ) -> Stamps:
     """Turn raw stamps into increasing seconds.
 
@@ -78,6 +79,8 @@ def read_stamps(
     origin : Origin, optional
         Count from here, as another log does; if not given, from zero, or from the first stamp
         where zero is far away.
+    only_seconds : bool
+        Take no other unit than seconds from the numbers alone.
 
     Returns
     -------
@@ -96,7 +99,7 @@ def read_stamps(
         _refuse_backward(stamps, ticks, file, row)
     keep, ticks = _repaired(stamps, ticks, file, findings)
     if unit is None:
-        unit, why = _evident_unit(stamps[keep], file, findings)
+        unit, why = _evident_unit(stamps[keep], file, findings, only_seconds)
     elif (usual := _mean_step(ticks[keep]) * TIME_UNITS[unit]) > 0 and not (
         PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
     ):
@@ -209,9 +212,11 @@ def _repaired(
     return keep, ticks
 
 
-def _evident_unit(stamps: NDArray[Any], file: str, findings: list[Finding]) -> tuple[str, str]:
+def _evident_unit(
+    stamps: NDArray[Any], file: str, findings: list[Finding], only_seconds: bool
+) -> tuple[str, str]:
     said = infer_time_unit(stamps)
-    if said.settled:
+    if said.settled and (said.value == "s" or not only_seconds):
         unit = str(said.value)
         if unit != "s":
             findings.append(

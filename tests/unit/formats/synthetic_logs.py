@@ -164,7 +164,12 @@ def make(seed: int) -> tuple[Signals, Truth]:
         mag_unit,
         rate,
     )
-    signals = Signals(stamps, gyro / gyro_scale, accel / accel_scale, mag / MAG_UNITS[mag_unit])
+    gyro, accel = gyro / gyro_scale, accel / accel_scale
+    if gyro_unit == "counts":
+        gyro = np.round(gyro)
+    if accel_unit == "counts":
+        accel = np.round(accel)
+    signals = Signals(stamps, gyro, accel, mag / MAG_UNITS[mag_unit])
     return signals, truth
 
 
@@ -182,10 +187,8 @@ def _stamps(rng, time, unit):
         return ticks.astype(np.int64), "1 wrapped (a counter of 32 bits)"
     if fault == "jump":
         ticks[k:] += 100.0 * step / TIME_UNITS[unit]
-    if unit in ("us", "ns"):
-        whole = np.round(ticks).astype(np.int64) + int(start)
-    else:
-        whole = ticks + start
+    integers = np.round(ticks).astype(np.int64) + int(start)
+    whole = integers if unit in ("us", "ns") else ticks + start
     if fault == "repeated":
         whole[k] = whole[k - 1]
         return whole, "1 repeated"

@@ -59,7 +59,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     sensor and the part of the motion that does not average out; its spread over the log says how
     much that is. Without gravity it may be anything, and swings as much as it is large.
     """
-    pieces = piece_means(accel, max(int(round(PIECE / step)), 1) if step else 10)
+    pieces = piece_means(accel, max(round(PIECE / step), 1) if step else 10)
     norms = np.linalg.norm(pieces, axis=1)
     usual = float(np.median(norms))
     flag = "--accel-unit"
@@ -179,7 +179,7 @@ def infer_up(accel: Array, step: float | None) -> Inference:
     A sensor of the other sign (iOS) reads the same numbers upside down. That share of sensors,
     a twentieth, bounds the confidence; the flag is the user's to give.
     """
-    pieces = piece_means(accel, max(int(round(1.0 / step)), 1) if step else 100)
+    pieces = piece_means(accel, max(round(1.0 / step), 1) if step else 100)
     norms = np.linalg.norm(pieces, axis=1, keepdims=True)
     units = pieces / np.where(norms > 0, norms, 1.0)
     # Within 30 deg of an axis; more than half the log makes it the sensor's usual attitude.

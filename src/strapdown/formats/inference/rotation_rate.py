@@ -108,6 +108,10 @@ def infer_gyro(
             }
             if max(float(e.max()) for _, e in rows.values()) < LEAST_EXPLAINED:
                 continue
+            # Where nine free numbers do much better than any gyro could, motion is in step.
+            free = turn.log_free()
+            if max(float(logs.max()) for logs, _ in rows.values()) < free + np.log(_PRIOR_FREE):
+                continue
             scales.append((turn, share))
             table = by_scale.setdefault(turn.half_width, {})
             for key, (logs, _) in rows.items():
@@ -116,27 +120,26 @@ def infer_gyro(
                     table[key[0], key[1], name, tau] = (
                         base[key[0], key[1], tau] + log + np.log(same * (1 - _PRIOR_FREE))
                     )
-            free = turn.log_free()
             # A fit that means nothing leaves the magnitudes to speak.
             for key in candidates:
                 table[key[0], key[1], "", tau] = (
                     base[key[0], key[1], tau] + free + np.log(_PRIOR_FREE)
                 )
             table[None, "other", "", tau] = base[None, "other", tau] + free
-    for (unit, form, tau), weight in base.items():
-        weights[unit, form, "", tau] = weight
+    for (name, kind, tau), weight in base.items():
+        weights[name, kind, "", tau] = weight
         for table in by_scale.values():
             if not any(h[3] == tau and h[2] for h in table):
-                table[unit, form, "", tau] = weight
+                table[name, kind, "", tau] = weight
     pooled = [posterior(t) for t in by_scale.values()] or [posterior(weights)]
     # Which scale is free of motion in step with the turn is not known: each has its share.
     total: dict[Hypothesis, float] = {}
     for probabilities in pooled:
         for hypothesis, p in probabilities.items():
             # Counts are rates, in no unit.
-            form = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
-            key4 = (hypothesis[0], form, hypothesis[2], hypothesis[3])
-            total[key4] = total.get(key4, 0.0) + p / len(pooled)
+            kind = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
+            merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
+            total[merged] = total.get(merged, 0.0) + p / len(pooled)
     evidence = _evidence(largest, scales, total)
     axes = {k or None: v for k, v in _marginal(total, 2).items()}
     said_unit = conclude("gyro_unit", _marginal(total, 0), evidence, "--gyro-unit")

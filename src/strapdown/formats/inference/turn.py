@@ -117,8 +117,10 @@ class Turn:
         predicted = float(c @ self.gram[:9, :9] @ c)
         floor = MODEL_ERROR**2 * predicted + 6 * self.windows * LEAST_SIGNAL**2
         # Five of nine elements are turned about on the way, as a rule; each costs sqrt(windows).
+        # Their common scale may lie anywhere in eight decades, and fits within a tenth.
         log = -0.5 * self.windows * np.log((left + floor) / self._nothing())
-        return float(log - 2.5 * np.log(max(self.windows, 2)))
+        cost = 2.5 * np.log(max(self.windows, 2)) + np.log(8.0 * np.log(10.0) / MODEL_ERROR)
+        return float(log - cost)
 
 
 def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
