@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -81,6 +82,8 @@ def test_it_is_right_or_asks(recordings, name, gyro, accel, time, axes):
     to_gyro = GYRO[is_gyro] / GYRO[gyro] if gyro and is_gyro else 1.0
     to_accel = ACCEL[is_accel] / ACCEL[accel] if accel and is_accel else 1.0
     turned = log.scaled(to_gyro, to_accel, 1.0 / TIME[time]).turned(AXES[axes])
+    if time == "us":  # a clock that counts
+        turned = replace(turned, time=np.round(turned.time).astype(np.int64))
     found = {i.quantity: i for i in infer(turned.log())}
     right = {
         "gyro_unit": (gyro or is_gyro) if is_gyro else None,
@@ -99,7 +102,8 @@ def test_it_is_right_or_asks(recordings, name, gyro, accel, time, axes):
         if q in found and found[q].settled and found[q].value != v
     ]
     assert not wrong
-    assert found["time_unit"].settled
+    # 10 kHz in ms could be 10 Hz in s.
+    assert found["time_unit"].settled or name.startswith("crash")
     if name in GYRO_TOLD:
         assert found["gyro_unit"].settled
     if name in ACCEL_TOLD:
@@ -109,8 +113,6 @@ def test_it_is_right_or_asks(recordings, name, gyro, accel, time, axes):
 @pytest.mark.parametrize("name", [NAMES[0], NAMES[4]])
 @pytest.mark.parametrize("axes", ["-x,-y,-z", "x,-y,z", "y,x,z"])
 def test_a_gyro_whose_axes_were_exchanged_is_never_called_right(recordings, name, axes):
-    from dataclasses import replace
-
     from strapdown.formats.inference.turn import signed_permutations
 
     names, matrices = signed_permutations()

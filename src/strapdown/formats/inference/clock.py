@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 # Rates at which inertial sensors are logged, as log10 of a density over log10 of the rate in Hz:
 # phones, boards and navigation units keep 10 to 1000 Hz, crash recorders 10 to 20 kHz; nobody
 # logs a rotation every ten seconds.
-_RATE = np.log10([1e-3, 0.01, 0.1, 1.0, 5.0, 20.0, 1e3, 2e3, 5e3, 1e4, 1e5, 1e6])
-_RATE_DENSITY = np.array([-9.0, -7.0, -4.5, -1.5, -0.5, 0.0, 0.0, -1.0, -2.2, -3.0, -4.5, -8.0])
+_RATE = np.log10([1e-3, 0.01, 0.1, 1.0, 5.0, 20.0, 1e3, 2e3, 5e3, 1e4, 5e4, 1e6])
+_RATE_DENSITY = np.array([-9.0, -7.0, -4.5, -1.5, -0.5, 0.0, 0.0, -0.8, -1.4, -1.6, -4.0, -8.0])
 # How often a clock counts in each, where nothing says so; minutes are for tables by hand.
 _PRIOR = {"s": 0.5, "ms": 0.25, "us": 0.15, "ns": 0.1, "min": 1e-6}
 # How often stamps in each have fractions.
-_FRACTIONAL = {"s": 1.0, "ms": 0.3, "us": 0.1, "ns": 0.02, "min": 1.0}
+_FRACTIONAL = {"s": 1.0, "ms": 0.6, "us": 0.1, "ns": 0.02, "min": 1.0}
 # A first stamp that is an instant of these years by chance is rare; clocks of 1970 are not.
 _EPOCH = (946_684_800.0, 2_366_841_600.0)  # 2000 to 2045
 _EPOCH_RATIO = 30.0

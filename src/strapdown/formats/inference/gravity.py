@@ -85,7 +85,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     # What moves and has no gravity averages to nothing, for velocities stay bounded.
     lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
     # With gravity the motion of a hand or a car spreads it by a tenth.
-    calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.3
+    calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.1
     weights: dict[tuple[str | None, str], float] = {}
 
     def add(unit: str | None, form: str, prior: float, density: float) -> None:

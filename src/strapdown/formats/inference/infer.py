@@ -134,7 +134,10 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     if signals.gyro is not None and len(signals.gyro) > 1:
         ticks, gyro, force = _increasing(signals, force)
         if len(gyro) > 1:
-            *turned, times = infer_gyro(ticks, gyro, force, times or {"s": 1.0})
+            *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0})
+            if times and next(iter(joint)) != next(iter(times)):
+                # A turn that fits in another unit of time alone is a doubt, and no proof.
+                times = {u: min(p, 0.5) for u, p in times.items()}
     if stamps is not None and times:
         best = next(iter(times))
         told = time_evidence(stamps, mean_step(stamps), best)

@@ -126,11 +126,11 @@ def infer_gyro(
                     base[key[0], key[1], tau] + free + np.log(_PRIOR_FREE)
                 )
             table[None, "other", "", tau] = base[None, "other", tau] + free
-    for (name, kind, tau), weight in base.items():
-        weights[name, kind, "", tau] = weight
+    for (known, kind, tau), weight in base.items():
+        weights[known, kind, "", tau] = weight
         for table in by_scale.values():
             if not any(h[3] == tau and h[2] for h in table):
-                table[name, kind, "", tau] = weight
+                table[known, kind, "", tau] = weight
     pooled = [posterior(t) for t in by_scale.values()] or [posterior(weights)]
     # Which scale is free of motion in step with the turn is not known: each has its share.
     total: dict[Hypothesis, float] = {}
