@@ -134,7 +134,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     if signals.gyro is not None and len(signals.gyro) > 1:
         ticks, gyro, force = _increasing(signals, force)
         if len(gyro) > 1:
-            *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0})
+            *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0}, _increments(heard))
             if times and next(iter(joint)) != next(iter(times)):
                 # A turn that fits in another unit of time alone is a doubt, and no proof.
                 times = {u: min(p, 0.5) for u, p in times.items()}
@@ -180,6 +180,15 @@ def _steady(accel: Array) -> bool:
     """Whether the norm is that of one vector: it spreads by less than a fifth of itself."""
     norms = np.linalg.norm(accel, axis=1)
     return bool(np.std(norms) < 0.2 * np.mean(norms))
+
+
+def _increments(heard: list[Inference]) -> float:
+    """Prior of increments in the gyro: what the accelerometer holds, within bounds."""
+    form = next((i for i in heard if i.quantity == "accel_form"), None)
+    if form is None:
+        return 0.01
+    shares = dict(((form.value, form.confidence), *form.alternatives))
+    return float(np.clip(shares.get("increment", 0.0), 1e-3, 0.95))
 
 
 def _sign() -> Inference:

@@ -35,6 +35,7 @@ _QUIET, _FULL_SCALE = 3e-3, 25.0
 # movement, to be evidence; on scales on which it does not, the motion's acceleration is at work.
 LEAST_TURN = 0.02  # rad
 LEAST_EXPLAINED = 0.85
+LEAST_SCALES = 2
 
 # Unit, form, axes (empty where the turn of gravity says nothing), unit of time.
 Hypothesis = tuple[str | None, str, str, str]
@@ -54,6 +55,7 @@ def infer_gyro(
     gyro: Array,
     force: Array | None,
     time_units: dict[str, float],
+    increments: float = _INCREMENTS,
 ) -> tuple[Inference, Inference, Inference, dict[str, float]]:
     """Conclude unit, form and axes of a gyro, and weigh the units of time by it.
 
@@ -67,6 +69,9 @@ def infer_gyro(
         Accelerometer in units of gravity; None where gravity is not in it.
     time_units : dict of str to float
         Probability of each unit of time.
+    increments : float
+        Probability of increments instead of rates; that of the accelerometer, which is of the
+        same kind.
 
     Returns
     -------
@@ -92,8 +97,8 @@ def infer_gyro(
             candidates[None, f"counts {k}"] = (np.radians(count), prior)
         for unit, scale in GYRO_UNITS.items():
             prior = _PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
-            candidates[unit, "rate"] = (scale, prior * (1 - _INCREMENTS))
-            candidates[unit, "increment"] = (scale / step, prior * _INCREMENTS)
+            candidates[unit, "rate"] = (scale, prior * (1 - increments))
+            candidates[unit, "increment"] = (scale / step, prior * increments)
         for key, (scale, prior) in candidates.items():
             base[key[0], key[1], tau] = float(
                 np.log(share * prior * (1 - _OTHER)) + _log_magnitude(largest * scale)
@@ -126,6 +131,9 @@ def infer_gyro(
                     base[key[0], key[1], tau] + free + np.log(_PRIOR_FREE)
                 )
             table[None, "other", "", tau] = base[None, "other", tau] + free
+    # An arm in step with its turn can pass for a gyro on one scale; on two it does not.
+    if len(by_scale) < LEAST_SCALES:
+        by_scale, scales = {}, []
     for (known, kind, tau), weight in base.items():
         weights[known, kind, "", tau] = weight
         for table in by_scale.values():
