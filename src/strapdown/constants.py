@@ -11,6 +11,7 @@ __all__ = [
     "ACCEL_UNITS",
     "CORTEX_M4F_CYCLES",
     "GYRO_UNITS",
+    "MAG_UNITS",
     "STANDARD_GRAVITY",
     "TIME_UNITS",
 ]
@@ -37,6 +38,15 @@ ACCEL_UNITS: dict[str, float] = {
     # Sensors that report gravity instead of specific force, as iOS does.
     "-m/s2": -1.0,
     "-g": -STANDARD_GRAVITY,
+}
+
+#: Factors to µT.
+MAG_UNITS: dict[str, float] = {
+    "uT": 1.0,
+    "nT": 1e-3,
+    "gauss": 100.0,
+    "mG": 0.1,
+    "T": 1e6,
 }
 
 #: Factors to s.

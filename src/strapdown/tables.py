@@ -8,7 +8,8 @@ changed in place.
 table                   index                  columns
 ======================  =====================  ===================================================
 Imu                     ``time`` s             ``gyro_x..z`` rad/s, and where there is an
-                                               accelerometer ``accel_x..z`` m/s² (specific force);
+                                               accelerometer ``accel_x..z`` m/s² (specific force),
+                                               where there is a magnetometer ``mag_x..z`` µT;
                                                body axes forward-right-down;
                                                ``attrs["sampling"]``: ``instantaneous`` at the
                                                stamp, or ``mean`` over the interval that ends there
@@ -38,6 +39,7 @@ Array = NDArray[np.float64]
 
 GYRO = ["gyro_x", "gyro_y", "gyro_z"]
 ACCEL = ["accel_x", "accel_y", "accel_z"]
+MAG = ["mag_x", "mag_y", "mag_z"]
 THETA = ["theta_x", "theta_y", "theta_z"]
 DTHETA = ["dtheta_x", "dtheta_y", "dtheta_z"]
 QUATERNION = ["q_w", "q_x", "q_y", "q_z"]
@@ -186,6 +188,7 @@ def imu_table(
     time: ArrayLike,
     gyro: ArrayLike,
     accel: ArrayLike | None = None,
+    mag: ArrayLike | None = None,
     *,
     sampling: str = "instantaneous",
     source: str | None = None,
@@ -200,6 +203,8 @@ def imu_table(
         Rate of the body relative to inertial space, in body axes (forward, right, down).
     accel : array_like, (n, 3), m/s², optional
         Specific force in body axes: about (0, 0, -9.8) at rest and level.
+    mag : array_like, (n, 3), µT, optional
+        Magnetic field in body axes.
     sampling : {'instantaneous', 'mean'}
         Whether a row holds the value at its stamp or the mean over the interval ending there.
     source : str, optional
@@ -223,6 +228,10 @@ def imu_table(
         force = _array(accel, 3, "accel", source)
         _same_length(source, time=stamps, accel=force)
         columns, values = columns + ACCEL, np.hstack([values, force])
+    if mag is not None:
+        field = _array(mag, 3, "mag", source)
+        _same_length(source, time=stamps, mag=field)
+        columns, values = columns + MAG, np.hstack([values, field])
     table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
     check_imu(table)
@@ -252,10 +261,12 @@ def check_imu(table: pd.DataFrame) -> None:
             remedy="say 'instantaneous' (rate at the stamp) or 'mean' (over the interval "
             "that ends there)",
         )
-    accel = [c for c in ACCEL if c in table.columns]
-    if accel and len(accel) < 3:
-        _check_columns(table, ACCEL, source)
-    columns = GYRO + accel
+    columns = list(GYRO)
+    for triad in (ACCEL, MAG):
+        there = [c for c in triad if c in table.columns]
+        if there:
+            _check_columns(table, triad, source)
+        columns += there
     if len(table) < 2:
         raise DataError(
             f"{len(table)} sample: attitude is the integral of a rate, and needs at least two",

@@ -41,6 +41,22 @@ def stamps(values: list[str], header: str = HEADER) -> Callable[[Path], Path]:
     return make
 
 
+def turning(header: str, scale: float) -> Callable[[Path], Path]:
+    """A slow tumble of 20 s: rates in rad/s over `scale`, gravity in g."""
+
+    def make(folder: Path) -> Path:
+        t = np.arange(2001) * 0.01
+        roll, pitch = np.sin(0.9 * t), 0.8 * np.sin(0.6 * t)
+        p, q = 0.9 * np.cos(0.9 * t), 0.48 * np.cos(0.6 * t)
+        # Rates of roll and pitch in body axes, heading kept: w = (p, q cos, -q sin).
+        rates = np.column_stack([p, q * np.cos(roll), -q * np.sin(roll)]) / scale
+        force = [np.sin(pitch), -np.sin(roll) * np.cos(pitch), -np.cos(roll) * np.cos(pitch)]
+        lines = [",".join(f"{v:.6f}" for v in row) for row in np.column_stack([t, rates, *force])]
+        return text(folder / "log.csv", lines, header)
+
+    return make
+
+
 def wrapped(folder: Path) -> Path:
     ticks = [(4294960000 + 10000 * k) % 2**32 for k in range(40)]
     return stamps([str(t) for t in ticks], HEADER.replace("time_s", "time_us"))(folder)
@@ -220,6 +236,11 @@ CASES = [
     Case(
         "Milliseconds that do not say so",
         stamps([str(10 * k) for k in range(50)], HEADER.replace("time_s", "time")),
+        fails=False,
+    ),
+    Case(
+        "A clock that could be of two units",
+        stamps([str(k) for k in range(50)], HEADER.replace("time_s", "time")),
     ),
     Case(
         "Nanoseconds since 1970 that do not say so",
@@ -227,6 +248,7 @@ CASES = [
             [str(1_700_000_000_000_000_000 + 10_000_000 * k) for k in range(50)],
             HEADER.replace("time_s", "time"),
         ),
+        fails=False,
     ),
     Case(
         "Nanoseconds since 1970, with --time-unit ns",
@@ -246,6 +268,16 @@ CASES = [
     Case(
         "No unit of the rate",
         lambda f: text(f / "log.csv", rows(), "time_s,gx,gy,gz"),
+    ),
+    Case(
+        "No unit of the rate, and gravity tells it",
+        turning("time_s,gx,gy,gz,ax,ay,az", np.pi / 180.0),
+        fails=False,
+    ),
+    Case(
+        "Degrees that were called radians, and gravity tells it",
+        turning("time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g", np.pi / 180.0),
+        fails=False,
     ),
     Case(
         "A unit that is none",

@@ -8,11 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.formats.assemble_truth import truth_of_log
 from strapdown.formats.columns import parse_axes, parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
+from strapdown.formats.inference import Inference, Signals, infer_signals
+from strapdown.formats.judge import (
+    UNITS,
+    inferred_unit,
+    report_contradictions,
+    report_upside_down,
+    told_of_up,
+)
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.plausibility import report_absurd, report_gaps
 from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
@@ -21,7 +28,8 @@ from strapdown.results import Reading
 from strapdown.tables import SAMPLINGS, imu_table
 
 Array = NDArray[np.float64]
-UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS}
+# Left out where they cannot be used, for the gyro alone makes an attitude.
+OPTIONAL = ("accel", "mag")
 
 
 @dataclass(frozen=True)
@@ -56,11 +64,14 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     found = find_columns(raw, options)
     require_gyro(raw, found)
     findings = list(raw.findings)
-    axes = _axes(raw, options, findings)
-    values, units = _triads(raw, found, options, findings)
+    values = _values(raw, found, findings)
     ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
+    said = _said(raw, found, options, values, ticks, dated)
+    axes = _axes(raw, options, said, findings)
+    units = _units(raw, found, options, values, said, findings)
+    values = {t: values[t] for t in units}
     finite = _finite_rows(raw, found, ticks, values, options, findings)
-    stamps = _stamps(raw, found, ticks, dated, options, finite, findings)
+    stamps = _stamps(raw, found, ticks, dated, options, finite, said, findings)
     kept = np.flatnonzero(finite)[stamps.keep]
     time = stamps.seconds[stamps.keep]
     if time.size < 2:
@@ -90,7 +101,9 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     sampling = _sampling(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
-    imu = imu_table(time, body["gyro"], body.get("accel"), sampling=sampling, source=raw.name)
+    imu = imu_table(
+        time, body["gyro"], body.get("accel"), body.get("mag"), sampling=sampling, source=raw.name
+    )
     truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)
     return Recording(
         raw.name, raw.files, stamps.origin, imu, truth, scored, tuple(readings), tuple(findings)
@@ -100,37 +113,27 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
 # --- rates and specific force -----------------------------------------------------------
 
 
-def _triads(
-    raw: RawLog, found: dict[str, Column], options: ReadOptions, findings: list[Finding]
-) -> tuple[dict[str, Array], dict[str, tuple[str, str]]]:
-    """Values as they stand in the file, and the unit of each triad with its reason."""
+def _values(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> dict[str, Array]:
+    """Values of the triads as they stand in the file."""
     values = {"gyro": _triad(raw, found, "gyro")}
-    units = {"gyro": _unit(raw, found, "gyro", options, values["gyro"])}
-    if not any(f"accel_{a}" in found for a in AXES):
-        return values, units
-    # The gyro alone makes an attitude; an accelerometer that cannot be used is left out.
-    try:
-        missing = [f"accel_{a}" for a in AXES if f"accel_{a}" not in found]
-        if missing:
-            raise DataError(f"{', '.join(missing)} is not there")
-        accel = _triad(raw, found, "accel")
-        if not np.isfinite(accel).any():
-            raise DataError("it holds no number")
-        unit = _unit(raw, found, "accel", options, accel)
-    except DataError as error:
-        said = error.finding
-        findings.append(
-            Finding(
-                f"left out: {said.what}",
-                file=raw.name,
-                row=said.row,
-                quantity="accel",
-                remedy=said.remedy,
-            )
-        )
-    else:
-        values["accel"], units["accel"] = accel, unit
-    return values, units
+    for triad in OPTIONAL:
+        if not any(f"{triad}_{a}" in found for a in AXES):
+            continue
+        try:
+            missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in found]
+            if missing:
+                raise DataError(f"{', '.join(missing)} is not there")
+            block = _triad(raw, found, triad)
+            if not np.isfinite(block).any():
+                raise DataError("it holds no number")
+            empty = int((~np.isfinite(block)).any(axis=1).sum())
+            if triad == "mag" and empty:
+                raise DataError(f"{empty} rows hold no number of it")
+        except DataError as error:
+            findings.append(_left_out(raw, triad, error))
+        else:
+            values[triad] = block
+    return values
 
 
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
@@ -138,10 +141,70 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
     return np.column_stack(parts)
 
 
-def _unit(
-    raw: RawLog, found: dict[str, Column], triad: str, options: ReadOptions, values: Array
-) -> tuple[str, str]:
-    asked = options.gyro_unit if triad == "gyro" else options.accel_unit
+def _left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
+    said = error.finding
+    return Finding(
+        f"left out: {said.what}", file=raw.name, row=said.row, quantity=triad, remedy=said.remedy
+    )
+
+
+def _said(
+    raw: RawLog,
+    found: dict[str, Column],
+    options: ReadOptions,
+    values: dict[str, Array],
+    ticks: NDArray[Any] | None,
+    dated: bool,
+) -> dict[str, Inference]:
+    """What the numbers say; of a gyro alone whose unit is stated, nothing is asked."""
+    if set(values) == {"gyro"} and _stated_unit(found, "gyro", options):
+        return {}
+    unit = "ns" if dated else None
+    if ticks is not None and not dated:
+        asked = options.time_unit
+        unit = parse_unit(asked, "time") if asked else found["time"].unit
+    signals = Signals(
+        ticks,
+        values["gyro"],
+        values.get("accel"),
+        values.get("mag"),
+        time_unit=unit,
+        rate=options.rate or raw.rate,
+    )
+    return {i.quantity: i for i in infer_signals(signals)}
+
+
+def _units(
+    raw: RawLog,
+    found: dict[str, Column],
+    options: ReadOptions,
+    values: dict[str, Array],
+    said: dict[str, Inference],
+    findings: list[Finding],
+) -> dict[str, tuple[str, str]]:
+    """The unit of each triad that can be used, with its reason."""
+    units: dict[str, tuple[str, str]] = {}
+    asked: set[str] = set()
+    for triad, block in values.items():
+        stated = _stated_unit(found, triad, options)
+        if stated is None or stated[1].startswith("stated by --"):
+            asked.add(triad)
+        try:
+            units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
+        except DataError as error:
+            if triad == "gyro":
+                raise
+            findings.append(_left_out(raw, triad, error))
+    mirrored = options.axes is not None and _determinant(*parse_axes(options.axes)) < 0
+    plain = {t: u for t, (u, _) in units.items()}
+    report_contradictions(said, plain, asked, mirrored, raw.name, findings)
+    return units
+
+
+def _stated_unit(
+    found: dict[str, Column], triad: str, options: ReadOptions
+) -> tuple[str, str] | None:
+    asked = {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
     if asked:
         return parse_unit(asked, triad), f"stated by --{triad}-unit"
     columns = [found[f"{triad}_{a}"] for a in AXES]
@@ -149,25 +212,7 @@ def _unit(
     if len(units) == 1 and (unit := columns[0].unit) in UNITS[triad]:
         stated = columns[0].why == "stated by the file"
         return unit, "stated by the file" if stated else "in its name"
-    largest = float(np.nanmax(np.abs(np.where(np.isfinite(values), values, np.nan)), initial=0.0))
-    choices = ("rad/s", "deg/s") if triad == "gyro" else ("m/s2", "g")
-    told = " or ".join(
-        f"{u} (the largest value, {largest:.4g}, is then "
-        f"{_in_plain_words(triad, largest * UNITS[triad][u])})"
-        for u in choices
-    )
-    raise DataError(
-        f"the unit is not stated{' for all three axes alike' if len(units) > 1 else ''}",
-        file=raw.name,
-        quantity=triad,
-        remedy=f"state it with --{triad}-unit: {told}",
-    )
-
-
-def _in_plain_words(triad: str, value: float) -> str:
-    if triad == "gyro":
-        return f"{np.degrees(value) / 360.0:.3g} turns a second"
-    return f"{value:.3g} m/s²"
+    return None
 
 
 # --- rows and stamps --------------------------------------------------------------------
@@ -224,6 +269,7 @@ def _stamps(
     dated: bool,
     options: ReadOptions,
     finite: NDArray[np.bool_],
+    said: dict[str, Inference],
     findings: list[Finding],
 ) -> Stamps:
     """Stamps of the finite rows."""
@@ -261,6 +307,12 @@ def _stamps(
         unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
     elif column.why == "stated by the file":
         why = "stated by the file"
+    elif unit is None and "time_unit" in said and said["time_unit"].settled:
+        unit, why = str(said["time_unit"].value), str(said["time_unit"])
+        if unit != "s":
+            findings.append(
+                Finding(why, file=raw.name, quantity="time", remedy="if not, say --time-unit")
+            )
     stamps = read_stamps(
         ticks[rows],
         unit,
@@ -285,22 +337,35 @@ def _time_reading(raw: RawLog, found: dict[str, Column], stamps: Stamps, sample:
 # --- axes and sampling ------------------------------------------------------------------
 
 
-def _axes(raw: RawLog, options: ReadOptions, findings: list[Finding]) -> Axes:
+def _determinant(axis: list[int], sign: list[float]) -> float:
+    return float(np.linalg.det(np.eye(3)[axis] * np.array(sign)[:, None]))
+
+
+def _axes(
+    raw: RawLog, options: ReadOptions, said: dict[str, Inference], findings: list[Finding]
+) -> Axes:
     text = options.axes or raw.axes
     if text is None:
+        up = None if options.accel_unit else told_of_up(said)
+        what, remedy = up or (
+            "",
+            "state them with --axes, as in --axes x,-y,-z for forward, left, up",
+        )
         findings.append(
             Finding(
                 "the sensor's x, y, z are taken as the body's forward, right, down: nothing says "
-                "otherwise",
+                f"otherwise{what}",
                 file=raw.name,
                 quantity="axes",
-                remedy="state them with --axes, as in --axes x,-y,-z for forward, left, up",
+                remedy=remedy,
             )
         )
         return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are")
     axis, sign = parse_axes(text)
-    mirrored = np.linalg.det(np.eye(3)[axis] * np.array(sign)[:, None]) < 0
-    if options.axes and mirrored:
+    if options.axes and not options.accel_unit:
+        down = ("-" if sign[2] < 0 else "") + AXES[axis[2]]
+        report_upside_down(said, down, raw.name, findings)
+    if options.axes and _determinant(axis, sign) < 0:
         findings.append(
             Finding(
                 f"--axes {text} is a mirror image, which turns no right-handed sensor into "

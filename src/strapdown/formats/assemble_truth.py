@@ -124,6 +124,7 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
             row=lambda k: raw.row(int(rows[k])),
             repair=options.repair,
             origin=origin,
+            only_seconds=True,
         )
     except DataError as error:
         if unit is not None:

@@ -61,7 +61,11 @@ def read(path: Path) -> RawLog:
             file=path.name,
             remedy="get the trial again from its source",
         )
-    raw = raw_log(path, {k: arrays[k] for k in ("imu_gyr", "imu_acc")}, {}, meta)
+    sensors = {"imu_gyr": ("gyro", "rad/s"), "imu_acc": ("accel", "m/s2")}
+    # The magnetometer runs slower than the gyro in some exports; only one on its stamps is read.
+    if arrays.get("imu_mag", np.empty(0)).shape == (samples, 3):
+        sensors["imu_mag"] = ("mag", "uT")
+    raw = raw_log(path, {k: arrays[k] for k in sensors}, {}, meta)
     q_enu = arrays["opt_quat"].astype(np.float64)
     # Zeros stand where the markers were lost, as NaN does.
     known = np.isfinite(q_enu).all(axis=1) & (np.abs(q_enu).max(axis=1) > LOST)
@@ -69,8 +73,11 @@ def read(path: Path) -> RawLog:
     q_ns[known] = rotation.compose(_Q_NED_ENU, q_enu[known])
     return dataclasses.replace(
         raw,
-        stated={f"imu_gyr[{k}]": (f"gyro_{'xyz'[k]}", "rad/s") for k in range(3)}
-        | {f"imu_acc[{k}]": (f"accel_{'xyz'[k]}", "m/s2") for k in range(3)},
+        stated={
+            f"{name}[{k}]": (f"{triad}_{'xyz'[k]}", unit)
+            for name, (triad, unit) in sensors.items()
+            for k in range(3)
+        },
         sampling="instantaneous",
         axes="x,-y,-z",
         truth=TruthInSensorAxes(q_ns, movement & known),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
 from strapdown.exceptions import ConfigError, nearest
 
 __all__ = [
@@ -45,6 +45,16 @@ TRIADS = {
         "specificforce",
         "a",
         "f",
+    ],
+    "mag": [
+        "mag",
+        "magn",
+        "magnetometer",
+        "magnetometers",
+        "magneticfield",
+        "imumag",
+        "compass",
+        "m",
     ],
 }
 TIMES = [
@@ -108,6 +118,11 @@ _SPELLINGS = {
     "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
     "g": "g g0 gs",
     "mg": "mg",
+    "uT": "ut µt μt microtesla",
+    "nT": "nt nanotesla",
+    "gauss": "gauss",
+    "mG": "mgauss milligauss",
+    "T": "tesla",
     "s": "s sec secs second seconds",
     "ms": "ms msec millis milliseconds",
     "us": "us µs μs usec micros microseconds",
@@ -116,6 +131,8 @@ _SPELLINGS = {
     "deg": "deg ° degree degrees",
     "rad": "rad radian radians",
 }
+# The letter of gauss is that of gravity, too.
+_MAGNETIC = {"g": "gauss", "mg": "mG"}
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
@@ -168,6 +185,8 @@ def read_name(name: str) -> ColumnName:
         if said.quantity:
             break
     quantity = said.quantity
+    if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
+        said = ColumnName(quantity, _MAGNETIC[said.unit])
     if quantity in TRIADS and index in _AXES_BY_INDEX:
         quantity = f"{quantity}_{_AXES_BY_INDEX[index]}"
     if quantity == "time" and (
@@ -216,7 +235,7 @@ def parse_unit(text: str, kind: str) -> str:
     Parameters
     ----------
     text : str
-    kind : {'gyro', 'accel', 'time'}
+    kind : {'gyro', 'accel', 'mag', 'time'}
 
     Returns
     -------
@@ -228,7 +247,7 @@ def parse_unit(text: str, kind: str) -> str:
     ConfigError
         It is no unit of that kind.
     """
-    known = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "time": TIME_UNITS}[kind]
+    known = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS, "time": TIME_UNITS}[kind]
     unit = UNIT_OF.get(text.strip().lower(), text)
     if unit not in known:
         raise ConfigError(

@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError, Finding
+from strapdown.formats.inference.clock import infer_time_unit, wrap_bits
+from strapdown.formats.inference.conclusion import THRESHOLD
 from strapdown.formats.recording import Origin
 
 Array = NDArray[np.float64]
 
-# Stamps without a stated unit are read as seconds only where that makes a rate at which
-# inertial sensors are logged.
+# Steps at which inertial sensors are logged.
 PLAUSIBLE_STEP = (1e-5, 0.25)  # s
 # Stamps later than this are counted from the first: a double holds a clock of 1970 to no
 # better than 0.2 µs.
 EPOCH = 1e6  # s
-# Counters that wrap in phones and microcontrollers.
-COUNTER_BITS = (16, 24, 31, 32)
 
 
 @dataclass(frozen=True)
@@ -59,6 +58,7 @@ def read_stamps(
     row: Callable[[int], int],
     repair: bool,
     origin: Origin | None = None,
+    only_seconds: bool = False,
 ) -> Stamps:
     """Turn raw stamps into increasing seconds.
 
@@ -79,6 +79,8 @@ def read_stamps(
     origin : Origin, optional
         Count from here, as another log does; if not given, from zero, or from the first stamp
         where zero is far away.
+    only_seconds : bool
+        Take no other unit than seconds from the numbers alone.
 
     Returns
     -------
@@ -97,7 +99,7 @@ def read_stamps(
         _refuse_backward(stamps, ticks, file, row)
     keep, ticks = _repaired(stamps, ticks, file, findings)
     if unit is None:
-        unit, why = _evident_unit(ticks[keep], file)
+        unit, why = _evident_unit(stamps[keep], file, findings, only_seconds)
     elif (usual := _mean_step(ticks[keep]) * TIME_UNITS[unit]) > 0 and not (
         PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
     ):
@@ -155,7 +157,7 @@ def _refuse_backward(
             quantity="time",
             remedy="--repair keeps the first row of each stamp and says how many it dropped",
         )
-    if bits := _wrap_bits(stamps[k], steps[k], _usual_step(steps)):
+    if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
         raise DataError(
             f"time falls from {here} to {then}, as a counter of {bits} bits does when it wraps",
             file=file,
@@ -182,14 +184,6 @@ def _usual_step(steps: Array) -> float:
     return float(np.median(forward)) if forward.size else 0.0
 
 
-def _wrap_bits(before: float, step: float, usual: float) -> int | None:
-    """Width of the counter that wrapped in this step, if one did."""
-    for bits in COUNTER_BITS:
-        if 0.0 < step + 2.0**bits <= 50.0 * usual and 0 <= float(before) < 2.0**bits:
-            return bits
-    return None
-
-
 def _repaired(
     stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
@@ -197,7 +191,7 @@ def _repaired(
     usual = _usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):
-        if bits := _wrap_bits(stamps[k], steps[k], usual):
+        if bits := wrap_bits(stamps[k], steps[k], usual):
             added[k + 1] = 2.0**bits
     if wraps := int(np.count_nonzero(added)):
         ticks = ticks + np.cumsum(added)
@@ -218,21 +212,26 @@ def _repaired(
     return keep, ticks
 
 
-def _evident_unit(ticks: Array, file: str) -> tuple[str, str]:
-    usual = _mean_step(ticks)
-    if PLAUSIBLE_STEP[0] <= usual <= PLAUSIBLE_STEP[1]:
-        return "s", f"no unit stated; read as seconds, {1.0 / usual:.4g} Hz on average"
-    fitting = [
-        u for u, f in TIME_UNITS.items() if PLAUSIBLE_STEP[0] <= usual * f <= PLAUSIBLE_STEP[1]
-    ]
+def _evident_unit(
+    stamps: NDArray[Any], file: str, findings: list[Finding], only_seconds: bool
+) -> tuple[str, str]:
+    said = infer_time_unit(stamps)
+    if said.settled and (said.value == "s" or not only_seconds):
+        unit = str(said.value)
+        if unit != "s":
+            findings.append(
+                Finding(str(said), file=file, quantity="time", remedy="if not, say --time-unit")
+            )
+        return unit, str(said)
+    usual = _mean_step((stamps - stamps[0]).astype(np.float64))
+    shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     told = "; ".join(
-        f"--time-unit {u} makes it {1.0 / (usual * TIME_UNITS[u]):.4g} Hz"
-        for u in dict.fromkeys([*fitting, *(["s"] if 1e-7 < usual < 20.0 else [])])
-        if usual > 0
+        f"--time-unit {u} makes it {1.0 / (usual * TIME_UNITS[u]):.4g} Hz (probability {p:.2g})"
+        for u, p in shares.items()
+        if p >= 1e-3 and usual > 0
     )
     raise DataError(
-        f"no unit stated, and a mean step of {usual:.6g} is no step in seconds that an inertial "
-        "log would have",
+        f"no unit stated, and a mean step of {usual:.6g} does not tell it to {THRESHOLD:g}",
         file=file,
         quantity="time",
         remedy=told or "check that this is the time column",

@@ -43,7 +43,10 @@ RATES = np.random.default_rng(2).normal(size=(30, 3))
         ("yaw_deg", "heading", "deg"),
         ("Roll [rad]", "roll", "rad"),
         ("linear_acceleration_x", None, None),  # gravity is gone from it: no specific force
-        ("magnetometer_x", None, None),
+        ("magnetometer_x", "mag_x", None),
+        ("mag_y (µT)", "mag_y", "uT"),
+        ("mz [mG]", "mag_z", "mG"),
+        ("magnetic_field_z [G]", "mag_z", "gauss"),
         ("temperature", None, None),
     ],
 )

@@ -1,0 +1,177 @@
+"""The unit of time stamps, their rate, and their faults."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.formats.inference.conclusion import Inference, conclude, posterior
+
+Array = NDArray[np.float64]
+
+# Rates at which inertial sensors are logged, as log10 of a density over log10 of the rate in Hz:
+# phones, boards and navigation units keep 10 to 1000 Hz, crash recorders 10 to 20 kHz; nobody
+# logs a rotation every ten seconds.
+_RATE = np.log10([1e-3, 0.01, 0.1, 1.0, 5.0, 20.0, 1e3, 2e3, 5e3, 1e4, 5e4, 1e6])
+_RATE_DENSITY = np.array([-9.0, -7.0, -4.5, -1.5, -0.5, 0.0, 0.0, -0.8, -1.4, -1.6, -4.0, -8.0])
+# How often a clock counts in each, where nothing says so; minutes are for tables by hand.
+_PRIOR = {"s": 0.5, "ms": 0.25, "us": 0.15, "ns": 0.1, "min": 1e-6}
+# How often stamps in each have fractions.
+_FRACTIONAL = {"s": 1.0, "ms": 0.6, "us": 0.1, "ns": 0.02, "min": 1.0}
+# A first stamp that is an instant of these years by chance is rare; clocks of 1970 are not.
+_EPOCH = (946_684_800.0, 2_366_841_600.0)  # 2000 to 2045
+_EPOCH_RATIO = 30.0
+COUNTER_BITS = (16, 24, 31, 32)
+
+
+def time_unit_probabilities(stamps: NDArray[Any]) -> dict[str, float]:
+    """Probability of each unit of time, from the mean step and the first stamp.
+
+    Parameters
+    ----------
+    stamps : ndarray, (n,)
+        Finite, as they stand in the log.
+
+    Returns
+    -------
+    dict of str to float
+        Keys of `constants.TIME_UNITS`, the most probable first; empty where time does not
+        advance.
+    """
+    step = mean_step(stamps)
+    if not step > 0:
+        return {}
+    fractional = stamps.dtype.kind == "f" and bool((stamps[:1000] % 1.0 != 0).any())
+    first = float(stamps[0])
+    weights = {}
+    for unit, factor in TIME_UNITS.items():
+        rate = -np.log10(step * factor)
+        log10 = float(np.interp(rate, _RATE, _RATE_DENSITY)) + np.log10(_PRIOR[unit])
+        if fractional:
+            log10 += np.log10(_FRACTIONAL[unit])
+        if _EPOCH[0] <= first * factor <= _EPOCH[1]:
+            log10 += np.log10(_EPOCH_RATIO)
+        weights[unit] = float(np.log(10.0) * log10)
+    return posterior(weights)
+
+
+def infer_time_unit(stamps: NDArray[Any]) -> Inference:
+    """Conclude the unit of time from the stamps alone.
+
+    Parameters
+    ----------
+    stamps : ndarray, (n,)
+        Finite, as they stand in the log.
+    """
+    found = time_unit_probabilities(stamps)
+    if not found:
+        return Inference("time_unit", None, 1.0, ("time does not advance",), (), "--time-unit")
+    step = mean_step(stamps)
+    return conclude(
+        "time_unit", dict(found), time_evidence(stamps, step, next(iter(found))), "--time-unit"
+    )
+
+
+def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[str, ...]:
+    """What the stamps say for a unit, in words."""
+    factor = TIME_UNITS[unit]
+    told = [f"a mean step of {step:.6g} is then {1.0 / (step * factor):.4g} Hz"]
+    if _EPOCH[0] <= float(stamps[0]) * factor <= _EPOCH[1]:
+        year = 1970 + float(stamps[0]) * factor / 31_556_952.0
+        told.append(f"the first stamp is then in the year {int(year)}")
+    return tuple(told)
+
+
+def mean_step(stamps: NDArray[Any]) -> float:
+    """Mean of the forward steps within 50 times their median; the clock may be set between."""
+    if stamps.size < 2:
+        return 0.0
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
+    steps = np.diff(exact).astype(np.float64)
+    forward = steps[steps > 0]
+    if not forward.size:
+        return 0.0
+    # Bursts have a median far below the mean; the 90 % quantile is within both habits.
+    usual = forward[forward <= 50.0 * np.quantile(forward, 0.9)]
+    # Rows of one burst that share a stamp count, too.
+    repeats = int((steps == 0).sum())
+    return float(usual.sum() / (usual.size + repeats))
+
+
+def infer_rate(stamps: NDArray[Any], unit: str) -> Inference:
+    """Nominal sampling rate in Hz, with how regular it is.
+
+    Parameters
+    ----------
+    stamps : ndarray, (n,)
+    unit : str
+        Of the stamps.
+    """
+    step = mean_step(stamps) * TIME_UNITS[unit]
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
+    steps = np.diff(exact).astype(np.float64) * TIME_UNITS[unit]
+    forward = steps[steps > 0]
+    if not (step > 0):
+        return Inference("rate", None, 1.0, ("time does not advance",), (), "--rate")
+    median = float(np.median(forward))
+    within = float(np.mean(np.abs(forward - median) <= 0.1 * median))
+    missing = float(np.maximum(np.round(forward / step) - 1.0, 0.0).sum())
+    told = (
+        f"mean step {1e3 * step:.5g} ms, median {1e3 * median:.5g} ms",
+        f"{100 * within:.3g} % of the steps within a tenth of the median",
+        f"{missing:.0f} samples missing in gaps",
+    )
+    # Bursts make the mean the rate of the sensor, and losses the median.
+    nominal = 1.0 / median if within > 0.5 else 1.0 / step
+    return Inference("rate", nominal, 1.0 - 1e-4 if within > 0.5 else 0.9, told, (), "--rate")
+
+
+def infer_time_faults(stamps: NDArray[Any]) -> Inference:
+    """Count what is wrong with stamps: repeated, backwards, wrapped, constant, in bursts, jumps.
+
+    Parameters
+    ----------
+    stamps : ndarray, (n,)
+    """
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps.astype(np.float64)
+    steps = np.diff(exact).astype(np.float64)
+    forward = steps[steps > 0]
+    faults: list[str] = []
+    if not forward.size:
+        faults.append("constant stamps")
+    else:
+        usual = float(np.median(forward))
+        mean = mean_step(stamps)
+        back = np.flatnonzero(steps < 0)
+        bits = [wrap_bits(float(stamps[k]), float(steps[k]), usual) for k in back]
+        wrapped = [b for b in bits if b]
+        if repeated := int((steps == 0).sum()):
+            faults.append(f"{repeated} repeated")
+        if wrapped:
+            faults.append(f"{len(wrapped)} wrapped (a counter of {wrapped[0]} bits)")
+        if len(back) > len(wrapped):
+            faults.append(f"{len(back) - len(wrapped)} backwards")
+        if jumps := int((forward > max(50.0 * usual, 10.0 * mean)).sum()):
+            faults.append(f"{jumps} jump{'s' if jumps > 1 else ''}")
+        if usual < 0.5 * mean or (repeated > 0.3 * steps.size):
+            faults.append("bursts")
+    told = f"{steps.size} steps"
+    return Inference(
+        "time_faults",
+        ", ".join(faults) or "none",
+        1.0 - 1e-4,
+        (told,),
+        (),
+        "--repair" if faults else "",
+    )
+
+
+def wrap_bits(before: float, step: float, usual: float) -> int | None:
+    """Width of the counter that wrapped in this step, if one did."""
+    for bits in COUNTER_BITS:
+        if 0.0 < step + 2.0**bits <= 50.0 * usual and 0 <= before < 2.0**bits:
+            return bits
+    return None

@@ -1,0 +1,200 @@
+"""Unit and form of an accelerometer: gravity is in every one that is at rest or carried."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.formats.inference.conclusion import Inference, conclude, posterior
+
+Array = NDArray[np.float64]
+
+# Scales without the sign: which of the two signs it is, no motion can say (both f and -f turn
+# alike in the body), so that it is a question of its own.
+SCALES = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
+_PRIOR = {"m/s2": 0.6, "g": 0.37, "mg": 0.03}
+# How often a log under these names holds something else.
+_PRIOR_FORM = {"rate": 0.93, "linear": 0.03, "increment": 0.01, "other": 0.03}
+# Raw counts of 8 to 16 bits a gravity; 1024 is near enough to be taken for mg.
+_COUNTS = (256.0, 1024.0, 2048.0, 4096.0, 8192.0, 16384.0)
+_PRIOR_COUNTS = 0.03
+_BROKEN_COUNTS = 0.05  # how often counts have fractions
+# How often all numbers are whole in each unit.
+_WHOLE = {"m/s2": 1e-4, "g": 1e-4, "mg": 0.7}
+# Scale and offset of cheap sensors together: 3 % and 80 mg (MPU-6050 data sheet, section 6.2).
+_ERROR = 0.04  # of g
+_DECADES = 12.0  # the range of scales of what has no unit known here
+PIECE = 0.2  # s, over which the norm of the mean is taken
+
+
+def piece_means(values: Array, per_piece: int) -> Array:
+    """Means over pieces of so many samples, (m, 3)."""
+    count = max(len(values) // per_piece, 1)
+    per_piece = min(per_piece, len(values))
+    whole = values[: count * per_piece].reshape(count, per_piece, -1)
+    return np.asarray(whole.mean(axis=1), dtype=np.float64)
+
+
+def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference, Inference, float]:
+    """Conclude unit, form, and whether gravity is in it.
+
+    Parameters
+    ----------
+    accel : ndarray, (n, 3)
+        Finite, as it stands in the log.
+    step : float or None, s
+        Mean step, where it is known.
+
+    Returns
+    -------
+    unit, form, gravity : Inference
+        The form is ``rate`` or ``increment``.
+    magnitude : float
+        The usual norm of the accelerometer in its own unit.
+
+    Notes
+    -----
+    The norm of short means stays at 9.8 m/s² in a sensor that is carried, to the offset of the
+    sensor and the part of the motion that does not average out; its spread over the log says how
+    much that is. Without gravity it may be anything, and swings as much as it is large.
+    """
+    pieces = piece_means(accel, max(round(PIECE / step), 1) if step else 10)
+    norms = np.linalg.norm(pieces, axis=1)
+    usual = float(np.median(norms))
+    flag = "--accel-unit"
+    if not usual > 0:
+        nothing = ("every value is zero",)
+        return (
+            Inference("accel_unit", None, 1.0, nothing, (), flag),
+            Inference("accel_form", None, 1.0, nothing),
+            Inference("gravity", "removed", 0.5, nothing),
+            usual,
+        )
+    whole = bool((accel == np.round(accel)).all())
+    spread = 1.4826 * float(np.median(np.abs(norms - usual))) / usual
+    # The median over m pieces is better than a piece, but what the motion adds is one-sided. A
+    # log of few pieces does not know its spread, and a crash is shorter than one.
+    few = 2.0 / len(norms) if step else 0.4
+    sd = np.hypot(np.hypot(_ERROR, 0.5 * spread), few) / np.log(10.0)
+    where = np.log10(usual)
+    # Mean vectors without gravity are those of a random motion, whose norm spreads by 0.4 of
+    # itself or more; a constant offset is possible, and small.
+    swings = min(spread / 0.3, 1.0) ** 2
+    direction = float(np.linalg.norm(pieces.mean(axis=0))) / usual
+    # What moves and has no gravity averages to nothing, for velocities stay bounded.
+    lasting = 0.01 if direction > 0.7 and len(norms) > 20 else 1.0
+    # With gravity the motion of a hand or a car spreads it by a tenth.
+    calm = float(np.exp(-spread / 0.12)) if len(norms) >= 5 else 0.1
+    weights: dict[tuple[str | None, str], float] = {}
+
+    def add(unit: str | None, form: str, prior: float, density: float) -> None:
+        weights[unit, form] = float(np.log(max(prior * density, 1e-300)))
+
+    for unit, scale in SCALES.items():
+        prior = _PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
+        off = (where - np.log10(STANDARD_GRAVITY / scale)) / sd
+        # A cubic tail, for what is shaken and spun more than its median spread tells.
+        peak = 0.45 / sd / (1.0 + off * off / 3.0) ** 2
+        add(unit, "rate", prior * _PRIOR_FORM["rate"], calm * peak)
+        si = usual * scale
+        broad = 0.25 * min(1.0, 10.0 / si) ** 2 * min(1.0, si / 1e-3)
+        offset = broad * min(1.0, 0.3 / si) ** 3  # constant, and yet not gravity
+        add(
+            unit,
+            "linear",
+            prior * _PRIOR_FORM["linear"],
+            swings * lasting * broad + (1.0 - swings) * offset,
+        )
+        if step:
+            off = (where - np.log10(STANDARD_GRAVITY * step / scale)) / sd
+            add(
+                unit,
+                "increment",
+                prior * _PRIOR_FORM["increment"],
+                calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2,
+            )
+    for k, count in enumerate(_COUNTS):
+        off = (where - np.log10(count)) / sd
+        prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
+        add(None, f"counts {k}", prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2)
+    add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
+    found = posterior(weights)
+    units = _summed(found, 0)
+    forms = _summed(found, 1)
+    counted = sum(p for f, p in forms.items() if str(f).startswith("counts"))
+    forms["rate"] = forms.get("rate", 0.0) + counted
+    told = f"the median norm of {PIECE} s means is {usual:.5g}, spread {100 * spread:.2g} %"
+    best = next(iter(units))
+    if best is not None:
+        told += f", {usual * SCALES[best]:.4g} m/s² in {best}"
+    else:
+        told += ", which is gravity in none of m/s2, g, mg"
+    evidence = (told,)
+    gravity = posterior_of(
+        {
+            "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
+            "removed": forms.get("linear", 0.0),
+            None: forms.get("other", 0.0),
+        }
+    )
+    form = posterior_of(
+        {
+            "rate": forms.get("rate", 0.0) + forms.get("linear", 0.0),
+            "increment": forms.get("increment", 0.0),
+            None: forms.get("other", 0.0),
+        }
+    )
+    tell = (*evidence, f"the mean vector is {direction:.2g} of it")
+    return (
+        conclude("accel_unit", units, evidence, flag),
+        conclude("accel_form", form, evidence),
+        conclude("gravity", gravity, tell),
+        usual,
+    )
+
+
+def posterior_of(probabilities: dict[str | None, float]) -> dict[str | None, float]:
+    """The same, the most probable first."""
+    return dict(sorted(probabilities.items(), key=lambda p: -p[1]))
+
+
+def _summed(found: dict[tuple[str | None, str], float], key: int) -> dict[str | None, float]:
+    out: dict[str | None, float] = {}
+    for hypothesis, p in found.items():
+        out[hypothesis[key]] = out.get(hypothesis[key], 0.0) + p
+    return posterior_of(out)
+
+
+def infer_up(accel: Array, step: float | None) -> Inference:
+    """Which sensor axis points up, as far as the log keeps one up, if gravity reads as reaction.
+
+    Parameters
+    ----------
+    accel : ndarray, (n, 3)
+    step : float or None, s
+
+    Notes
+    -----
+    A sensor of the other sign (iOS) reads the same numbers upside down. That share of sensors,
+    a twentieth, bounds the confidence; the flag is the user's to give.
+    """
+    pieces = piece_means(accel, max(round(1.0 / step), 1) if step else 100)
+    norms = np.linalg.norm(pieces, axis=1, keepdims=True)
+    units = pieces / np.where(norms > 0, norms, 1.0)
+    # Within 30 deg of an axis; more than half the log makes it the sensor's usual attitude.
+    shares = {
+        f"{'-' if sign < 0 else ''}{'xyz'[k]}": float(np.mean(sign * units[:, k] > np.sqrt(0.75)))
+        for k in range(3)
+        for sign in (1.0, -1.0)
+    }
+    best = max(shares, key=lambda a: shares[a])
+    share = shares[best]
+    told = (
+        f"the specific force points along {best} in {100 * share:.3g} % of the log",
+        "a sensor that reports gravity with the other sign (iOS) reads this upside down",
+    )
+    if share <= 0.5:
+        return Inference("up_axis", None, 1.0 - share, told[:1], (), "--axes")
+    other = best[1:] if best.startswith("-") else f"-{best}"
+    return Inference("up_axis", best, 0.95 * share, told, ((other, 0.05),), "--axes")

@@ -1,0 +1,243 @@
+"""What the numbers of a log say of its units, axes, clock and content."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.exceptions import DataError
+from strapdown.formats.columns import parse_unit
+from strapdown.formats.find_columns import AXES, Column, find_columns
+from strapdown.formats.inference.clock import (
+    infer_rate,
+    infer_time_faults,
+    mean_step,
+    time_evidence,
+    time_unit_probabilities,
+)
+from strapdown.formats.inference.conclusion import Inference, conclude
+from strapdown.formats.inference.gravity import infer_accel, infer_up
+from strapdown.formats.inference.magnetic import infer_mag_unit
+from strapdown.formats.inference.rotation_rate import infer_gyro
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.recording import RawLog, ReadOptions
+
+Array = NDArray[np.float64]
+# Longer logs are looked at in parts: this many rows say all that there is to say.
+LARGEST = 40_000
+
+
+@dataclass(frozen=True)
+class Signals:
+    """Numbers of a log as they stand in it, without units.
+
+    Attributes
+    ----------
+    stamps : ndarray, (n,), or None
+    gyro, accel, mag : ndarray, (n, 3), or None
+    time_unit : str or None
+        Where it is known.
+    rate : float or None, Hz
+        Where there are no stamps.
+    """
+
+    stamps: NDArray[Any] | None
+    gyro: Array | None
+    accel: Array | None = None
+    mag: Array | None = None
+    time_unit: str | None = None
+    rate: float | None = None
+
+
+def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, ...]:
+    """Conclude what can be concluded from the numbers of a log, whatever it says of itself.
+
+    Parameters
+    ----------
+    raw : RawLog
+    options : ReadOptions, optional
+        Which columns to take, and the unit of time where it is known. Units that it states of
+        the sensors are not used: the numbers are asked.
+
+    Returns
+    -------
+    tuple of Inference
+        One for each quantity that the log has numbers for.
+
+    Raises
+    ------
+    ConfigError
+        An option names what is not in the log.
+    DataError
+        A value or a stamp is not a number.
+    """
+    options = options or ReadOptions()
+    found = find_columns(raw, options)
+    stamps, unit = None, None
+    if "time" in found:
+        stamps, dated = ticks_of(raw, found["time"])
+        unit = "ns" if dated else found["time"].unit
+        if options.time_unit:
+            unit = parse_unit(options.time_unit, "time")
+    triads = {t: _triad(raw, found, t) for t in ("gyro", "accel", "mag")}
+    return infer_signals(Signals(stamps, **triads, time_unit=unit, rate=options.rate or raw.rate))
+
+
+def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
+    columns = [f"{triad}_{a}" for a in AXES]
+    if not all(c in found for c in columns):
+        return None
+    try:
+        parts = [numbers(raw, found[c], c).astype(np.float64) for c in columns]
+    except DataError:
+        if triad == "gyro":
+            raise
+        return None
+    return np.column_stack(parts)
+
+
+def infer_signals(signals: Signals) -> tuple[Inference, ...]:
+    """The same for arrays.
+
+    Parameters
+    ----------
+    signals : Signals
+
+    Returns
+    -------
+    tuple of Inference
+    """
+    out: list[Inference] = []
+    stamps = _finite(signals.stamps)
+    times = _times(signals, stamps)
+    step = _step(signals, stamps, times)
+    force = None
+    accel = _finite_rows(signals.accel)
+    heard: list[Inference] = []
+    if accel is not None:
+        unit, form, gravity, usual = infer_accel(accel, step)
+        heard = [unit, form, gravity]
+        if gravity.value == "present" and gravity.confidence > 0.9:
+            heard.append(infer_up(accel, step))
+            heard.append(_sign())
+            assert signals.accel is not None
+            force = signals.accel / usual
+        elif gravity.value is None and _steady(accel):
+            # Gravity in a unit that is not known still turns as gravity does.
+            assert signals.accel is not None
+            force = signals.accel / usual
+    turned: list[Inference] = []
+    if signals.gyro is not None and len(signals.gyro) > 1:
+        ticks, gyro, force = _increasing(signals, force)
+        if len(gyro) > 1:
+            *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0}, _increments(heard))
+            if times and next(iter(joint)) != next(iter(times)):
+                # A turn that fits in another unit of time alone is a doubt, and no proof.
+                times = {u: min(p, 0.5) for u, p in times.items()}
+    if stamps is not None and times:
+        best = next(iter(times))
+        told = time_evidence(stamps, mean_step(stamps), best)
+        if signals.time_unit is None:
+            out.append(conclude("time_unit", {**times}, told, "--time-unit"))
+        else:
+            stated = time_unit_probabilities(stamps)
+            out.append(conclude("time_unit", dict(stated), told, "--time-unit"))
+        out.append(infer_time_faults(stamps))
+        out.append(infer_rate(stamps, signals.time_unit or best))
+    elif stamps is not None:
+        nothing = ("time does not advance",)
+        out.append(Inference("time_unit", None, 1.0, nothing, (), "--time-unit"))
+        out.append(infer_time_faults(stamps))
+    out += turned
+    out += heard
+    mag = _finite_rows(signals.mag)
+    if mag is not None:
+        out.append(infer_mag_unit(mag))
+    return tuple(out)
+
+
+def _times(signals: Signals, stamps: NDArray[Any] | None) -> dict[str, float]:
+    if signals.time_unit is not None:
+        return {signals.time_unit: 1.0}
+    if stamps is None:
+        return {"s": 1.0} if signals.rate else {}
+    return time_unit_probabilities(stamps)
+
+
+def _step(signals: Signals, stamps: NDArray[Any] | None, times: dict[str, float]) -> float | None:
+    if stamps is not None and times:
+        best = next(iter(times))
+        step = mean_step(stamps) * TIME_UNITS[best]
+        return step if step > 0 and (times[best] > 0.9) else None
+    return 1.0 / signals.rate if signals.rate else None
+
+
+def _steady(accel: Array) -> bool:
+    """Whether the norm is that of one vector: it spreads by less than a fifth of itself."""
+    norms = np.linalg.norm(accel, axis=1)
+    return bool(np.std(norms) < 0.2 * np.mean(norms))
+
+
+def _increments(heard: list[Inference]) -> float:
+    """Prior of increments in the gyro: what the accelerometer holds, within bounds."""
+    form = next((i for i in heard if i.quantity == "accel_form"), None)
+    if form is None:
+        return 0.01
+    shares = dict(((form.value, form.confidence), *form.alternatives))
+    return float(np.clip(shares.get("increment", 0.0), 1e-3, 0.95))
+
+
+def _sign() -> Inference:
+    """Which sign the accelerometer has: no motion tells it, only where its axes point does."""
+    told = (
+        "both signs turn alike in the body: only where an axis points can tell them apart",
+        "a sensor that reports gravity (iOS) reads -1 g on the axis that points up",
+    )
+    return Inference("accel_sign", "reaction", 0.95, told, (("gravity", 0.05),), "--accel-unit")
+
+
+def _finite(values: NDArray[Any] | None) -> NDArray[Any] | None:
+    if values is None:
+        return None
+    kept = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+    return kept if kept.size > 1 else None
+
+
+def _finite_rows(values: Array | None) -> Array | None:
+    if values is None:
+        return None
+    kept = values[np.isfinite(values).all(axis=1)]
+    return kept if len(kept) > 1 else None
+
+
+def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Array | None]:
+    """Finite rows with increasing stamps, no more than are needed."""
+    assert signals.gyro is not None
+    gyro = signals.gyro
+    keep = np.isfinite(gyro).all(axis=1)
+    if force is not None:
+        keep &= np.isfinite(force).all(axis=1)
+    if signals.stamps is None:
+        rate = signals.rate
+        ticks = np.arange(len(gyro)) / rate if rate else np.arange(len(gyro), dtype=np.float64)
+        force = force if rate else None
+    else:
+        stamps = signals.stamps
+        exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
+        keep &= np.isfinite(exact)
+        first = exact[np.argmax(keep)]
+        ticks = (exact - first).astype(np.float64)
+        latest = np.maximum.accumulate(np.where(keep, ticks, -np.inf))
+        keep &= ticks > np.concatenate([[-np.inf], latest[:-1]])
+    rows = np.flatnonzero(keep)
+    if rows.size > LARGEST:
+        # The first, a middle and the last part whole; sums do not cross the holes between.
+        part = LARGEST // 3
+        middle = rows.size // 2 - part // 2
+        rows = np.concatenate([rows[:part], rows[middle : middle + part], rows[-part:]])
+    ticks = ticks[rows] - (ticks[rows[0]] if rows.size else 0.0)
+    return ticks, gyro[rows], None if force is None else force[rows]

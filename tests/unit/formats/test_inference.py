@@ -1,0 +1,271 @@
+"""What the engine concludes from logs of known units, and that it never concludes wrongly."""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from synthetic_logs import make
+
+from strapdown.exceptions import DataError
+from strapdown.formats import read_log
+from strapdown.formats.inference import Signals, infer_signals
+from strapdown.formats.inference.clock import infer_time_faults, infer_time_unit
+from strapdown.formats.inference.conclusion import posterior
+from strapdown.formats.inference.turn import signed_permutations, turns
+from strapdown.formats.recording import ReadOptions
+from strapdown.tables import ACCEL, GYRO, MAG
+
+SEEDS = range(100)
+
+
+def said(signals):
+    return {i.quantity: i for i in infer_signals(signals)}
+
+
+def test_no_wrong_answer_in_a_hundred_logs():
+    asked, silent, wrong = Counter(), Counter(), []
+    for seed in SEEDS:
+        signals, truth = make(seed)
+        for one in infer_signals(signals):
+            asked[one.quantity] += 1
+            silent[one.quantity] += not one.settled
+            if truth.is_wrong(one):
+                wrong.append((seed, one, truth))
+    print({q: f"{silent[q]} of {asked[q]} silent" for q in asked})
+    assert not wrong
+    # Motion that turns gravity is in half the logs, and half of those are in counts, in
+    # increments, without gravity, violent, or have shuffled axes: a gyro is silent in most.
+    assert silent["gyro_unit"] < 0.97 * asked["gyro_unit"]
+    # Of accelerometers 10 % are in counts, 10 % without gravity, 10 % increments, and 10 % in mg,
+    # which counts of 1024 a gravity come near; a violent or arm-swung log is silent, too.
+    assert silent["accel_unit"] < 0.6 * asked["accel_unit"]
+    # Time is nearly always told: what is not are steps of about one tick.
+    assert silent["time_unit"] < 0.05 * asked["time_unit"]
+
+
+def turning(seconds=40.0, rate=100.0, seed=3):
+    """A slow tumble about all axes without noise: rates in rad/s, reaction in m/s²."""
+    from scipy.spatial.transform import Rotation
+
+    t = np.arange(-1, int(seconds * rate) + 1) / rate
+    angles = np.column_stack(
+        [0.9 * np.sin(0.7 * t), 0.6 * np.sin(0.9 * t + 1), 0.8 * np.sin(0.5 * t)]
+    )
+    turn = Rotation.from_euler("ZYX", angles)
+    gyro = (turn[:-2].inv() * turn[2:]).as_rotvec() * rate / 2.0
+    accel = turn[1:-1].inv().apply([0.0, 0.0, 9.81])
+    return t[1:-1], gyro, accel
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("rad/s", 1.0), ("deg/s", np.pi / 180)])
+@pytest.mark.parametrize("factor", [9.81, 1.0, -1.0])
+def test_the_unit_of_a_gyro_is_told_by_gravity_of_either_sign(unit, scale, factor):
+    t, gyro, accel = turning()
+    found = said(Signals(t, gyro / scale, accel / factor))
+    assert found["gyro_unit"].settled
+    assert found["gyro_unit"].value == unit
+    assert found["gyro_axes"].value == "x,y,z"
+    # Both signs of the accelerometer turn alike.
+    assert not found["accel_sign"].settled
+
+
+@pytest.mark.parametrize("axes", ["-x,-y,-z", "y,x,z", "x,-y,z", "z,x,y"])
+def test_axes_that_differ_are_told(axes):
+    names, matrices = signed_permutations()
+    t, gyro, accel = turning()
+    matrix = matrices[names.index(axes)]
+    found = said(Signals(t, gyro @ matrix, accel))
+    assert (found["gyro_axes"].value, found["gyro_axes"].settled) == (axes, True)
+    assert found["gyro_unit"].settled
+
+
+def test_the_identity_of_turning_gravity_holds_exactly():
+    """Of a log without noise the nine numbers are the identity, to the rule's error.
+
+    The trapezoid of products that change by w dt each step errs by (w dt)²/12, 1e-5 here.
+    """
+    t, gyro, accel = turning()
+    for turn in turns(t, gyro, accel / 9.81):
+        best, left = turn.free()
+        assert np.allclose(best, np.eye(3), atol=1e-3)
+        assert left < 1e-5 * turn.gram[9, 9]
+
+
+def test_a_bias_does_not_spoil_it():
+    t, gyro, accel = turning()
+    found = said(Signals(t, gyro + np.array([0.2, -0.3, 0.1]), accel))
+    assert (found["gyro_unit"].value, found["gyro_unit"].settled) == ("rad/s", True)
+
+
+@pytest.mark.parametrize("scale", [1.0, np.pi / 180])
+def test_a_gyro_alone_and_a_gyro_at_rest_are_questions(scale):
+    t, gyro, _ = turning()
+    assert not said(Signals(t, 0.1 * gyro / scale, None))["gyro_unit"].settled
+    noise = np.random.default_rng(1).normal(size=(t.size, 3))
+    still = Signals(t, 1e-3 * noise / scale, [0, 0, 9.81] + 0.02 * noise)
+    assert not said(still)["gyro_unit"].settled
+
+
+def test_raw_counts_are_in_no_unit():
+    t, gyro, accel = turning()
+    # 16.4 counts a deg/s are 1.06 mrad/s each.
+    counts = np.round(np.degrees(gyro) * 16.4)
+    found = said(Signals(t, counts, np.round(accel / 9.81 * 4096)))
+    assert not found["gyro_unit"].settled
+    assert not found["accel_unit"].settled
+
+
+def test_linear_acceleration_is_no_gravity_in_another_unit():
+    rng = np.random.default_rng(5)
+    t = np.arange(4000) * 0.01
+    walk = sum(np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 6, 3)) for f in (0.9, 1.8, 2.7))
+    for rms in (0.3, 1.0, 3.0, 9.81):
+        found = said(Signals(t, rng.normal(size=(t.size, 3)), rms * walk / np.sqrt(4.5)))
+        assert not (found["gravity"].settled and found["gravity"].value == "present"), rms
+
+
+def test_increments_are_not_taken_for_rates():
+    t, gyro, accel = turning()
+    found = said(Signals(t, gyro * 0.01, accel * 0.01))
+    assert found["accel_form"].value == "increment"
+    assert not (found["gyro_form"].settled and found["gyro_form"].value == "rate")
+
+
+@pytest.mark.parametrize(
+    ("stamps", "unit"),
+    [
+        (np.arange(500) * 0.01, "s"),
+        (np.arange(500) * 10, "ms"),
+        (np.arange(500) * 10_000, "us"),
+        (1_700_000_000_000_000_000 + np.arange(500) * 10_000_000, "ns"),
+        (np.arange(500), None),  # 1 Hz or 1 kHz
+    ],
+)
+def test_units_of_time(stamps, unit):
+    one = infer_time_unit(stamps)
+    assert one.settled == (unit is not None)
+    assert unit is None or one.value == unit
+
+
+def test_faults_of_time_are_counted():
+    t = np.arange(200) * 0.01
+    assert infer_time_faults(t).value == "none"
+    assert infer_time_faults(np.ones(50)).value == "constant stamps"
+    t[50:] += 5.0
+    t[100] = t[99]
+    t[150] = t[140]
+    assert infer_time_faults(t).value == "1 repeated, 1 backwards, 1 jump"
+    wrapped = (65_000 + np.arange(200) * 10) % 2**16
+    assert "wrapped (a counter of 16 bits)" in infer_time_faults(wrapped).value
+    bursts = np.repeat(np.arange(40) * 0.05, 5) + np.tile(np.arange(5) * 1e-4, 40)
+    assert infer_time_faults(bursts).value == "bursts"
+
+
+def test_a_posterior_is_a_probability():
+    found = posterior({"a": 0.0, "b": -1.0, "c": -900.0})
+    assert sum(found.values()) == pytest.approx(1.0, abs=1e-12)
+    assert found["a"] / found["b"] == pytest.approx(np.e, rel=1e-3)
+    assert next(iter(found)) == "a"
+
+
+def write(path, t, gyro, accel, header="time,gx,gy,gz,ax,ay,az", extra=()):
+    rows = np.column_stack([t, gyro, accel, *extra])
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+def test_a_log_without_units_is_read_with_those_inferred(tmp_path):
+    t, gyro, accel = turning()
+    path = write(tmp_path / "log.csv", 1e3 * t, np.degrees(gyro), accel / 9.80665)
+    log = read_log(path)
+    assert np.allclose(log.imu[GYRO], gyro, atol=1e-7)
+    assert np.allclose(log.imu[ACCEL], accel, atol=1e-6)
+    assert np.allclose(log.imu.index, t, atol=1e-9)
+    told = [f.what for f in log.findings if f.what.startswith("inferred: ")]
+    assert [w.split(" (")[0] for w in told] == [
+        "inferred: deg/s",
+        "inferred: g",
+        "inferred: ms",
+    ]
+    assert all("confidence 0.9" in w for w in told)
+    assert any("inferred: deg/s" in r.why for r in log.readings)
+
+
+def test_what_cannot_be_inferred_is_an_error_that_tells_why(tmp_path):
+    t, gyro, accel = turning()
+    path = write(tmp_path / "log.csv", t, 0 * gyro + 0.01, accel[:1] + 0 * accel)
+    with pytest.raises(DataError, match=r"(?s)do not tell it to 0\.99.*--gyro-unit"):
+        read_log(path)
+    read_log(path, ReadOptions(gyro_unit="rad/s"))
+
+
+def test_a_statement_goes_before_and_a_contradiction_is_told(tmp_path):
+    t, gyro, accel = turning()
+    header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g"
+    path = write(tmp_path / "log.csv", t, np.degrees(gyro), accel, header)
+    log = read_log(path)
+    assert np.allclose(log.imu[GYRO], np.degrees(gyro), atol=1e-6)
+    told = [f.what for f in log.findings if "contradict" in f.what]
+    assert any("rad/s, which is stated; inferred: deg/s" in w for w in told)
+    assert any("g, which is stated; inferred: m/s2" in w for w in told)
+    # What the user states is not argued with.
+    log = read_log(path, ReadOptions(gyro_unit="rad/s", accel_unit="g"))
+    assert not any("contradict" in f.what for f in log.findings)
+
+
+def test_gravity_says_which_axis_points_up(tmp_path):
+    t, gyro, _ = turning()
+    header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+    flat = np.tile([0.1, 0.2, 9.8], (t.size, 1))
+    path = write(tmp_path / "log.csv", t, 0.001 * gyro, flat, header)
+    told = [str(f) for f in read_log(path).findings if f.quantity == "axes"]
+    assert "the sensor's z points up in 100 % of the log" in told[0]
+    assert "--axes x,-y,-z" in told[0]
+    told = [str(f) for f in read_log(path, ReadOptions(axes="x,y,z")).findings]
+    assert any("upside down" in w for w in told)
+    assert not any("upside" in str(f) for f in read_log(path, ReadOptions(axes="x,-y,-z")).findings)
+
+
+def test_a_gyro_that_turns_the_other_way_is_told(tmp_path):
+    t, gyro, accel = turning()
+    header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+    path = write(tmp_path / "log.csv", t, -gyro, accel, header)
+    assert any("turns the other way" in f.what for f in read_log(path).findings)
+    mirrored = read_log(path, ReadOptions(axes="x,y,-z")).findings
+    assert not any("turns the other way" in f.what for f in mirrored)
+
+
+def test_a_magnetometer_is_read_in_body_axes(tmp_path):
+    t, gyro, accel = turning()
+    field = np.tile([200.0, -30.0, 400.0], (t.size, 1))
+    header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+    path = tmp_path / "log.csv"
+    write(path, t, gyro, accel, header + ",mx_mG,my_mG,mz_mG", [field])
+    imu = read_log(path, ReadOptions(axes="x,-y,-z")).imu
+    assert np.allclose(imu[MAG], [20.0, 3.0, -40.0])
+    # Without its unit 447 could be mG or counts of 1090 a gauss: a question.
+    write(path, t, gyro, accel, header + ",mx,my,mz", [field])
+    log = read_log(path)
+    assert not set(MAG) & set(log.imu.columns)
+    assert any(f.quantity == "mag" and "left out" in f.what for f in log.findings)
+    write(path, t, gyro, accel, header + ",mx,my,mz", [0.1 * field])
+    assert np.allclose(read_log(path).imu[MAG], [20.0, -3.0, 40.0])
+
+
+def test_it_is_fast():
+    rng = np.random.default_rng(0)
+    n = 100_000
+    signals = Signals(np.arange(n) * 0.01, rng.normal(size=(n, 3)), rng.normal(size=(n, 3)) + 9.0)
+    infer_signals(signals)
+    begin = clock.perf_counter()
+    infer_signals(signals)
+    # 0.1 s on an idle core; the bound leaves room for a busy one.
+    assert clock.perf_counter() - begin < 1.0
