@@ -229,6 +229,7 @@ def test_a_truth_on_dates(tmp_path):
     truth += [f"{s},0,0,{np.degrees(0.5 * k)}" for k, s in enumerate(stamps)]
     bench = bench_attitude(
         written(tmp_path / "log.csv", "\n".join(log)),
+        algorithms="quaternion",
         reference=[str(written(tmp_path / "truth.csv", "\n".join(truth)))],
     )
     assert max(s.max_deg for s in bench.scores) < 1e-9

@@ -18,6 +18,7 @@ from strapdown.simulation import (
     Coning,
     Gesture,
     Handling,
+    ImuErrors,
     PulseMotion,
     SmoothRandom,
     Track,
@@ -338,7 +339,7 @@ def test_whole_turns_leave_the_pose_to_the_last_bit():
 def test_the_new_motions_do_not_know_pulses():
     new = [s for s in SCENARIOS.values() if not isinstance(s.motion, PulseMotion)]
     assert len(new) >= 7
-    assert not any(s.errors.noise_density or any(s.errors.bias) for s in new)
+    assert all(s.errors == ImuErrors() for s in new)
 
 
 @pytest.mark.parametrize(
