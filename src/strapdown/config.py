@@ -57,6 +57,7 @@ class AttitudeSpec(Spec):
     references: tuple[str, ...] = ()
     truth_path: str | None = None
     gyro_bias_path: str | None = None
+    reference_log_path: str | None = None
     from_s: FiniteFloat | None = None
     to_s: FiniteFloat | None = None
 

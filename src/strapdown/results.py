@@ -512,6 +512,12 @@ class AttitudeBench:
     answer : Answer
     trials : Trials or None
     peers : tuple of PeerRun
+    places : tuple of PositionScore
+        One an algorithm and a reference point of place.
+    offers : tuple of SamePose
+        Rests that look alike, where no reference point was named.
+    second : SecondLog or None
+        How a second sensor's log lies to this one.
     """
 
     source: str
@@ -537,6 +543,9 @@ class AttitudeBench:
     answer: Answer
     trials: Trials | None = None
     peers: tuple[PeerRun, ...] = field(default=(), repr=False)
+    places: tuple[PositionScore, ...] = field(default=(), repr=False)
+    offers: tuple[SamePose, ...] = field(default=(), repr=False)
+    second: SecondLog | None = field(default=None, repr=False)
 
     @property
     def summary(self) -> pd.DataFrame:

@@ -16,29 +16,63 @@ _LOG, _RUN, _OUT = "How to read the log", "What to run", "What to write"
 
 
 def attitude(
-    source: Annotated[
-        str,
+    sources: Annotated[
+        list[str],
         typer.Argument(
-            metavar="LOG|SCENARIO",
-            help="A log (CSV, .mat, .h5, .npz, or the folder of a known recording), or the name "
-            "of a scenario (see: strapdown modules).",
+            metavar="LOG|SCENARIO...",
+            help="A log (a file or a folder; see: strapdown modules), or the name of a scenario. "
+            "Several are trials of one question.",
         ),
     ],
     algorithms: Annotated[
         str,
         typer.Option(
-            help="Names joined by blanks or commas, with options after a colon: 'naive euler "
-            "euler:step=rk4 dcm:order=3 quaternion'.",
+            help="Names joined by blanks or commas, with options after a colon: 'naive "
+            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all.",
             rich_help_panel=_RUN,
         ),
-    ] = "naive euler dcm quaternion",
+    ] = "naive euler dcm quaternion rk4 rotvec",
+    rates: Annotated[
+        str | None,
+        typer.Option(
+            metavar="HZ,HZ,…",
+            help="Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    tolerance_deg: Annotated[
+        float,
+        typer.Option(
+            metavar="DEG", help="What is accurate enough: the largest error.", rich_help_panel=_RUN
+        ),
+    ] = 1.0,
+    interpolation: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND",
+            help="How rates run between their stamps: linear (the trapezoid), or cubic.",
+            rich_help_panel=_RUN,
+        ),
+    ] = "linear",
+    trials: Annotated[
+        int,
+        typer.Option(metavar="N", help="Of a scenario: so many seeds.", rich_help_panel=_RUN),
+    ] = 1,
     reference: Annotated[
         list[str] | None,
         typer.Option(
             metavar="WORDS|FILE",
             help="What is known, as often as you like: 'end same as start', 'end 2 turns about z "
-            "since start', '12.5 roll 0 pitch 0 heading 90', a file of such lines (.txt .toml "
-            ".csv), or an attitude truth.",
+            "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
+            "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    reference_log: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="LOG",
+            help="Log of a second, better sensor on the same body, to be taken for the truth.",
             rich_help_panel=_RUN,
         ),
     ] = None,
@@ -54,8 +88,8 @@ def attitude(
         str,
         typer.Option(
             metavar="BIAS",
-            help="none; rest (mean of the first stationary stretch); 'x,y,z deg/s' about forward, "
-            "right, down; or a log of the sensor lying still.",
+            help="none; rest (mean of the first stationary stretch); rests (course through all of "
+            "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still.",
             rich_help_panel=_RUN,
         ),
     ] = "none",
@@ -126,6 +160,14 @@ def attitude(
     seed: Annotated[
         int | None, typer.Option(help="Of a scenario's noise (0).", rich_help_panel=_RUN)
     ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="Of a scenario: a sensor of the catalogue, with its errors.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -145,11 +187,11 @@ def attitude(
         bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
     ] = False,
 ) -> None:
-    """Tell how far each attitude algorithm can be trusted on this log.
+    """Name the simplest attitude algorithm, and the lowest rate, that are accurate enough.
 
-    Runs Alexiev's four algorithms (naive, Euler-Krylov, direction cosines, quaternion) over a
-    gyro log or a scenario, compares them with what is known, and writes a table, JSON, CSV, a
-    report page and its figures.
+    Runs attitude algorithms over a gyro log or a scenario at its own and at lower rates, compares
+    them with what is known, splits their error into the sensor's and their own, counts what they
+    cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
     from strapdown.bundle import check_destination, write_timing
     from strapdown.cli.console import (
@@ -165,19 +207,25 @@ def attitude(
     from strapdown.report.attitude import attitude_json, write_attitude
     from strapdown.systems.attitude_bench import bench_attitude
 
-    folder = out or Path(f"{Path(source).resolve().stem}-attitude")
+    folder = out or Path(f"{Path(sources[0]).resolve().stem}-attitude")
     check_destination(folder, force)
     with progress(quiet or json) as show:
         report = Stopwatch(show)
         bench = bench_attitude(
-            source,
+            sources,
             algorithms=_split(algorithms),
+            rates=_numbers(rates),
+            tolerance_deg=tolerance_deg,
+            interpolation=interpolation,
+            trials=trials,
             reference=reference or [],
+            reference_log=reference_log,
             initial=initial,
             gyro_bias=gyro_bias,
             rate=rate,
             sampling=sampling,
             seed=seed,
+            sensor=sensor,
             columns=parse_column_option(columns or []),
             gyro_unit=gyro_unit,
             accel_unit=accel_unit,
@@ -215,6 +263,20 @@ def attitude(
         page.print(words.HOW_TO_REFERENCE)
     print_findings(bench.findings)
     print_seal(seal, "report.html")
+
+
+def _numbers(text: str | None) -> list[float]:
+    """Numbers joined by blanks or commas."""
+    from strapdown.exceptions import ConfigError
+
+    try:
+        return [float(word) for word in (text or "").replace(",", " ").split()]
+    except ValueError:
+        raise ConfigError(
+            f"'{text}' is no list of numbers",
+            quantity="--rates",
+            remedy="give numbers in Hz joined by commas, as in 100,50,20",
+        ) from None
 
 
 def _split(text: str) -> list[str]:

@@ -30,7 +30,7 @@ def demo(
         "never right.\n",
         style="italic",
     )
-    attitude("alexiev-fig4", rate=100.0, out=out / "alexiev-fig4", force=force)
+    attitude(["alexiev-fig4"], rate=100.0, out=out / "alexiev-fig4", force=force)
     data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data")) / _TURNS
     turn = data / "rotate-360ccw-around-z-pointing-up"
     if not turn.is_dir():
@@ -41,7 +41,7 @@ def demo(
         style="italic",
     )
     attitude(
-        str(turn),
+        [str(turn)],
         reference=["end 2 turns about up since start"],
         gyro_bias=str(data / "unmoved-10min"),
         out=out / "turn-about-z",

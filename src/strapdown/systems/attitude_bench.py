@@ -15,13 +15,15 @@ from strapdown.attitude.cost import count_operations
 from strapdown.config import AttitudeSpec, specify
 from strapdown.evaluation.differences import largest_differences
 from strapdown.evaluation.known import Known, known_at
-from strapdown.evaluation.reference_points import references_from_words, score_references
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.evaluation.place_scores import score_places
+from strapdown.evaluation.reference_points import score_references
+from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import increments_from_imu
 from strapdown.results import AttitudeBench, RestStretch
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_answer import Evidence, find_answer
 from strapdown.systems.attitude_judgement import judge_runs, judge_truth, judge_turns, truth_score
+from strapdown.systems.attitude_known import gather_references, read_second, truth_of_second
 from strapdown.systems.attitude_request import (
     ALL_ALGORITHMS,
     as_text,
@@ -38,7 +40,7 @@ from strapdown.systems.attitude_shares import (
     own_truth,
 )
 from strapdown.systems.attitude_source import Source, describe, read_source, window, with_truth
-from strapdown.systems.attitude_start import find_gyro_bias, initial_attitude
+from strapdown.systems.attitude_start import find_gyro_bias, initial_attitude, without_bias
 from strapdown.systems.attitude_sweep import (
     Grounds,
     choose_factors,
@@ -67,11 +69,13 @@ def bench_attitude(
     interpolation: str = "linear",
     trials: int = 1,
     reference: Sequence[str] = (),
+    reference_log: str | Path | None = None,
     initial: str = "auto",
     gyro_bias: str = "none",
     rate: float | None = None,
     sampling: str | None = None,
     seed: int | None = None,
+    sensor: str | None = None,
     columns: dict[str, str] | None = None,
     gyro_unit: str | None = None,
     accel_unit: str | None = None,
@@ -103,12 +107,16 @@ def bench_attitude(
         Of a scenario: so many seeds, from `seed` on.
     reference : sequence of str
         Reference points in words (``end same as start``, `evaluation.reference_points`), or
-        the path of a file of them, or of an attitude truth.
+        the path of a file of them, or of an attitude truth; ``rests``: gravity at every rest.
+    reference_log : str or Path, optional
+        Log of a second, better sensor on the same body: laid over this one in time and
+        mounting, its attitude is taken for the truth.
     initial : str
         ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
         the truth where there is one, levelled where the log begins at rest, and zero else.
     gyro_bias : str
-        ``none``; ``rest``, the mean over the first stationary stretch; three numbers and a
+        ``none``; ``rest``, the mean over the first stationary stretch; ``rests``, the course
+        through all of them; three numbers and a
         unit about forward, right, down; or the path of a log of the sensor lying still.
     rate : float, optional, Hz
         Of a scenario (100 if not given), or of a log without a time column.
@@ -116,6 +124,8 @@ def bench_attitude(
         What a row holds: the rate at its stamp, or its mean over the interval ending there.
     seed : int, optional
         Of a scenario's noise; 0 if not given.
+    sensor : str, optional
+        Of a scenario: a sensor of the catalogue, or a file like its entries.
     columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
     from_s, to_s : float, optional, s
@@ -153,7 +163,7 @@ def bench_attitude(
     first, *others = (
         one
         for text in sources
-        for one in source_spec(text, rate, seed, reading, sampling, trials, rates)
+        for one in source_spec(text, rate, seed, reading, sampling, trials, rates, sensor)
     )
     words, truth_path = sort_references(as_texts(reference))
     bias = as_text(gyro_bias)
@@ -171,6 +181,7 @@ def bench_attitude(
         references=words,
         truth_path=truth_path,
         gyro_bias_path=bias_path,
+        reference_log_path=None if reference_log is None else str(reference_log),
         from_s=from_s,
         to_s=to_s,
     )
@@ -254,14 +265,11 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
     source = read_source(spec)
     whole = source.imu
     source = replace(source, imu=window(whole, spec.from_s, spec.to_s, source.name))
-    source = with_truth(source, spec)
+    source, second = read_second(spec, with_truth(source, spec))
     rests = find_rests(source.imu)
     bias, bias_input = find_gyro_bias(spec, source, rests)
-    findings = list(source.findings)
-    imu = source.imu
-    if bias["rad_per_s"] is not None:
-        imu = imu.copy()
-        imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias["rad_per_s"])
+    imu = without_bias(spec, source.imu, bias, rests)
+    findings: list[Finding] = []
     q_nb, initial, begin = initial_attitude(spec.initial, source, rests, findings)
     imu = imu[imu.index >= begin]
     if len(imu) < 2:
@@ -270,13 +278,18 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
             file=source.name,
             remedy="give another --initial",
         )
+    if second is not None:
+        source = truth_of_second(source, second, imu, q_nb)
+    findings = [*source.findings, *findings]
     increments = increments_from_imu(imu, spec.interpolation)
     runs = []
     for k, algorithm in enumerate(algorithms):
         progress(algorithm.title, 0.05 + 0.15 * k / len(algorithms))
         runs.append(run_attitude(algorithm, increments, q_nb))
     span = (float(imu.index[0]), float(imu.index[-1]))
-    references = references_from_words(list(spec.references), *span)
+    levelled = str(initial["from"]).startswith("levelled")
+    told = gather_references(spec, source, span, rests, levelled)
+    references = told.points
     scores = [s for run in runs for s in truth_score(run, source)]
     scores += [s for run in runs for s in score_references(run, references, imu)]
     findings += judge_runs(runs, increments)
@@ -325,6 +338,11 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         shares=shares,
         sweep=sweep,
         answer=find_answer(evidence, spec.tolerance_deg),
+        places=tuple(p for run in runs for p in score_places(run, told.places, imu, rests))
+        if told.places
+        else (),
+        offers=told.offers,
+        second=None if second is None else second.aligned,
     )
     return bench, evidence
 

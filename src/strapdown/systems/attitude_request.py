@@ -47,6 +47,7 @@ def source_spec(
     sampling: str | None,
     trials: int = 1,
     rates: Sequence[float] = (),
+    sensor: str | None = None,
 ) -> list[ScenarioSpec] | list[LogSpec]:
     """Specify a scenario, as often as there are trials, or a log.
 
@@ -63,6 +64,8 @@ def source_spec(
         Seeds of a scenario.
     rates : sequence of float, Hz
         That will be tried; a scenario without a rate is sampled at the highest.
+    sensor : str or None
+        Of a scenario.
 
     Returns
     -------
@@ -94,12 +97,17 @@ def source_spec(
                 rate_hz=highest if rate is None else rate,
                 sampling=(sampling or "instantaneous").lower(),
                 seed=first + k,
+                sensor=sensor,
             )
             for k in range(trials)
         ]
     if seed is not None:
         raise ConfigError(
             "a recorded log has no noise to be drawn", quantity="seed", remedy="leave it out"
+        )
+    if sensor is not None:
+        raise ConfigError(
+            "a recorded log has the sensor that it has", quantity="sensor", remedy="leave it out"
         )
     if trials > 1:
         raise ConfigError(
@@ -115,7 +123,7 @@ def source_spec(
 
 def exists(text: str) -> bool:
     """Tell whether a text is the path of something; sentences and odd characters are not."""
-    if text in ("", "none", "rest"):
+    if text in ("", "none", "rest", "rests"):
         return False
     try:
         return Path(text).exists()

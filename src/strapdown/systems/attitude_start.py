@@ -6,6 +6,7 @@ import re
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
@@ -18,7 +19,9 @@ from strapdown.formats import read_log
 from strapdown.formats.columns import parse_unit
 from strapdown.results import InputFiles, RestStretch
 from strapdown.sensors.rest import find_rests
+from strapdown.sensors.rest_bias import gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.attitude_source import Source, input_files, read_options
+from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
 
@@ -67,7 +70,7 @@ def find_gyro_bias(
     choice = spec.gyro_bias.lower()
     if choice == "none":
         return {"rad_per_s": None, "from": "not removed: nothing was asked for"}, ()
-    if choice == "rest":
+    if choice in ("rest", "rests"):
         if not rests:
             raise DataError(
                 "no stationary stretch of a second or more was found",
@@ -76,11 +79,45 @@ def find_gyro_bias(
                 remedy="give the bias itself, as in --gyro-bias '4.5,0.1,1.1 deg/s', or a log of "
                 "the sensor lying still",
             )
+        if choice == "rests" and len(rests) > 1:
+            course = gyro_bias_from_rests(rests)
+            where = (
+                f"course over {len(rests)} rests from {rests[0].start:.3f} to "
+                f"{rests[-1].end:.3f} s, straight between them; shown: their average"
+            )
+            return {"rad_per_s": list(course.average), "from": where}, ()
         first = rests[0]
         return _bias_of(first, f"mean over the rest {first.start:.3f}–{first.end:.3f} s"), ()
     numbers, unit = _stated_bias(spec.gyro_bias)
     bias = [v * GYRO_UNITS[unit] for v in numbers]
     return {"rad_per_s": bias, "from": f"stated: {spec.gyro_bias}"}, ()
+
+
+def without_bias(
+    spec: AttitudeSpec, imu: pd.DataFrame, bias: dict[str, Any], rests: tuple[RestStretch, ...]
+) -> pd.DataFrame:
+    """Take a bias that was found off the rates of a log.
+
+    Parameters
+    ----------
+    spec : AttitudeSpec
+    imu : DataFrame
+        An Imu table; it is not changed.
+    bias : dict
+        From `find_gyro_bias`.
+    rests : tuple of RestStretch
+
+    Returns
+    -------
+    DataFrame
+    """
+    if bias["rad_per_s"] is None:
+        return imu
+    if spec.gyro_bias.lower() == "rests" and len(rests) > 1:
+        return without_gyro_bias(imu, gyro_bias_from_rests(rests))
+    less = imu.copy()
+    less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias["rad_per_s"])
+    return less
 
 
 def _bias_of(rest: RestStretch, where: str) -> dict[str, Any]:
@@ -99,8 +136,8 @@ def _stated_bias(text: str) -> tuple[list[float], str]:
         raise ConfigError(
             f"'{text}' is no bias",
             quantity="--gyro-bias",
-            remedy="give none, rest, three numbers and a unit about the body's forward, right and "
-            "down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
+            remedy="give none, rest, rests, three numbers and a unit about the body's forward, "
+            "right and down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
         ) from None
     return numbers, parse_unit((match.group(4) or "rad/s").strip(), "gyro")
 
