@@ -521,9 +521,29 @@ def rotation_angle(q_1: ArrayLike, q_2: ArrayLike) -> Array:
     DataError
         Wrong shape, a value that is not finite, or a norm that is not 1.
     """
-    difference = rotation_vector_from_quaternion(compose(conjugate(q_1), q_2))
-    angle: Array = np.asarray(np.degrees(np.sqrt((difference * difference).sum(axis=-1))))
-    return angle
+    (a, lead_a), (b, lead_b) = _unit(q_1, "q_1"), _unit(q_2, "q_2")
+    leading = _common(lead_a, lead_b)
+    if lead_a != lead_b:
+        a = np.broadcast_to(a.reshape((*lead_a, 4)), (*leading, 4)).reshape(-1, 4)
+        b = np.broadcast_to(b.reshape((*lead_b, 4)), (*leading, 4)).reshape(-1, 4)
+    return unit_rotation_angle(a, b).reshape(leading)
+
+
+def unit_rotation_angle(q_1: Array, q_2: Array) -> Array:
+    """Angle between the attitudes of two arrays of unit quaternions, which is not checked.
+
+    Parameters
+    ----------
+    q_1, q_2 : ndarray, (n, 4)
+        Of norm 1, as this package's own functions return them.
+
+    Returns
+    -------
+    ndarray, (n,), deg
+    """
+    out = np.empty(len(q_1))
+    kernel.quats_angle(np.ascontiguousarray(q_1), np.ascontiguousarray(q_2), out)
+    return np.asarray(np.degrees(out))
 
 
 def to_scipy(q: ArrayLike) -> Rotation:

@@ -10,6 +10,7 @@ for counting they run as plain Python on numbers that count what is done to them
 from __future__ import annotations
 
 import ast
+import functools
 import hashlib
 import importlib
 import math
@@ -200,6 +201,7 @@ class Counted:
     __hash__ = None  # type: ignore[assignment]
 
 
+@functools.cache
 def counted_kernels() -> dict[str, SimpleNamespace]:
     """Return every kernel module as plain Python, for numbers of `Counted`."""
     loaded: dict[str, SimpleNamespace] = {}

@@ -308,6 +308,19 @@ def quats_multiply(a, b, q):
 
 
 @njit(cache=True)
+def quat_angle(aw, ax, ay, az, bw, bx, by, bz):
+    """Angle of the rotation from a to b, at most pi; right however small it is."""
+    w, x, y, z = quat_multiply(aw, -ax, -ay, -az, bw, bx, by, bz)
+    return 2.0 * math.atan2(math.sqrt(x * x + y * y + z * z), abs(w))
+
+
+@njit(cache=True)
+def quats_angle(a, b, out):
+    for k in range(a.shape[0]):
+        out[k] = quat_angle(a[k, 0], a[k, 1], a[k, 2], a[k, 3], b[k, 0], b[k, 1], b[k, 2], b[k, 3])
+
+
+@njit(cache=True)
 def quats_rotate(q, v, out):
     """Turn each row of `v` by the unit quaternion in the same row."""
     for i in range(q.shape[0]):

@@ -49,7 +49,7 @@ class Known:
         counts = self.counts[samples]
         if not counts.any():
             return None
-        angles = rotation.rotation_angle(q_nb[counts], self.q_nb[samples][counts])
+        angles = rotation.unit_rotation_angle(q_nb[counts], self.q_nb[samples][counts])
         return angles_to_errors(angles)
 
 

@@ -102,7 +102,7 @@ def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | Non
         attitude_history(MOST_ACCURATE, increments_from_imu(imu, how), q_nb)
         for how in ("linear", "cubic")
     )
-    final, _, largest = angles_to_errors(rotation.rotation_angle(chord, cubic))
+    final, _, largest = angles_to_errors(rotation.unit_rotation_angle(chord, cubic))
     return final, largest
 
 
@@ -149,9 +149,9 @@ def find_shares(
         else:
             q_clean = attitude_history(algorithm, clean, q_nb)
             mine = own.known.errors(q_clean, everywhere)
-            sensor = angles_to_errors(rotation.rotation_angle(q, q_clean))
+            sensor = angles_to_errors(rotation.unit_rotation_angle(q, q_clean))
         assert mine is not None
-        apart = rotation.rotation_angle(run_single(algorithm, rounded, q_nb), q)
+        apart = rotation.unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
         shares.append(Share(run.algorithm, mine, sensor, angles_to_errors(apart)))
     return tuple(shares)
 
@@ -177,7 +177,7 @@ def best_error(own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Arra
         return truth.errors(own.known.q_nb, slice(None))
     run = run_attitude(MOST_ACCURATE, increments_from_imu(imu), q_nb)
     clean = run_attitude(MOST_ACCURATE, increments_from_imu(own.clean), q_nb)
-    angle = rotation.rotation_angle(
+    angle = rotation.unit_rotation_angle(
         run.attitude[QUATERNION].to_numpy(), clean.attitude[QUATERNION].to_numpy()
     )
     return angles_to_errors(angle)
