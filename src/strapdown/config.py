@@ -58,6 +58,7 @@ class AttitudeSpec(Spec):
     truth_path: str | None = None
     gyro_bias_path: str | None = None
     reference_log_path: str | None = None
+    peers: tuple[str, ...] = ()
     from_s: FiniteFloat | None = None
     to_s: FiniteFloat | None = None
 

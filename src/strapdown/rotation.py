@@ -17,6 +17,7 @@ agrees with his kinematics (8)-(10).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -57,6 +58,9 @@ __all__ = [
 # How far a norm or C^T C may lie from one before an input is refused as no rotation. Hand
 # written quaternions carry three or four digits; a mistaken order of components does not pass.
 _TOLERANCE = 1e-2
+
+#: From east-north-up to north-east-down: half a turn about the diagonal of north and east.
+Q_NED_ENU = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)
 
 #: Components beyond this are refused, because their squares leave the range of a double.
 LARGEST = LARGEST_RATE

@@ -93,6 +93,14 @@ def attitude(
             rich_help_panel=_RUN,
         ),
     ] = "none",
+    peers: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
     from_s: Annotated[
         float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
     ] = None,
@@ -220,6 +228,7 @@ def attitude(
             trials=trials,
             reference=reference or [],
             reference_log=reference_log,
+            peers=(peers or "").replace(",", " ").split(),
             initial=initial,
             gyro_bias=gyro_bias,
             rate=rate,

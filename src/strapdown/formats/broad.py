@@ -14,9 +14,6 @@ from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble_truth import LOST
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 
-# East-north-up to north-east-down: half a turn about the diagonal between north and east.
-_Q_NED_ENU = (0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0)
-
 
 def detect(path: Path) -> bool:
     """Tell whether this is an HDF5 file with the datasets of BROAD."""
@@ -70,7 +67,7 @@ def read(path: Path) -> RawLog:
     # Zeros stand where the markers were lost, as NaN does.
     known = np.isfinite(q_enu).all(axis=1) & (np.abs(q_enu).max(axis=1) > LOST)
     q_ns = np.full((samples, 4), np.nan)
-    q_ns[known] = rotation.compose(_Q_NED_ENU, q_enu[known])
+    q_ns[known] = rotation.compose(rotation.Q_NED_ENU, q_enu[known])
     return dataclasses.replace(
         raw,
         stated={

@@ -24,6 +24,7 @@ from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_answer import Evidence, find_answer
 from strapdown.systems.attitude_judgement import judge_runs, judge_truth, judge_turns, truth_score
 from strapdown.systems.attitude_known import gather_references, read_second, truth_of_second
+from strapdown.systems.attitude_peers import run_beside
 from strapdown.systems.attitude_request import (
     ALL_ALGORITHMS,
     as_text,
@@ -84,6 +85,7 @@ def bench_attitude(
     repair: bool = False,
     from_s: float | None = None,
     to_s: float | None = None,
+    peers: Sequence[str] = (),
     progress: Progress = _silent,
 ) -> AttitudeBench:
     """Run attitude algorithms over a log or a scenario and compare them with what is known.
@@ -130,6 +132,8 @@ def bench_attitude(
         How to read a log, as in `formats.recording.ReadOptions`.
     from_s, to_s : float, optional, s
         Use a part of the log.
+    peers : sequence of str
+        Filters of other libraries to lay beside (`peers.PEERS`), or ``all``.
     progress : callable, optional
         Called with the name of a stage and the share done.
 
@@ -181,6 +185,7 @@ def bench_attitude(
         references=words,
         truth_path=truth_path,
         gyro_bias_path=bias_path,
+        peers=tuple(as_texts(peers)),
         reference_log_path=None if reference_log is None else str(reference_log),
         from_s=from_s,
         to_s=to_s,
@@ -312,6 +317,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         exact=grounds.own.exact,
         without_bias=_without_bias(grounds, bias, rests),
     )
+    beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     truth, scored = source.truth, source.scored
     if truth is not None and scored is not None:
         inside = np.asarray((truth.index >= span[0]) & (truth.index <= span[1]))
@@ -341,6 +347,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         places=tuple(p for run in runs for p in score_places(run, told.places, imu, rests))
         if told.places
         else (),
+        peers=beside,
         offers=told.offers,
         second=None if second is None else second.aligned,
     )

@@ -1,0 +1,290 @@
+"""What a filter of another library is here: samples in, attitudes out, in our conventions."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import ConfigError, DataError, DivergenceError, Finding, nearest
+from strapdown.tables import ACCEL, GYRO, MAG, attitude_table, check_imu
+
+Array = NDArray[np.float64]
+
+AIDINGS = ("gyro", "gyro+accel", "gyro+accel+mag")
+
+# Steps that differ from their mean by more than this share are not a constant rate.
+STEADY = 0.01
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What a filter may use.
+
+    Attributes
+    ----------
+    dt : ndarray, (n-1,), s
+        From each stamp to the next.
+    gyro : ndarray, (n, 3), rad/s
+    force : ndarray, (n, 3), m/s²
+        Specific force; empty, (0, 3), for the gyro alone. Body axes forward-right-down.
+    mag : ndarray, (n, 3), µT
+        Likewise empty where it is not used.
+    """
+
+    dt: Array
+    gyro: Array
+    force: Array
+    mag: Array
+
+
+@dataclass(frozen=True)
+class PeerFilter:
+    """One filter of a library.
+
+    Attributes
+    ----------
+    compute : dict of str to callable
+        For each aiding: from samples and the initial attitude to ``q_nb``, (n, 4), the first
+        row at the first stamp.
+    steady : bool
+        It knows one rate only, and is given the mean of the record.
+    microseconds : float
+        About what it takes a sample, the slowest of its aidings; for the choice of what to
+        leave out.
+    """
+
+    compute: dict[str, Callable[[Samples, Array], Array]]
+    steady: bool
+    microseconds: float
+
+
+@dataclass(frozen=True)
+class Peer:
+    """Another library.
+
+    Attributes
+    ----------
+    name : str
+        Its distribution, its module, and the word for it here.
+    licence : str
+    filters : dict of str to PeerFilter
+        The first that offers an aiding is the default for it.
+    source : str
+        Where its method stands.
+    """
+
+    name: str
+    licence: str
+    source: str
+    filters: dict[str, PeerFilter]
+
+    @property
+    def available(self) -> bool:
+        """Whether it is installed."""
+        return importlib.util.find_spec(self.name) is not None
+
+    @property
+    def version(self) -> str:
+        """Installed version.
+
+        Raises
+        ------
+        ConfigError
+            It is not installed.
+        """
+        load(self.name)
+        return metadata.version(self.name)
+
+    def label(self, filter_name: str) -> str:
+        """Name, version and, where there are several, the filter."""
+        chosen = f" {filter_name}" if len(self.filters) > 1 else ""
+        return f"{self.name} {self.version}{chosen}"
+
+    def run(
+        self, imu: pd.DataFrame, q_nb: ArrayLike, aiding: str, filter_name: str | None = None
+    ) -> pd.DataFrame:
+        """Run a filter over a record.
+
+        Parameters
+        ----------
+        imu : DataFrame
+            An Imu table; ``mag_x..z`` in µT, body axes, for ``gyro+accel+mag``.
+        q_nb : array_like, (4,)
+            Attitude at the first stamp.
+        aiding : {'gyro', 'gyro+accel', 'gyro+accel+mag'}
+        filter_name : str, optional
+            One of `filters`; the first that offers the aiding.
+
+        Returns
+        -------
+        DataFrame
+            Attitude table on the stamps of `imu`. With a magnetometer the heading is magnetic.
+            Except for vqf with an accelerometer, the first row is `q_nb`.
+
+        Raises
+        ------
+        ConfigError
+            The library is not installed, or has no such filter or aiding.
+        DataError
+            A column that the aiding needs is absent or not finite; or as `tables.check_imu`.
+        DivergenceError
+            The library gave up, or what it returned is no attitude.
+        """
+        load(self.name)
+        _known_aiding(aiding)
+        offering = [name for name, f in self.filters.items() if aiding in f.compute]
+        chosen = filter_name if filter_name is not None else next(iter(offering), "")
+        if chosen not in offering:
+            raise ConfigError(
+                f"'{chosen}' does not run on {aiding}",
+                quantity=f"peers: {self.name}",
+                remedy=nearest(chosen, offering or AIDINGS),
+            )
+        samples = samples_for(imu, aiding)
+        unit = rotation.normalise(q_nb)
+        try:
+            q = self.filters[chosen].compute[aiding](samples, unit)
+            return attitude_table(imu.index.to_numpy(dtype=np.float64), q, imu.attrs.get("source"))
+        except (ValueError, ArithmeticError, np.linalg.LinAlgError, DataError) as error:
+            raise DivergenceError(
+                f"it gave up: {error}",
+                quantity=f"{self.label(chosen)}, {aiding}",
+                remedy="leave it out of the comparison, or try it with other sensors",
+            ) from error
+
+
+def _known_aiding(aiding: str) -> None:
+    if aiding not in AIDINGS:
+        raise ConfigError(
+            f"'{aiding}' is no aiding", quantity="aiding", remedy=nearest(aiding, AIDINGS)
+        )
+
+
+def load(name: str) -> Any:
+    """Import a library.
+
+    Raises
+    ------
+    ConfigError
+        It is not installed.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise ConfigError(
+            f"{name} is not installed",
+            quantity="peers",
+            remedy="pip install 'strapdown[peers]'",
+        ) from None
+
+
+def needed_columns(aiding: str) -> list[str]:
+    """Columns of the Imu table that an aiding needs.
+
+    Raises
+    ------
+    ConfigError
+        The aiding is unknown.
+    """
+    _known_aiding(aiding)
+    return (GYRO + ACCEL + MAG)[: 3 * (1 + AIDINGS.index(aiding))]
+
+
+def samples_for(imu: pd.DataFrame, aiding: str) -> Samples:
+    """Take from an Imu table what an aiding needs.
+
+    Raises
+    ------
+    DataError
+        A column is absent or not finite; or as `tables.check_imu`.
+    """
+    check_imu(imu)
+    columns = needed_columns(aiding)
+    source = imu.attrs.get("source")
+    missing = [c for c in columns if c not in imu.columns]
+    if missing:
+        raise DataError(
+            f"{aiding} needs {', '.join(missing)}, and the log has {', '.join(imu.columns)}",
+            file=source,
+            quantity=missing[0],
+            remedy="compare without this sensor, or use a log that has it",
+        )
+    values = imu[columns].to_numpy(dtype=np.float64)
+    bad = np.argwhere(~np.isfinite(values))
+    if bad.size:
+        row, column = (int(i) for i in bad[0])
+        raise DataError(
+            f"not a finite number ({values[row, column]})",
+            file=source,
+            row=row + 1,
+            quantity=columns[column],
+            remedy="bring this sensor onto the stamps of the gyro, or compare without it",
+        )
+    blocks = [np.ascontiguousarray(values[:, k : k + 3]) for k in range(0, values.shape[1], 3)]
+    blocks += [np.empty((0, 3))] * (3 - len(blocks))
+    time = imu.index.to_numpy(dtype=np.float64)
+    return Samples(np.diff(time), *blocks)
+
+
+def steadiness(dt: Array, label: str, source: str | None) -> Finding | None:
+    """Say that a library for a constant rate got a record whose steps vary.
+
+    Parameters
+    ----------
+    dt : ndarray, s
+    label : str
+        Of the library.
+    source : str or None
+
+    Returns
+    -------
+    Finding or None
+    """
+    mean = float(dt.mean())
+    off = float(np.abs(dt / mean - 1.0).max())
+    if off <= STEADY:
+        return None
+    return Finding(
+        f"{label} takes a constant rate: it was given the mean step of {mean * 1e3:.4g} ms, and "
+        f"steps run from {dt.min() * 1e3:.4g} to {dt.max() * 1e3:.4g} ms",
+        file=source,
+        quantity="time",
+        remedy="its errors include those of the steps; compare it on an evenly sampled log",
+    )
+
+
+def align_heading(q: ArrayLike, known: ArrayLike, row: int = 0) -> Array:
+    """Turn attitudes about the vertical so that one of them comes nearest to a known one.
+
+    Parameters
+    ----------
+    q : array_like, (n, 4)
+        ``q_nb`` whose heading has an arbitrary zero.
+    known : array_like, (4,)
+        ``q_nb`` at one instant.
+    row : int
+        The row of `q` at that instant.
+
+    Returns
+    -------
+    ndarray, (n, 4)
+
+    Notes
+    -----
+    The turn is the twist about down of ``known q*``, ``2 atan2(z, w)``: of all turns about the
+    vertical it leaves the smallest rotation angle. It needs no Euler angles, and is free only
+    where the two differ by half a turn about a level axis.
+    """
+    rows = np.asarray(q, dtype=np.float64)
+    w, _, _, z = rotation.compose(known, rotation.conjugate(rows[row]))
+    turn = rotation.quaternion_from_rotation_vector([0.0, 0.0, 2.0 * float(np.arctan2(z, w))])
+    return rotation.compose(turn, rows)
