@@ -3,7 +3,8 @@
 The state is (the quaternion now, that at the start of the block, steps in the block, their
 increments as length and three angles each). Within a block the attitude is that of the
 block's start turned by the rotation vector of the increments so far, so that it is defined
-at every step and at a ragged end; only whole blocks are built upon.
+at every step and at a ragged end. A block ends when it is full, or before a step that is
+unlike its first: a polynomial through a burst and a gap would say nothing of either.
 
 The rotation vector of a block is ``sum + 1/2 int(alpha x omega) + ...``, Bortz (1971). By
 `MILLER` it is the sum and products of pairs of increments with the coefficients that are
@@ -28,6 +29,9 @@ AUTO, MILLER, FIT = 0.0, 1.0, 2.0
 # share change the correction for coning by the same share of it, which is less than what
 # the correction of the next higher number of increments changes at the rates it is used at.
 EQUAL = 1e-3
+
+# Ratio of two steps up to which they may share a block.
+ALIKE = 3.0
 
 COUNT = 8
 FIRST = 9  # of the increments; each has four numbers
@@ -178,6 +182,10 @@ def rotvec_step(state, dt, tx, ty, tz, dx, dy, dz, samples, coefficients):
     if samples == 1.0:
         x, y, z = linear_rate_vector(tx, ty, tz, dx, dy, dz)
     else:
+        first = state[FIRST]
+        if state[COUNT] > 0.0 and (dt > ALIKE * first or first > ALIKE * dt):
+            state[4], state[5], state[6], state[7] = state[0], state[1], state[2], state[3]
+            state[COUNT] = 0.0
         done = int(state[COUNT])
         at = FIRST + 4 * done
         state[at], state[at + 1], state[at + 2], state[at + 3] = dt, tx, ty, tz

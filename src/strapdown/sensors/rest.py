@@ -62,7 +62,7 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     gyro_sd = _window_sd(gyro, starts, ends)
     quiet = max(QUIET_FACTOR * float(np.quantile(gyro_sd, QUIET_QUANTILE)), ROUNDING)
     still = gyro_sd <= min(quiet, MAX_GYRO_SD)
-    still &= np.linalg.norm(_window_mean(gyro, starts, ends), axis=1) <= MAX_MEAN_RATE
+    still &= np.abs(_window_mean(gyro, starts, ends)).max(axis=1) <= MAX_MEAN_RATE
     if accel is not None:
         still &= _window_sd(accel, starts, ends) <= MAX_ACCEL_SD
     rests = [

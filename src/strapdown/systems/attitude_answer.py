@@ -37,6 +37,9 @@ class Evidence:
         Whether the algorithms' own errors are against exact truth.
     without_bias : float or None
         Error in deg that would be left with the bias of a rest removed, where it was not.
+    with_cubic : float or None
+        Error in deg that would be left with rates as cubics between their stamps, where they
+        were chords.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -46,6 +49,7 @@ class Evidence:
     known: bool
     exact: bool
     without_bias: float | None
+    with_cubic: float | None
 
 
 @dataclass(frozen=True)
@@ -167,11 +171,16 @@ def _limited_by_sensor(
 ) -> Answer:
     limit = UNSEEN * sensor
     good = choices(evidence, "own_deg", limit)
-    how = "" if evidence.exact else ", as estimated from the most accurate algorithm"
-    sentence = (
-        f"No algorithm stays within {tolerance:g}°, and none could: the sensor alone makes "
-        f"{_deg(sensor)} on this log{how}."
-    )
+    if evidence.exact:
+        whose = f"the sensor alone makes {_deg(sensor)}"
+    elif evidence.sensor is not None:
+        whose = f"the sensor makes {_deg(sensor)}, by the most accurate algorithm"
+    else:
+        whose = (
+            f"by the most accurate algorithm, too, sensor and reference points are {_deg(sensor)} "
+            "apart"
+        )
+    sentence = f"No algorithm stays within {tolerance:g}°, and none could: {whose}."
     algorithm = meaning = rate = None
     why = [
         f"The most accurate algorithm here, {best['algorithm']} at {float(best['rate_hz']):.4g} "
@@ -182,8 +191,8 @@ def _limited_by_sensor(
         chosen = good[0]
         algorithm, meaning, rate = chosen.cost.algorithm, chosen.meaning, chosen.rate_hz
         sentence += (
-            f" {_title(evidence, chosen)} at {_rate(chosen)} is all that this sensor needs: its "
-            f"own error, {_deg(chosen.error_deg)}, is under a tenth of the sensor's."
+            f" {_title(evidence, chosen)} at {_rate(chosen)} is all that is needed: its own "
+            f"error, {_deg(chosen.error_deg)}, is under a tenth of that."
         )
         why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
     helps = []
@@ -209,11 +218,18 @@ def _limited_by_rate(evidence: Evidence, best: pd.Series, tolerance: float) -> A
     )
     order = next(a.accuracy.rates for a in evidence.algorithms if a.label == str(best["algorithm"]))
     helps = []
+    if evidence.with_cubic is not None and evidence.with_cubic < 0.5 * error:
+        helps.append(
+            "Rates that run as cubics between their stamps (--interpolation cubic): "
+            f"{_deg(evidence.with_cubic)} would be left."
+        )
     if order and np.isfinite(error):
         # From rates by the trapezoid no algorithm is of more than second order.
-        needed = rate * (error / tolerance) ** (1.0 / min(order, 2))
+        order = order if evidence.with_cubic is None else min(order, 2)
+        needed = rate * (error / tolerance) ** (1.0 / order)
         helps.append(
-            f"A higher rate: on smooth motion about {needed:.2g} Hz, by its order of accuracy."
+            f"A higher rate: on smooth motion about {_two_digits(needed)} Hz, by its order of "
+            "accuracy."
         )
     helps.append("A sensor that integrates between samples, or a tolerance that is wider.")
     return Answer("rate", sentence, tolerance, None, None, None, (), tuple(helps))
@@ -264,6 +280,11 @@ def _title(evidence: Evidence, choice: Choice) -> str:
 
 def _rate(choice: Choice) -> str:
     return f"{choice.rate_hz:.4g} Hz"
+
+
+def _two_digits(value: float) -> str:
+    digits = 1 - int(np.floor(np.log10(value)))
+    return f"{round(value, digits):.10g}"
 
 
 def _cycles(choice: Choice) -> str:

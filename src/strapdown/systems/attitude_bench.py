@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude import AttitudeAlgorithm, make_algorithm, run_attitude
+from strapdown.attitude import AttitudeAlgorithm, RotationVector, make_algorithm, run_attitude
 from strapdown.attitude.cost import count_operations
 from strapdown.config import AttitudeSpec, specify
 from strapdown.evaluation.differences import largest_differences
@@ -225,7 +225,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     sweep = worst_sweep([b.sweep for b in benches])
     known = [e.sensor for _, e in judged if e.sensor is not None]
     worst = max(known, key=lambda e: e[2]) if len(known) == len(judged) else None
-    together = replace(evidence, sweep=sweep, sensor=worst, without_bias=None)
+    together = replace(evidence, sweep=sweep, sensor=worst, without_bias=None, with_cubic=None)
     return replace(
         bench,
         specification=spec.model_dump(mode="json"),
@@ -316,6 +316,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         known=known is not None or bool(len(references)),
         exact=grounds.own.exact,
         without_bias=_without_bias(grounds, bias, rests),
+        with_cubic=_with_cubic(grounds),
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     truth, scored = source.truth, source.scored
@@ -378,3 +379,12 @@ def _without_bias(
     imu = grounds.imu.copy()
     imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(rests[0].gyro_mean)
     return error_at_full_rate(MOST_ACCURATE, replace(grounds, imu=imu))
+
+
+def _with_cubic(grounds: Grounds) -> float | None:
+    """Error that would be left with rates as cubics, where they were taken as chords."""
+    if grounds.interpolation == "cubic" or grounds.imu.attrs["sampling"] == "mean":
+        return None
+    if grounds.truth is None and grounds.references.empty:
+        return None
+    return error_at_full_rate(RotationVector(samples=1), replace(grounds, interpolation="cubic"))
