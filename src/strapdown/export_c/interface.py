@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 from strapdown.attitude import AttitudeAlgorithm
 
-QUATERNION = "{0}[0], {0}[1], {0}[2], {0}[3]"
 _PLACES = "&q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]"
 _UNIT = f"quat_normalise(a->state[0], a->state[1], a->state[2], a->state[3],\n        {_PLACES});"
 _ANGLES = f"quat_from_euler(a->state[0], a->state[1], a->state[2],\n        {_PLACES});"
@@ -20,8 +19,8 @@ _COPY = """a->state[0] = w;
     a->state[1] = x;
     a->state[2] = y;
     a->state[3] = z;"""
-_ROWS = """quat_from_dcm({0}[0], {0}[1], {0}[2], {0}[3], {0}[4], {0}[5], {0}[6], {0}[7], {0}[8],
-        &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);"""
+_ROWS = """quat_from_dcm({0}[0], {0}[1], {0}[2], {0}[3], {0}[4], {0}[5],
+        {0}[6], {0}[7], {0}[8], &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);"""
 
 # The rotation nearest in Frobenius norm. Newton's step finds it from every matrix whose
 # singular values are below sqrt(3), as they are when their squares sum to 3.
@@ -50,6 +49,8 @@ class Shape:
         What its numbers are.
     begin, read : str
         Statements: from w, x, y, z into ``a->state``; from there into ``q_nb``.
+    begun : int
+        Numbers of the state that `begin` sets; the rest is zero.
     kernels : tuple of str
         What these call.
     ranges : callable
@@ -59,32 +60,36 @@ class Shape:
     state: str
     begin: str
     read: str
+    begun: int
     kernels: tuple[str, ...]
     ranges: Callable[[AttitudeAlgorithm], dict[str, tuple[int, int]]] = field(
         default=lambda algorithm: {}
     )
 
 
-_BY_QUATERNION = Shape("quaternion w, x, y, z", _COPY, _UNIT, ())
+_BY_QUATERNION = Shape("quaternion w, x, y, z", _COPY, _UNIT, 4, ())
 _BY_MATRIX = Shape(
     "C_nb row by row, steps since it was orthogonalised",
     "dcm_from_quat(w, x, y, z, a->state);",
     _ROWS.format("a->state"),
+    9,
     ("dcm_from_quat", "quat_from_dcm"),
 )
 _TRUNCATED = Shape(
     _BY_MATRIX.state,
     _BY_MATRIX.begin,
     NEAREST + _ROWS.format("m"),
+    9,
     (*_BY_MATRIX.kernels, "orthogonalise"),
 )
 
 SHAPES: dict[str, Shape] = {
-    "naive": Shape("roll, pitch, heading, rad", _FROM_ANGLES, _ANGLES, ("quat_from_euler",)),
+    "naive": Shape("roll, pitch, heading, rad", _FROM_ANGLES, _ANGLES, 3, ("quat_from_euler",)),
     "euler": Shape(
         "roll, pitch, heading, rad; least |cos pitch|, its step, steps",
         f"{_FROM_ANGLES}\n    a->state[3] = FABS(COS(a->state[1]));",
         _ANGLES,
+        4,
         ("quat_from_euler",),
     ),
     "dcm": _BY_MATRIX,
@@ -92,8 +97,10 @@ SHAPES: dict[str, Shape] = {
     "rk4": _BY_QUATERNION,
     "rotvec": Shape(
         "quaternion now, at the block's start; steps in it; dt and angles of each",
-        _COPY + "\n    for (int i = 0; i < 4; i++) {\n        a->state[4 + i] = a->state[i];\n    }",
+        _COPY
+        + "\n    for (int i = 0; i < 4; i++) {\n        a->state[4 + i] = a->state[i];\n    }",
         _UNIT,
+        8,
         (),
         lambda algorithm: {"done": (0, int(algorithm.kernel_options()[0]) - 1)},
     ),
@@ -122,6 +129,8 @@ class Sampling:
         What the structure remembers, as declarations.
     code : str
         The functions; ``STEP`` stands for the call of the algorithm.
+    bytes : int
+        What the structure remembers takes in single precision.
     lag : int
         Samples by which the attitude is behind.
     """
@@ -129,6 +138,7 @@ class Sampling:
     words: str
     memory: str
     code: str
+    bytes: int
     lag: int = 0
 
 
@@ -142,7 +152,7 @@ static int usable(real_t dt, const real_t *gyro)
 """
 
 MEAN = Sampling(
-    "a sample is the mean rate over the dt that ends with it",
+    "A sample is the mean rate over the dt that ends with it",
     "",
     f"""{_USABLE}
 int attitude_update(struct attitude *a, real_t dt, const real_t gyro[3])
@@ -158,10 +168,11 @@ int attitude_update(struct attitude *a, real_t dt, const real_t gyro[3])
     return 0;
 }}
 """,
+    bytes=0,
 )
 
 LINEAR = Sampling(
-    "a sample is the rate at its instant, and the rate is linear between samples (trapezoid)",
+    "A sample is the rate at its instant, and the rate is linear between samples (trapezoid)",
     """\
     real_t rate[3]; /* of the sample before, rad/s */
     int started;    /* whether there was one */
@@ -187,10 +198,11 @@ int attitude_update(struct attitude *a, real_t dt, const real_t gyro[3])
     return 0;
 }}
 """,
+    bytes=16,
 )
 
 CUBIC = Sampling(
-    "a sample is the rate at its instant, and the rate is the cubic through four samples; a step "
+    "A sample is the rate at its instant, and the rate is the cubic through four samples; a step "
     "needs the sample after it, so that the attitude is that of the sample before the last",
     """\
     real_t rate[3][3]; /* of the last three samples, the newest last, rad/s */
@@ -241,6 +253,7 @@ void attitude_finish(struct attitude *a)
     }}
 }}
 """,
+    bytes=48,
     lag=1,
 )
 
@@ -282,9 +295,6 @@ void attitude_init(struct attitude *a, const real_t q_nb[4])
 {{
     real_t w, x, y, z;
     quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3], &w, &x, &y, &z);
-    for (int i = 0; i < {size}; i++) {{
-        a->state[i] = R(0.0);
-    }}
     {begin}
 {clear}}}
 

@@ -76,6 +76,15 @@ int main(void)
 #ifdef ATTITUDE_FILTER
 #include <stdio.h>
 
+static void put(const struct attitude *a)
+{{
+    real_t q[4];
+    attitude_quaternion(a, q);
+    for (int i = 0; i < 4; i++) {{
+        printf("%.17g%c", (double)q[i], i < 3 ? ' ' : '\\n');
+    }}
+}}
+
 int main(void)
 {{
     static const real_t from[4] = {{{from_}}};
@@ -84,20 +93,22 @@ int main(void)
     attitude_init(&a, from);
     while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {{
         const real_t gyro[3] = {{R(x), R(y), R(z)}};
-        real_t q[4];
         if (attitude_update(&a, R(dt), gyro)) {{
             fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
         }}
-        attitude_quaternion(&a, q);
-        printf("%.17g %.17g %.17g %.17g\\n", (double)q[0], (double)q[1], (double)q[2], (double)q[3]);
+        put(&a);
     }}
-    return 0;
+{last}    return 0;
 }}
 #endif
 """
 _FINISH = """ else {
             attitude_finish(&a);
         }"""
+_LAST = """\
+    attitude_finish(&a);
+    put(&a);
+"""
 
 
 def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
@@ -113,8 +124,8 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
     """
     from_ = ", ".join(f"R({float(v).hex()})" for v in q_nb)
     bound = (
-        f"{len(vector.samples)} steps of {ROUNDINGS} roundings that another compiler or another sine "
-        "may make otherwise"
+        f"{len(vector.samples)} steps of {ROUNDINGS} roundings that another compiler or another "
+        "sine may make otherwise"
     )
     if vector.condition > 1.0:
         bound += f", each magnified by 1/cos(pitch), here up to {vector.condition:.3g}"
@@ -128,6 +139,7 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
         bound="\n".join(comment(f"{bound}.")),
         roundings=f"{vector.roundings:.4g}".replace("e+0", "e"),
         finish=_FINISH if lag else "",
+        last=_LAST if lag else "",
         from_=from_.replace("R(", "\n        R("),
     )
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import textwrap
 
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown import __version__, rotation
+from strapdown import rotation
 from strapdown.attitude import AttitudeAlgorithm
 from strapdown.attitude.cost import operation_count, step_kernel
 from strapdown.exceptions import ConfigError, nearest
@@ -82,9 +83,8 @@ def export_c(
     translator = Translator(kernels)
     functions = ["\n".join(translator.function(f)) + "\n" for f in kernels.functions]
     ends = ENDS.format(
-        size=translator.state_size,
         begin=shape.begin,
-        clear=CLEAR[kind],
+        clear=_rest(shape, translator.state_size) + CLEAR[kind],
         update=_update(around, step, increments),
         read=shape.read,
     )
@@ -145,6 +145,16 @@ def _require_increments(kernels: Kernels, kind: str, change: bool) -> Function:
     return kernels.require("increment", {"mean": (False, False)}, None if change else (0,))
 
 
+def _rest(shape: Shape, size: int) -> str:
+    """Statements that clear what of the state does not begin with the attitude."""
+    if size == shape.begun:
+        return ""
+    if size == shape.begun + 1:
+        return f"    a->state[{shape.begun}] = R(0.0);\n"
+    head = f"    for (int i = {shape.begun}; i < {size}; i++) {{\n"
+    return head + "        a->state[i] = R(0.0);\n    }\n"
+
+
 def _update(around: Sampling, step: Function, increments: Function) -> str:
     change = "dx" in step.parameters
     of = {"state": "a->state", "dt": "dt"}
@@ -176,8 +186,8 @@ def _update(around: Sampling, step: Function, increments: Function) -> str:
 
 def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
     accuracy, count = algorithm.accuracy, operation_count(algorithm)
-    numbers = size + around.memory.count("rate[3];") * 3 + around.memory.count("[3][3]") * 11
-    whole = numbers * 4 + (4 if around.memory else 0)
+    # Looked up, because the package itself names what stands on higher floors.
+    version = importlib.import_module("strapdown").__version__
     operations = ", ".join(f"{count[k]:.3g} {k}" for k in count if count[k])
     orders = (
         f"increments {accuracy.increments}, rates interpolated by a cubic {accuracy.rates} (by the "
@@ -185,17 +195,17 @@ def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
     )
     lines = [
         f"Attitude by {algorithm.title.lower()}, {algorithm.source}, {algorithm.equations}.",
-        f"Written by strapdown {__version__} from the kernels that it runs itself: {algorithm.label}.",
-        f"Samples: {around.words}.",
+        f"{algorithm.label}, written by strapdown {version} from the kernels that it runs itself.",
+        f"{around.words}.",
         "Axes: body forward-right-down; local level north-east-down. q_nb turns body into local "
         "level, Hamilton, scalar first. Rates in rad/s of the body relative to inertial space, "
         "time in s.",
-        f"Error falls with the power of the step of: {orders}.",
+        f"Power of the step with which the error falls, 0 where it does not: {orders}.",
         f"Operations a step, from increments of angle below 0.5 rad: {operations}. "
-        f"Memory in single precision: {whole} bytes.",
+        f"Memory in single precision: {4 * size + around.bytes} bytes.",
         "Single precision; -DREAL=double for double. Test: cc -std=c99 -O2 -DATTITUDE_TEST "
         "attitude.c -lm && ./a.out. With -DATTITUDE_FILTER it reads lines of dt gx gy gz and "
-        "writes a quaternion for each.",
+        f"writes a quaternion for each{', and at the end one more' if around.lag else ''}.",
         "SPDX-License-Identifier: MIT. Copyright (c) 2026 The strapdown developers.",
     ]
     return "\n".join(comment("\n\n".join(lines))) + "\n"
@@ -248,4 +258,3 @@ def _constants(kernels: Kernels) -> str:
             lines += comment(constant.comment)
         lines.append(f"#define {constant.name} {number(constant.value)}")
     return "\n".join([*lines, ""]) if lines else ""
-

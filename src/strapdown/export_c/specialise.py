@@ -23,7 +23,7 @@ Span = tuple[Number, Number]
 Env = dict[str, Span]
 
 
-class Untranslatable(Exception):
+class UntranslatableError(Exception):
     """A kernel has left the subset of Python that can be translated."""
 
     def __init__(self, what: str, node: ast.AST) -> None:
@@ -190,7 +190,10 @@ class _Specialiser:
             new = ast.Assign([self.target(node.targets[0])], self.expression(node.value))
             self.remember(node.targets[0])
         elif isinstance(node, ast.AugAssign):
-            new = ast.AugAssign(self.target(node.target), node.op, self.expression(node.value))
+            target = self.target(node.target)
+            if not isinstance(target, ast.Name | ast.Subscript):
+                raise UntranslatableError("statement outside the subset", node)
+            new = ast.AugAssign(target, node.op, self.expression(node.value))
         elif isinstance(node, ast.Return) and node.value is not None:
             new = ast.Return(self.expression(node.value))
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
@@ -202,13 +205,17 @@ class _Specialiser:
         elif isinstance(node, ast.While):
             new = ast.While(self.expression(node.test), self.block(node.body), [])
         else:
-            raise Untranslatable("statement outside the subset", node)
+            raise UntranslatableError("statement outside the subset", node)
         return [_like(new, node)]
 
     def target(self, node: ast.expr) -> ast.expr:
         for part in ast.walk(node):
-            if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Store) and part.id in self.env:
-                raise Untranslatable("an option is given another value", node)
+            if (
+                isinstance(part, ast.Name)
+                and isinstance(part.ctx, ast.Store)
+                and part.id in self.env
+            ):
+                raise UntranslatableError("an option is given another value", node)
         return self.expression(node)
 
     def remember(self, target: ast.expr) -> None:
@@ -218,10 +225,12 @@ class _Specialiser:
     def each(self, node: ast.For, values: ast.Tuple) -> list[ast.stmt]:
         """Write a loop over a tuple out."""
         if not isinstance(node.target, ast.Name):
-            raise Untranslatable("loop over more than one name", node)
+            raise UntranslatableError("loop over more than one name", node)
         out: list[ast.stmt] = []
         for value in values.elts:
-            out += self.block([_Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body])
+            out += self.block(
+                [_Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body]
+            )
         return out
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
@@ -394,7 +403,7 @@ class _Keep(ast.NodeTransformer):
 
     def visit_Return(self, node: ast.Return) -> ast.Return:
         if not isinstance(node.value, ast.Tuple):
-            raise Untranslatable("results that cannot be chosen from", node)
+            raise UntranslatableError("results that cannot be chosen from", node)
         values = [node.value.elts[i] for i in self.keep]
         node.value = values[0] if len(values) == 1 else ast.Tuple(values, ast.Load())
         return node
@@ -465,7 +474,8 @@ def _attach_comments(tree: ast.Module, lines: list[str]) -> None:
     """Note with each statement the comment lines right above it."""
     for node in ast.walk(tree):
         if isinstance(node, ast.stmt) and not isinstance(node, ast.FunctionDef):
-            at, found = node.lineno - 2, []
+            at = node.lineno - 2
+            found: list[str] = []
             while at >= 0 and lines[at].lstrip().startswith("# ") and "# ---" not in lines[at]:
                 found.insert(0, lines[at].strip()[2:])
                 at -= 1

@@ -6,7 +6,7 @@ import ast
 import textwrap
 from collections.abc import Iterable, Iterator
 
-from strapdown.export_c.specialise import Function, Kernels, Untranslatable, loaded
+from strapdown.export_c.specialise import Function, Kernels, UntranslatableError, loaded
 
 WIDTH = 100
 # Results up to this number go where pointers say; more of them into one array.
@@ -41,7 +41,7 @@ def comment(text: str, indent: str = "") -> list[str]:
     room = WIDTH - len(indent) - 3
     if len(paragraphs) == 1 and len(paragraphs[0]) <= room - 3:
         return [f"{indent}/* {paragraphs[0]} */"]
-    lines = []
+    lines: list[str] = []
     for paragraph in paragraphs:
         lines += [*([""] if lines else []), *textwrap.wrap(paragraph, room)]
     return [
@@ -70,7 +70,7 @@ def wrapped(text: str, indent: str) -> list[str]:
 
 def number(value: float) -> str:
     """A literal: whole numbers as such, others as R(...), which is of the precision chosen."""
-    if isinstance(value, bool) or isinstance(value, int):
+    if isinstance(value, int):
         return str(int(value))
     return f"R({value!r})"
 
@@ -228,10 +228,12 @@ class _Body:
         if isinstance(node, ast.If):
             return out + self.branch(node, indent, last)
         if isinstance(node, ast.For | ast.While):
-            head = self.loop(node) if isinstance(node, ast.For) else f"while ({self.text(node.test)})"
+            head = (
+                self.loop(node) if isinstance(node, ast.For) else f"while ({self.text(node.test)})"
+            )
             inside = self.block(node.body, indent + "    ")
             return [*out, *wrapped(f"{head} {{", indent), *inside, f"{indent}}}"]
-        raise Untranslatable("statement outside the subset", node)
+        raise UntranslatableError("statement outside the subset", node)
 
     def branch(self, node: ast.If, indent: str, last: bool) -> list[str]:
         inner = indent + "    "
@@ -251,7 +253,7 @@ class _Body:
 
     def loop(self, node: ast.For) -> str:
         if not isinstance(node.iter, ast.Call) or _name(node.iter.func) != "range":
-            raise Untranslatable("loop over something else than a range", node)
+            raise UntranslatableError("loop over something else than a range", node)
         bounds = [self.text(a) for a in node.iter.args]
         first, end, step = [["0", *bounds, "1"], [*bounds, "1"], bounds][len(bounds) - 1]
         k = _name(node.target)
@@ -275,7 +277,7 @@ class _Body:
             return self.assign_each(target.elts, value.elts, indent, new)
         if isinstance(target, ast.Tuple):
             if callee is None or callee.results != len(target.elts) or callee.results > POINTERS:
-                raise Untranslatable("results of something else than a kernel", node)
+                raise UntranslatableError("results of something else than a kernel", node)
             out = self.declared([n for n in map(_plain_name, target.elts) if n in new], indent)
             places = [f"&{self.text(t)}" for t in target.elts]
             return out + wrapped(f"{self.text(value, places)};", indent)
@@ -295,12 +297,14 @@ class _Body:
     ) -> list[str]:
         written: set[str] = set()
         for target, value in zip(targets, values, strict=True):
-            if {self.text(p) for p in ast.walk(value) if isinstance(p, ast.Name | ast.Subscript)} & (
-                written
-            ):
-                raise Untranslatable("reads what the same assignment writes", value)
+            if {
+                self.text(p) for p in ast.walk(value) if isinstance(p, ast.Name | ast.Subscript)
+            } & (written):
+                raise UntranslatableError("reads what the same assignment writes", value)
             written.add(self.text(target))
-        pairs = [f"{self.text(t)}{TIE}={TIE}{self.text(v)}" for t, v in zip(targets, values, strict=True)]
+        pairs = [
+            f"{self.text(t)}{TIE}={TIE}{self.text(v)}" for t, v in zip(targets, values, strict=True)
+        ]
         if all(_plain_name(t) in new for t in targets):
             kinds = {self.all.kind(v, self.types) for v in values}
             if kinds == {"real_t"}:
@@ -361,7 +365,7 @@ class _Body:
             return f"{parts[0]} ?{TIE}{parts[1]} :{TIE}{parts[2]}", 3
         if isinstance(node, ast.Call):
             return self.call(node, places), _ATOM
-        raise Untranslatable("expression outside the subset", node)
+        raise UntranslatableError("expression outside the subset", node)
 
     def call(self, node: ast.Call, places: list[str]) -> str:
         name = node.func.attr if isinstance(node.func, ast.Attribute) else _name(node.func)
@@ -372,7 +376,7 @@ class _Body:
             inside = self.text(node.args[0], over=_UNARY)
             return f"({'int' if name == 'int' else 'real_t'}){inside}"
         if name not in FUNCTIONS:
-            raise Untranslatable("function outside the subset", node)
+            raise UntranslatableError("function outside the subset", node)
         macro = FUNCTIONS[name].upper()
         if name == "max":
             text = arguments[0]
@@ -401,7 +405,7 @@ class _Body:
                     return self._last(other)
                 if isinstance(other, ast.Assign) and _plain_name(other.targets[0]) == node.id:
                     return self.highest(other.value)
-        raise Untranslatable("index whose range is not known", node)
+        raise UntranslatableError("index whose range is not known", node)
 
     def _last(self, loop: ast.For) -> int:
         bounds = [ast.unparse(a) for a in loop.iter.args] if isinstance(loop.iter, ast.Call) else []
@@ -457,5 +461,5 @@ def _plain_name(node: ast.expr) -> str:
 
 def _name(node: ast.expr) -> str:
     if not isinstance(node, ast.Name):
-        raise Untranslatable("a plain name is expected", node)
+        raise UntranslatableError("a plain name is expected", node)
     return node.id
