@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.export_c.translate import comment
+from strapdown.export_c.layout import comment
 from strapdown.export_c.vector import ROUNDINGS, Vector
 
 Array = NDArray[np.float64]

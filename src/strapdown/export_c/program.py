@@ -23,9 +23,10 @@ from strapdown.export_c.interface import (
     Shape,
     shape_of,
 )
+from strapdown.export_c.kernels import Function, Kernels
+from strapdown.export_c.layout import WIDTH, comment, number
 from strapdown.export_c.main import main_program
-from strapdown.export_c.specialise import Function, Kernels
-from strapdown.export_c.translate import WIDTH, Translator, comment, number
+from strapdown.export_c.translate import Translator
 from strapdown.export_c.vector import make_vector
 from strapdown.increments import INTERPOLATIONS
 from strapdown.tables import SAMPLINGS as KINDS

@@ -10,163 +10,16 @@ from __future__ import annotations
 
 import ast
 import copy
-import importlib
-import inspect
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from strapdown._kernels.arithmetic import PACKAGE, SOURCES
+from strapdown.export_c.ranges import ARITHMETIC, COMPARISONS, Env, Span, equality, without
+from strapdown.export_c.syntax import Put, UntranslatableError, like
 
-Number = float | int
-# A scalar is (v, v); a whole number of which only the range is known is (low, high).
-Span = tuple[Number, Number]
-Env = dict[str, Span]
+if TYPE_CHECKING:
+    from strapdown.export_c.kernels import Kernels
 
 
-class UntranslatableError(Exception):
-    """A kernel has left the subset of Python that can be translated."""
-
-    def __init__(self, what: str, node: ast.AST) -> None:
-        super().__init__(f"line {getattr(node, 'lineno', '?')}: {what}: {ast.unparse(node)}")
-
-
-@dataclass
-class Function:
-    """One function of a kernel, specialised.
-
-    Attributes
-    ----------
-    name : str
-        That of the kernel; a second version of it has a number behind it.
-    doc : str
-        First paragraphs of its docstring.
-    parameters : list of str
-        Those that are still used.
-    body : list of stmt
-        Its statements; ``comment`` of each are the comment lines above it.
-    results : int
-        Numbers that it returns.
-    """
-
-    name: str
-    doc: str
-    parameters: list[str]
-    body: list[ast.stmt]
-    results: int
-
-
-@dataclass(frozen=True)
-class Constant:
-    """A constant of a kernel module with the comment that stands above it."""
-
-    name: str
-    value: Number
-    comment: str
-
-
-@dataclass
-class Kernels:
-    """The sources of all kernels, and what was asked of them so far.
-
-    Attributes
-    ----------
-    ranges : dict
-        For a variable that holds a whole number at run time: the least and the greatest.
-    functions : list of Function
-        In the order in which they must be defined.
-    """
-
-    ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
-    functions: list[Function] = field(default_factory=list)
-
-    def __post_init__(self) -> None:
-        self._sources: dict[str, ast.FunctionDef] = {}
-        self._constants: dict[str, Constant] = {}
-        self._made: dict[tuple[object, ...], Function] = {}
-        for name in SOURCES:
-            module = importlib.import_module(f"{PACKAGE}.{name}")
-            text = inspect.getsource(module)
-            tree = ast.parse(text)
-            _attach_comments(tree, text.splitlines())
-            for node in tree.body:
-                if isinstance(node, ast.FunctionDef):
-                    self._sources[node.name] = node
-                elif isinstance(node, ast.Assign):
-                    for target in ast.walk(node.targets[0]):
-                        if isinstance(target, ast.Name):
-                            value, about = getattr(module, target.id), getattr(node, "comment", "")
-                            self._constants[target.id] = Constant(target.id, value, about)
-
-    def constants(self) -> list[Constant]:
-        """Return the constants that the functions use, in the order of the sources."""
-        used = {name for f in self.functions for name in loaded(f.body)}
-        return [c for c in self._constants.values() if c.name in used]
-
-    def require(
-        self, name: str, options: Env | None = None, keep: tuple[int, ...] | None = None
-    ) -> Function:
-        """Specialise a function and all that it calls.
-
-        Parameters
-        ----------
-        name : str
-            A function of a kernel module.
-        options : dict
-            What is known of its parameters.
-        keep : tuple of int
-            The results that are wanted, by position; all where not given.
-        """
-        options = options or {}
-        key = (name, tuple(sorted(options.items())), keep)
-        if key not in self._made:
-            node = self._sources[name]
-            body = _Specialiser(self, dict(options)).block(_without_docstring(node.body))
-            if keep is not None:
-                body = [_Keep(keep).visit(s) for s in body]
-            body = _without_unused(body)
-            used = loaded(body)
-            versions = sum(made[0] == name for made in self._made)
-            self._made[key] = function = Function(
-                name=f"{name}_{versions + 1}" if versions else name,
-                doc=ast.get_docstring(node) or "",
-                parameters=[a.arg for a in node.args.args if a.arg in used],
-                body=body,
-                results=self._results(body),
-            )
-            self.functions.append(function)
-        return self._made[key]
-
-    def named(self, name: str) -> Function | None:
-        """Return the specialised function of that name."""
-        return next((f for f in self.functions if f.name == name), None)
-
-    def is_kernel(self, name: str) -> bool:
-        """Whether there is a kernel of that name."""
-        return name in self._sources
-
-    def parameters(self, name: str) -> list[str]:
-        """Return the parameters that a kernel has in the source."""
-        return [a.arg for a in self._sources[name].args.args]
-
-    def span(self, name: str) -> Span | None:
-        """Return the value of a module's constant."""
-        constant = self._constants.get(name)
-        return (constant.value, constant.value) if constant else None
-
-    def _results(self, body: list[ast.stmt]) -> int:
-        for node in _walk(body):
-            if isinstance(node, ast.Return):
-                value = node.value
-                if isinstance(value, ast.Tuple):
-                    return len(value.elts)
-                if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
-                    other = self.named(value.func.id)
-                    return other.results if other else 1
-                return 1 if value is not None else 0
-        return 0
-
-
-class _Specialiser:
+class Specialiser:
     """One function, with what is known of its names."""
 
     def __init__(self, kernels: Kernels, env: Env) -> None:
@@ -175,6 +28,7 @@ class _Specialiser:
     # --- statements -----------------------------------------------------------------------
 
     def block(self, body: list[ast.stmt]) -> list[ast.stmt]:
+        """Specialise statements, up to the first that returns."""
         done: list[ast.stmt] = []
         for node in body:
             done += self.statement(node)
@@ -183,6 +37,7 @@ class _Specialiser:
         return done
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:
+        """Specialise one statement: into none, one or several."""
         if isinstance(node, ast.If):
             return self.branch(node)
         new: ast.stmt
@@ -206,9 +61,10 @@ class _Specialiser:
             new = ast.While(self.expression(node.test), self.block(node.body), [])
         else:
             raise UntranslatableError("statement outside the subset", node)
-        return [_like(new, node)]
+        return [like(new, node)]
 
     def target(self, node: ast.expr) -> ast.expr:
+        """Specialise what a value is given to."""
         for part in ast.walk(node):
             if (
                 isinstance(part, ast.Name)
@@ -219,6 +75,7 @@ class _Specialiser:
         return self.expression(node)
 
     def remember(self, target: ast.expr) -> None:
+        """Note the range of a name that has one."""
         if isinstance(target, ast.Name) and target.id in self.kernels.ranges:
             self.env[target.id] = self.kernels.ranges[target.id]
 
@@ -229,31 +86,33 @@ class _Specialiser:
         out: list[ast.stmt] = []
         for value in values.elts:
             out += self.block(
-                [_Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body]
+                [Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body]
             )
         return out
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
+        """Decide a condition, or follow both ways with what each of them knows."""
         truth = self.truth(node.test)
         if truth is not None:
             return self.block(node.body if truth else node.orelse)
         before = dict(self.env)
         test = self.expression(node.test)
-        name, value = _equality(node.test, self)
+        name, value = equality(node.test, self.env)
         if name:
             self.env[name] = (value, value)
         body = self.block(node.body)
         self.env = otherwise = dict(before)
         if name:
-            otherwise[name] = _without(before[name], value)
+            otherwise[name] = without(before[name], value)
         orelse = self.block(node.orelse)
         # What follows is reached only by the other way.
         self.env = otherwise if body and isinstance(body[-1], ast.Return) else before
-        return [_like(ast.If(test, body, orelse), node)]
+        return [like(ast.If(test, body, orelse), node)]
 
     # --- expressions ----------------------------------------------------------------------
 
     def expression(self, node: ast.expr) -> ast.expr:
+        """Put in what is known."""
         if self.depends(node):
             span = self.span(node)
             if span and span[0] == span[1]:
@@ -282,6 +141,7 @@ class _Specialiser:
         return rest[0] if len(rest) == 1 else ast.copy_location(ast.BoolOp(node.op, rest), node)
 
     def call(self, node: ast.Call) -> ast.expr:
+        """Call the function that is specialised for what is known of the arguments."""
         if not isinstance(node.func, ast.Name) or not self.kernels.is_kernel(node.func.id):
             return ast.copy_location(
                 ast.Call(node.func, [self.expression(a) for a in node.args], []), node
@@ -300,6 +160,7 @@ class _Specialiser:
         return any(isinstance(p, ast.Name) and p.id in self.env for p in ast.walk(node))
 
     def span(self, node: ast.expr) -> Span | None:
+        """Value or range of an expression, where the options or the constants tell."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return node.value, node.value
         if isinstance(node, ast.Name):
@@ -310,13 +171,14 @@ class _Specialiser:
             return (kind(inside[0]), kind(inside[1])) if kind and inside else None
         if isinstance(node, ast.BinOp):
             a, b = self.span(node.left), self.span(node.right)
-            operation = _ARITHMETIC.get(type(node.op))
+            operation = ARITHMETIC.get(type(node.op))
             if a and b and operation:
                 corners = [operation(p, q) for p in a for q in b]
                 return min(corners), max(corners)
         return None
 
     def truth(self, node: ast.expr) -> bool | None:
+        """Whether a condition holds, where the options tell."""
         if isinstance(node, ast.BoolOp):
             known = [self.truth(v) for v in node.values]
             decides = isinstance(node.op, ast.Or)
@@ -326,157 +188,6 @@ class _Specialiser:
         if isinstance(node, ast.Compare) and len(node.ops) == 1 and self.depends(node):
             a, b = self.span(node.left), self.span(node.comparators[0])
             if a and b:
-                return _COMPARISONS[type(node.ops[0])](a, b)
+                return COMPARISONS[type(node.ops[0])](a, b)
         span = self.env.get(node.id) if isinstance(node, ast.Name) else None
         return bool(span[0]) if span and span[0] == span[1] else None
-
-
-_ARITHMETIC: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
-    ast.Add: lambda a, b: a + b,
-    ast.Sub: lambda a, b: a - b,
-    ast.Mult: lambda a, b: a * b,
-}
-
-
-def _less(a: Span, b: Span) -> bool | None:
-    return True if a[1] < b[0] else False if a[0] >= b[1] else None
-
-
-def _equal(a: Span, b: Span) -> bool | None:
-    if a[0] == a[1] == b[0] == b[1]:
-        return True
-    return False if a[1] < b[0] or b[1] < a[0] else None
-
-
-def _not(known: bool | None) -> bool | None:
-    return None if known is None else not known
-
-
-_COMPARISONS: dict[type[ast.cmpop], Callable[[Span, Span], bool | None]] = {
-    ast.Lt: _less,
-    ast.Gt: lambda a, b: _less(b, a),
-    ast.GtE: lambda a, b: _not(_less(a, b)),
-    ast.LtE: lambda a, b: _not(_less(b, a)),
-    ast.Eq: _equal,
-    ast.NotEq: lambda a, b: _not(_equal(a, b)),
-}
-
-
-def _equality(test: ast.expr, where: _Specialiser) -> tuple[str, Number]:
-    """Return name and value of a condition ``name == value`` on a name of known range."""
-    if (
-        isinstance(test, ast.Compare)
-        and isinstance(test.left, ast.Name)
-        and test.left.id in where.env
-        and isinstance(test.ops[0], ast.Eq)
-        and isinstance(test.comparators[0], ast.Constant)
-    ):
-        value = test.comparators[0].value
-        if isinstance(value, int):
-            return test.left.id, value
-    return "", 0
-
-
-def _without(span: Span, value: Number) -> Span:
-    low, high = span
-    return (low + (low == value), high - (high == value))
-
-
-# --- syntax trees -------------------------------------------------------------------------
-
-
-class _Put(ast.NodeTransformer):
-    """Put an expression in the place of a name."""
-
-    def __init__(self, name: str, value: ast.expr) -> None:
-        self.name, self.value = name, value
-
-    def visit_Name(self, node: ast.Name) -> ast.expr:
-        return self.value if node.id == self.name else node
-
-
-class _Keep(ast.NodeTransformer):
-    """Return some of the results alone."""
-
-    def __init__(self, keep: tuple[int, ...]) -> None:
-        self.keep = keep
-
-    def visit_Return(self, node: ast.Return) -> ast.Return:
-        if not isinstance(node.value, ast.Tuple):
-            raise UntranslatableError("results that cannot be chosen from", node)
-        values = [node.value.elts[i] for i in self.keep]
-        node.value = values[0] if len(values) == 1 else ast.Tuple(values, ast.Load())
-        return node
-
-
-def _like(new: ast.stmt, old: ast.stmt) -> ast.stmt:
-    ast.copy_location(new, old)
-    new.comment = getattr(old, "comment", "")  # type: ignore[attr-defined]
-    return new
-
-
-def _walk(body: Iterable[ast.AST]) -> Iterable[ast.AST]:
-    for node in body:
-        yield from ast.walk(node)
-
-
-def loaded(body: Iterable[ast.AST]) -> set[str]:
-    """Return the names that are read; what an augmented assignment changes is read, too."""
-    names = set()
-    for node in _walk(body):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
-            names.add(node.id)
-        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            names.add(node.target.id)
-    return names
-
-
-def _without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
-    first = body[0]
-    is_doc = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
-    return body[1:] if is_doc else body
-
-
-def _without_unused(body: list[ast.stmt]) -> list[ast.stmt]:
-    """Drop assignments to names that nobody reads, until there are none."""
-    while True:
-        used = loaded(body)
-        shorter = _assignments_to(body, used)
-        if loaded(shorter) == used:
-            return shorter
-        body = shorter
-
-
-def _assignments_to(body: list[ast.stmt], used: set[str]) -> list[ast.stmt]:
-    out: list[ast.stmt] = []
-    for node in body:
-        if isinstance(node, ast.If | ast.For | ast.While):
-            node.body = _assignments_to(node.body, used)
-            node.orelse = _assignments_to(node.orelse, used)
-        elif isinstance(node, ast.Assign):
-            target, value = node.targets[0], node.value
-            if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-                pairs = [
-                    (t, v)
-                    for t, v in zip(target.elts, value.elts, strict=True)
-                    if not (isinstance(t, ast.Name) and t.id not in used)
-                ]
-                if not pairs:
-                    continue
-                target.elts, value.elts = [t for t, _ in pairs], [v for _, v in pairs]
-            elif isinstance(target, ast.Name) and target.id not in used:
-                continue
-        out.append(node)
-    return out
-
-
-def _attach_comments(tree: ast.Module, lines: list[str]) -> None:
-    """Note with each statement the comment lines right above it."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.stmt) and not isinstance(node, ast.FunctionDef):
-            at = node.lineno - 2
-            found: list[str] = []
-            while at >= 0 and lines[at].lstrip().startswith("# ") and "# ---" not in lines[at]:
-                found.insert(0, lines[at].strip()[2:])
-                at -= 1
-            node.comment = " ".join(found)  # type: ignore[attr-defined]
