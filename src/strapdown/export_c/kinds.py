@@ -52,6 +52,7 @@ class Kinds:
                         yield name_of(argument)
 
     def callee(self, node: ast.expr) -> Function | None:
+        """Return the kernel that an expression calls."""
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             return self.kernels.named(node.func.id)
         return None
