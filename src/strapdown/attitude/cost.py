@@ -1,24 +1,86 @@
-"""What one sample costs an attitude algorithm, counted on its own kernel."""
+"""What an algorithm costs on a processor: operations a step, and what it must remember."""
 
 from __future__ import annotations
 
 from collections import Counter
+from typing import Any
 
-import numpy as np
-
-from strapdown._kernels.arithmetic import Counted, counted_kernels
+from strapdown import rotation
+from strapdown._kernels import arithmetic
 from strapdown.attitude.algorithm import AttitudeAlgorithm
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.results import Cost
 
-# Whole blocks of 1, 2, 3 and 4 increments.
-_STEPS = 12
-# An everyday step: 0.01 rad, 60 deg/s at 100 Hz; below 0.5 rad no path depends on it.
-_TURN = 0.01
+STEPS = 12
+TURN = 0.01
 
 
-def count_operations(algorithm: AttitudeAlgorithm) -> Cost:
-    """Count what an algorithm does with one sample.
+class _State(list[Any]):
+    """A state that notes how far it was used."""
+
+    used = 0
+
+    def __getitem__(self, index: Any) -> Any:
+        self.used = max(self.used, index + 1)
+        return super().__getitem__(index)
+
+    def __setitem__(self, index: Any, value: Any) -> None:
+        self.used = max(self.used, index + 1)
+        super().__setitem__(index, value)
+
+
+def _counted_run(algorithm: AttitudeAlgorithm) -> tuple[Counter[str], _State]:
+    count: Counter[str] = Counter()
+
+    def number(value: float) -> arithmetic.Counted:
+        return arithmetic.Counted(value, count)
+
+    home, name = step_kernel(algorithm)
+    step = getattr(arithmetic.counted_kernels()[home], name)
+    start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
+    state = _State(number(float(v)) for v in start)
+    for k in range(STEPS):
+        # The axis turns a little from step to step, as it does in every motion.
+        theta = (0.6 * TURN, (0.64 - 0.01 * k) * TURN, (0.48 + 0.01 * k) * TURN)
+        dtheta = (0.0, -0.01 * TURN, 0.01 * TURN)
+        numbers = [number(v) for v in (0.01, *theta, *dtheta)]
+        step(state, *numbers, *algorithm.kernel_options())
+    return count, state
+
+
+def step_kernel(algorithm: AttitudeAlgorithm) -> tuple[str, str]:
+    """Return the module and the name of the kernel of one step."""
+    kernel: Any = type(algorithm).advance_kernel
+    home = kernel.py_func.__module__.rpartition(".")[2]
+    return home, kernel.py_func.__name__.replace("_advance", "_step")
+
+
+def operation_count(algorithm: AttitudeAlgorithm) -> dict[str, float]:
+    """Count the floating-point operations of a step.
+
+    Parameters
+    ----------
+    algorithm : AttitudeAlgorithm
+
+    Returns
+    -------
+    dict
+        ``add`` (subtractions, too), ``multiply``, ``divide`` (remainders, too), ``sqrt`` and
+        ``trig``, per step, the mean over 12 steps of 0.01 rad each. From increments of angle:
+        what forms them from rates is the same for every algorithm. A sign, a comparison and
+        a copy are free.
+    """
+    count, _ = _counted_run(algorithm)
+    return {kind: count[kind] / STEPS for kind in CORTEX_M4F_CYCLES}
+
+
+def memory(algorithm: AttitudeAlgorithm) -> int:
+    """Return how many numbers an algorithm keeps from one step to the next."""
+    return _counted_run(algorithm)[1].used
+
+
+def count_cost(algorithm: AttitudeAlgorithm) -> Cost:
+    """Count what one sample costs an algorithm.
 
     Parameters
     ----------
@@ -27,27 +89,14 @@ def count_operations(algorithm: AttitudeAlgorithm) -> Cost:
     Returns
     -------
     Cost
-        Of the step from an increment to the attitude in the algorithm's own numbers, without
-        forming the increment (the trapezoid adds 3 additions, 3 multiplications) and without
-        reading angles from the result. Averaged over 12 samples, which are whole blocks. The
-        cycles weigh the operations as `constants.CORTEX_M4F_CYCLES` does.
+        Operations of `operation_count`, weighed as `constants.CORTEX_M4F_CYCLES` does, and the
+        `memory`.
     """
-    kernel = type(algorithm).advance_kernel
-    home = kernel.py_func.__module__.rpartition(".")[2]
-    name = kernel.py_func.__name__.removesuffix("_advance")
-    step = getattr(counted_kernels()[home], f"{name}_step")
-    count: Counter[str] = Counter()
-    begun = algorithm.begin(np.array([1.0, 0.0, 0.0, 0.0]))
-    state = [Counted(value, count) for value in begun]
-    options = algorithm.kernel_options()
-    for k in range(_STEPS):
-        turn = [_TURN * np.cos(k + j) for j in range(3)]
-        change = [0.1 * _TURN * np.sin(k + j) for j in range(3)]
-        step(state, *(Counted(v, count) for v in (0.01, *turn, *change)), *options)
-    per_sample = {key: count[key] / _STEPS for key in CORTEX_M4F_CYCLES}
+    count, state = _counted_run(algorithm)
+    operations = {kind: count[kind] / STEPS for kind in CORTEX_M4F_CYCLES}
     return Cost(
         algorithm=algorithm.label,
-        **per_sample,
-        cycles=sum(per_sample[key] * weight for key, weight in CORTEX_M4F_CYCLES.items()),
-        memory=len(begun),
+        **operations,
+        cycles=sum(operations[kind] * weight for kind, weight in CORTEX_M4F_CYCLES.items()),
+        memory=state.used,
     )

@@ -176,6 +176,15 @@ def attitude(
             rich_help_panel=_RUN,
         ),
     ] = None,
+    export_c: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.c",
+            help="Write the algorithm that the answer chose (or the only one named) as C99, with "
+            "a test vector of this log.",
+            rich_help_panel=_OUT,
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -213,10 +222,12 @@ def attitude(
     from strapdown.formats.columns import parse_column_option
     from strapdown.report import attitude_words as words
     from strapdown.report.attitude import attitude_json, write_attitude
+    from strapdown.report.attitude_c import check_c, write_c
     from strapdown.systems.attitude_bench import bench_attitude
 
     folder = out or Path(f"{Path(sources[0]).resolve().stem}-attitude")
     check_destination(folder, force)
+    check_c(export_c, force)
     with progress(quiet or json) as show:
         report = Stopwatch(show)
         bench = bench_attitude(
@@ -247,6 +258,8 @@ def attitude(
         )
         report("writing", 0.95)
         seal = write_attitude(bench, folder, force=force)
+        if export_c is not None:
+            exported = write_c(bench, export_c, force=force)
         report.stop()
         write_timing(seal, report.seconds)
     if json:
@@ -272,6 +285,8 @@ def attitude(
         page.print(words.HOW_TO_REFERENCE)
     print_findings(bench.findings)
     print_seal(seal, "report.html")
+    if export_c is not None:
+        page.print(f"C99   {export_c}: {exported}")
 
 
 def _numbers(text: str | None) -> list[float]:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.attitude import AttitudeAlgorithm, RotationVector, make_algorithm, run_attitude
-from strapdown.attitude.cost import count_operations
+from strapdown.attitude.cost import count_cost
 from strapdown.config import AttitudeSpec, specify
 from strapdown.evaluation.differences import largest_differences
 from strapdown.evaluation.known import Known, known_at
@@ -307,7 +307,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
     sweep = sweep_rates(
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
-    costs = tuple(count_operations(algorithm) for algorithm in algorithms)
+    costs = tuple(count_cost(algorithm) for algorithm in algorithms)
     evidence = Evidence(
         algorithms=algorithms,
         costs=costs,
