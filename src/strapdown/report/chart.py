@@ -58,8 +58,8 @@ class Line:
         Of a point, in pixels.
     labels : tuple of str
         One a point, or none.
-    places : tuple of str
-        Where each label stands, as ``top right`` (`label_places.place_labels`).
+    places : tuple of (int, int)
+        Where each label stands (`label_places.PLACES`); above its point if not given.
     low, high : ndarray, (n,), or None
         Ends of a horizontal bar through each point.
     legend : bool
@@ -77,7 +77,7 @@ class Line:
     hollow: bool = False
     size: float = 9.0
     labels: tuple[str, ...] = ()
-    places: tuple[str, ...] = ()
+    places: tuple[tuple[int, int], ...] = ()
     low: Array | None = None
     high: Array | None = None
     legend: bool = True
@@ -181,29 +181,36 @@ def short_span(values: ArrayLike) -> bool:
 
 
 def curve(
-    name: str, x: ArrayLike, y: ArrayLike, colour: str, dash: str = "solid", width: float = 1.4
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    colour: str,
+    dash: str = "solid",
+    width: float = 1.4,
+    buckets: int = BUCKETS,
 ) -> Line:
     """Make a line of as many points as a screen can show."""
-    return Line(name, *thin(x, y), colour, dash, width)
+    return Line(name, *thin(x, y, buckets), colour, dash, width)
 
 
-def thin(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+def thin(x: ArrayLike, y: ArrayLike, buckets: int = BUCKETS) -> tuple[Array, Array]:
     """Thin a curve to what a screen shows, keeping every peak.
 
     Parameters
     ----------
     x, y : array_like, (n,)
         NaN in `y` breaks the curve.
+    buckets : int
 
     Returns
     -------
     x, y : ndarray
-        The least and the greatest of each of 1500 equal runs of samples, in their order.
+        The least and the greatest of each of so many equal runs of samples, in their order.
     """
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if xs.size <= 2 * BUCKETS:
+    if xs.size <= 2 * buckets:
         return xs, ys
-    width = -(-xs.size // BUCKETS)
+    width = -(-xs.size // buckets)
     first = np.arange(0, xs.size, width)
     # The last run is filled up with its own last value, which adds no peak and no break.
     body = np.pad(ys, (0, first.size * width - xs.size), mode="edge").reshape(-1, width)

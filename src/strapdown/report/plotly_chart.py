@@ -10,7 +10,7 @@ import numpy as np
 
 from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span
 
-_GRID, _RED, _INK = "#e6e9ed", "#b42318", "#1b1f24"
+_GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
 FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
 _ROW = 30  # pixels a category
 _SPACE = {False: 0.06, True: 0.09}  # between panels, above or beside each other
@@ -182,6 +182,8 @@ def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool)
                 "text": f"<b>{html.escape(panel.title)}</b>",
             }
         )
+    for line in panel.lines:
+        layout["annotations"] += _labels(line, x, y, (log_x, panel.log))
     for level in panel.levels:
         layout["shapes"].append(
             {
@@ -211,6 +213,34 @@ def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool)
         )
 
 
+def _labels(line: Line, x: str, y: str, log: tuple[bool, bool]) -> list[dict[str, Any]]:
+    """Return the labels of points as annotations, a thin line leading to those farther off."""
+    found = []
+    places = line.places or ((0, 1),) * len(line.labels)
+    for at, value, label, (side, rise) in zip(
+        line.x.tolist(), line.y.tolist(), line.labels, places, strict=False
+    ):
+        found.append(
+            {
+                "x": math.log10(at) if log[0] else at,
+                "xref": x,
+                "y": math.log10(value) if log[1] else value,
+                "yref": y,
+                "ax": 10 * side,
+                "ay": -15 * rise,
+                "xanchor": {-1: "right", 0: "center", 1: "left"}[side],
+                "yanchor": "middle",
+                "showarrow": True,
+                "arrowhead": 0,
+                "arrowwidth": 0.7,
+                "arrowcolor": _FAINT if abs(rise) > 1 else "rgba(0,0,0,0)",
+                "text": html.escape(label),
+                "font": {"size": 11},
+            }
+        )
+    return found
+
+
 def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dict[str, Any]]:
     out = []
     for line in panel.lines:
@@ -237,11 +267,6 @@ def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dic
         }
         if line.hollow:
             trace["marker"]["line"] = {"width": 1.8}
-        if line.labels:
-            trace["mode"] += "+text"
-            trace["text"] = [html.escape(label) for label in line.labels]
-            trace["textposition"] = list(line.places) or "top center"
-            trace["cliponaxis"] = False
         if panel.categories:
             trace["hovertemplate"] = f"%{{x:.3g}}<extra>{name}</extra>"
         if line.low is not None and line.high is not None:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-_RED = "#b42318"
+_RED, _FAINT = "#b42318", "#8a939e"
 _DASH: dict[str, Any] = {
     "solid": "-",
     "dash": "--",
@@ -200,19 +200,17 @@ def _draw_line(line: Line, axis: Axes) -> None:
         axis.errorbar(line.x, line.y, xerr=ends, capsize=3, elinewidth=1.3, **style)
     else:
         axis.plot(line.x, line.y, **style)
-    places = line.places or ("top center",) * len(line.labels)
-    for x, y, label, place in zip(line.x, line.y, line.labels, places, strict=False):
-        vertical, horizontal = place.split()
-        right = {"left": -1, "center": 0, "right": 1}[horizontal]
-        up = {"bottom": -1, "middle": 0, "top": 1}[vertical]
+    places = line.places or ((0, 1),) * len(line.labels)
+    for x, y, label, (side, rise) in zip(line.x, line.y, line.labels, places, strict=False):
         axis.annotate(
             label,
             (x, y),
-            xytext=((4 if up else 6) * right, 4 * up),
+            xytext=(7 * side, 10 * rise),
             textcoords="offset points",
             fontsize=7.5,
-            ha={-1: "right", 0: "center", 1: "left"}[right],
-            va={-1: "top", 0: "center", 1: "bottom"}[up],
+            ha={-1: "right", 0: "center", 1: "left"}[side],
+            va="center",
+            arrowprops={"arrowstyle": "-", "lw": 0.5, "color": _FAINT} if abs(rise) > 1 else None,
         )
 
 
