@@ -28,7 +28,7 @@ from strapdown.report.label_places import place_labels
 from strapdown.results import AttitudeBench, PeerRun
 
 # A logarithmic axis has no zero; what is less is drawn here.
-LEAST_ERROR = 1e-6  # deg
+LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"
 _FAINT = "#c3c9d0"
 
 
@@ -143,7 +143,7 @@ def _cost(bench: AttitudeBench) -> Chart:
             else "The algorithm's own error: nothing is known of the attitude. "
         )
         + "Largest rotation angle at the log's own rate. Cost: counted operations of a sample, "
-        f"weighed as a Cortex-M4F takes them. Drawn at {LEAST_ERROR:g}° where it is less.",
+        f"weighed as a Cortex-M4F takes them. Drawn at {LEAST_WORDS} where it is less.",
         "cost, Cortex-M4F cycles per sample",
         (
             Panel(
@@ -233,7 +233,7 @@ def _sweep(bench: AttitudeBench) -> Chart:
             else "The algorithm's own error, with that of the rate. "
         )
         + "Left out: as if the sensor were read less often. Summed: as if it integrated in "
-        f"between. Drawn at {LEAST_ERROR:g}° where it is less.",
+        f"between. Drawn at {LEAST_WORDS} where it is less.",
         "rate, Hz",
         tuple(panels),
         log_x=True,
@@ -260,7 +260,7 @@ def _share(bench: AttitudeBench) -> Chart:
         "Whose error it is",
         "The largest rotation angle that each part makes. "
         + share_basis(bench)
-        + f" Drawn at {LEAST_ERROR:g}° where it is less.",
+        + f" Drawn at {LEAST_WORDS} where it is less.",
         "error, deg",
         (Panel("", lines, categories=names),),
         log_x=True,

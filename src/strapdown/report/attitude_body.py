@@ -38,7 +38,7 @@ _TRIANGLES = np.array(
     ]
 )
 # The upper face, where a screen is, and the front, so that one sees which way it points.
-_FACES = ("#9fb3c8", "#9fb3c8", "#2b3a4a", "#2b3a4a", *(("#c5d2de",) * 6), "#D55E00", "#D55E00")
+_FACES = ("#9fb3c8", "#9fb3c8", "#3d5166", "#3d5166", *(("#c5d2de",) * 6), "#D55E00", "#D55E00")
 _EDGES = [(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6)]
 _EDGES += [(5, 7), (6, 7)]
 _AXIS_NAMES = ("x forward", "y right", "z down")
@@ -187,7 +187,7 @@ def _wire(corners: Array) -> Array:
 def _still() -> list[dict[str, Any]]:
     """Axes of the local level."""
     traces = []
-    for name, end in (("north", (0, 1.45, 0)), ("east", (1.45, 0, 0)), ("down", (0, 0, -1.25))):
+    for name, end in (("north", (0, 1.3, 0)), ("east", (1.3, 0, 0)), ("down", (0, 0, -1.2))):
         traces.append(
             {
                 "type": "scatter3d",
@@ -205,20 +205,20 @@ def _still() -> list[dict[str, Any]]:
 
 
 def _layout(time: Array) -> dict[str, Any]:
-    empty = {"visible": False, "range": [-1.5, 1.5], "autorange": False}
+    empty = {"visible": False, "range": [-1.3, 1.3], "autorange": False}
     at_once = {"mode": "immediate", "transition": {"duration": 0}}
     length = round(_frame_length(time), 1)
     return {
         "font": FONT,
         "paper_bgcolor": "#ffffff",
-        "height": 540,
+        "height": 520,
         "margin": {"l": 0, "r": 0, "t": 10, "b": 0},
         "legend": {"x": 0.01, "y": 0.98},
         "scene": {
             **{f"{axis}axis": empty for axis in "xyz"},
             "aspectmode": "cube",
             # From the south-east and above: north leads away, east to the right.
-            "camera": {"eye": {"x": 0.75, "y": -1.35, "z": 0.85}},
+            "camera": {"eye": {"x": 0.42, "y": -0.84, "z": 0.5}},
             "dragmode": "orbit",
         },
         "updatemenus": [

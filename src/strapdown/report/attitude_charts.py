@@ -7,6 +7,7 @@ import numpy as np
 from strapdown.evaluation.differences import error_angles
 from strapdown.report.attitude_answer_charts import (
     LEAST_ERROR,
+    LEAST_WORDS,
     answer_charts,
     judgement_charts,
 )
@@ -171,7 +172,7 @@ def _error(bench: AttitudeBench) -> Chart:
         "error",
         "Error against the truth",
         "Rotation angle between the computed and the true attitude, where the truth counts. "
-        f"Drawn at {LEAST_ERROR:g}° where it is less.",
+        f"Drawn at {LEAST_WORDS} where it is less.",
         _TIME,
         (Panel("error, deg", tuple(lines), log=True),),
         _marks(bench),
@@ -218,7 +219,7 @@ def _difference(bench: AttitudeBench) -> Chart:
         "difference",
         f"Difference from {base.algorithm}",
         "Rotation angle between the algorithms on the same samples: what the choice of the "
-        f"algorithm makes, whatever the sensor did. Drawn at {LEAST_ERROR:g}° where it is less.",
+        f"algorithm makes, whatever the sensor did. Drawn at {LEAST_WORDS} where it is less.",
         _TIME,
         (Panel("difference, deg", tuple(lines), log=True),),
     )

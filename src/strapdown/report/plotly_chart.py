@@ -33,7 +33,7 @@ def figure(chart: Chart) -> dict[str, Any]:
         "font": FONT,
         "paper_bgcolor": "#ffffff",
         "plot_bgcolor": "#ffffff",
-        "margin": {"l": 70, "r": 18, "t": 34, "b": 46},
+        "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
         "height": _height(chart),
         "hovermode": "closest" if chart.log_x else "x unified",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
@@ -83,7 +83,7 @@ def _log_ticks(values: Array) -> dict[str, Any]:
     """Labels at powers of ten, or at 1, 2 and 5 where those would be too few."""
     return {
         "type": "log",
-        "exponentformat": "power",
+        "tickformat": "~g",
         "dtick": "D2" if short_span(values) else 1,
     }
 
@@ -95,7 +95,7 @@ def _all(lines: tuple[Line, ...], what: str) -> Array:
 
 def _x_axis(chart: Chart, domain: tuple[float, float]) -> dict[str, Any]:
     axis: dict[str, Any] = {
-        "title": {"text": html.escape(chart.x_label)},
+        "title": {"text": html.escape(chart.x_label), "font": {"size": 13}, "standoff": 8},
         "gridcolor": _GRID,
         "zeroline": False,
         "domain": list(domain),
@@ -109,7 +109,7 @@ def _x_axis(chart: Chart, domain: tuple[float, float]) -> dict[str, Any]:
 
 def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
     axis: dict[str, Any] = {
-        "title": {"text": html.escape(panel.y_label)},
+        "title": {"text": html.escape(panel.y_label), "font": {"size": 13}},
         "gridcolor": _GRID,
         "zeroline": False,
         "domain": list(domain),
