@@ -80,7 +80,8 @@ def _write_csv(bench: AttitudeBench, path: Path) -> None:
         "time_s": bench.runs[0].attitude.index.to_numpy(dtype=np.float64)
     }
     for run in bench.runs:
-        name = run.algorithm.replace(",", ";")
+        # Neither a comma nor a semicolon, which a reader may take for what parts the columns.
+        name = run.algorithm.replace(",", " ")
         columns |= {f"{name} {q}": np.round(run.attitude[q].to_numpy(), 9) for q in QUATERNION}
         columns |= {f"{name} {e}_deg": np.round(run.attitude[e].to_numpy(), 6) for e in EULER}
     csv.write(

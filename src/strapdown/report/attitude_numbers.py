@@ -45,9 +45,10 @@ def full_rate_errors(bench: AttitudeBench) -> dict[str, float]:
         algorithm's own.
     """
     own = {share.algorithm: share.own_deg[2] for share in bench.shares}
-    table = bench.sweep
-    rows = table[table["factor"] == 1] if len(table) else table
-    swept = dict(zip(rows["algorithm"].tolist(), rows["error_deg"].tolist(), strict=True))
+    swept: dict[str, float] = {}
+    if len(bench.sweep):
+        rows = bench.sweep[bench.sweep["factor"] == 1]
+        swept = dict(zip(rows["algorithm"].tolist(), rows["error_deg"].tolist(), strict=True))
     errors = {}
     for run in bench.runs:
         name = run.algorithm

@@ -101,4 +101,5 @@ def _table(table: TextTable) -> str:
 
     rows = "".join(row(r, "td", k in table.strong) for k, r in enumerate(table.rows))
     note = f"<div><small>{escape(table.note)}</small></div>" if table.note else ""
-    return f"<table><thead>{row(table.columns, 'th', False)}</thead><tbody>{rows}</tbody></table>{note}"
+    head = row(table.columns, "th", False)
+    return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>{note}"

@@ -58,7 +58,7 @@ def place_labels(
             + sum(_overlap(box, dot) for j, dot in enumerate(dots) if j != k)
             + _outside(box)
             # Near is better where nothing is covered anyway.
-            + 1e-5 * number
+            + 1e-7 * number
             for number, box in enumerate(boxes)
         ]
         best = int(np.argmin(np.round(covered, 9)))

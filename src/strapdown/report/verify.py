@@ -213,16 +213,14 @@ def _column_difference(one: dict[str, NDArray[Any]], two: dict[str, NDArray[Any]
 
 def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
     """Largest difference, relative where a number exceeds 1; infinite where one is no number."""
-    if "f" not in one.dtype.kind + two.dtype.kind and not np.array_equal(one, two):
-        return math.inf
-    if one.dtype.kind not in "fiu":
-        return 0.0
+    if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
+        return 0.0 if np.array_equal(one, two) else math.inf
     # An empty field on both sides is the same.
     apart = np.where(np.isnan(one) & np.isnan(two), 0.0, np.abs(one - two))
     if name.endswith("heading_deg"):
         # Just under 360 may come out just above 0 elsewhere.
         apart = np.minimum(apart, np.abs(apart - 360.0))
-    largest = float(np.max(apart / np.maximum(1.0, np.abs(one)), initial=0.0))
+    largest = float(np.max(apart / np.fmax(1.0, np.abs(one)), initial=0.0))
     return largest if math.isfinite(largest) else math.inf
 
 

@@ -86,20 +86,24 @@ def _bench(algorithms, name="alexiev-fig2c", rate=100.0, truth_known=True, refer
                 own = float(error_angles(both[0].attitude, truth).max())
                 most = float(e.max())
                 sweep.append(
-                    (label, meaning, factor, rate / factor, own, float(e.iloc[-1]))
-                    + (float(np.sqrt((e**2).mean())), most, np.nan, most if truth_known else own)
+                    {
+                        "algorithm": label,
+                        "meaning": meaning,
+                        "factor": factor,
+                        "rate_hz": rate / factor,
+                        "own_deg": own,
+                        "final_deg": float(e.iloc[-1]),
+                        "rms_deg": float(np.sqrt((e**2).mean())),
+                        "max_deg": most,
+                        "reference_deg": np.nan,
+                        "error_deg": most if truth_known else own,
+                    }
                 )
-    sweep = pd.DataFrame(
-        sweep,
-        columns=["algorithm", "meaning", "factor", "rate_hz", "own_deg", "final_deg"]
-        + ["rms_deg", "max_deg", "reference_deg", "error_deg"],
-    )
+    sweep = pd.DataFrame(sweep)
     if not truth_known:
         sweep[["final_deg", "rms_deg", "max_deg"]] = np.nan
     run_list = tuple(runs[a] for a in algorithms)
-    points = references_from_words(
-        list(references), float(noisy.index[0]), float(noisy.index[-1])
-    )
+    points = references_from_words(list(references), float(noisy.index[0]), float(noisy.index[-1]))
     scores, shares, costs = [], [], []
     for label in algorithms:
         e = error_angles(runs[label].attitude, truth)
