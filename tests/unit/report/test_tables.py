@@ -50,19 +50,17 @@ def test_the_answer_comes_first(full_bench):
 def test_the_results_say_whose_error_it_is_and_what_it_costs(make_bench):
     bench = make_bench(references=("end same as start",))
     (table,) = tables.result_tables(bench)
-    assert table.columns == tuple(
-        [
-            "algorithm",
-            "final",
-            "RMS",
-            "largest",
-            "at R1",
-            "own",
-            "sensor",
-            "float32",
-            "cycles",
-            "memory",
-        ]
+    assert table.columns == (
+        "algorithm",
+        "final",
+        "RMS",
+        "largest",
+        "at R1",
+        "own",
+        "sensor",
+        "float32",
+        "cycles",
+        "memory",
     )
     cells = dict(zip(table.columns, table.rows[1], strict=True))
     share, cost = bench.shares[1], bench.costs[1]
