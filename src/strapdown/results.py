@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from math import nan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
 from strapdown.exceptions import Finding
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = [
     "Answer",
@@ -552,3 +556,66 @@ class AttitudeBench:
         """One row an algorithm and a comparison; angles in degrees, time in seconds."""
         columns = [f.name for f in fields(Score)]
         return pd.DataFrame([vars(score) for score in self.scores], columns=columns)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row an algorithm and a comparison, with its share of the error and its cost.
+
+        Returns
+        -------
+        DataFrame
+            The columns of `summary`, then ``own_*_deg``, ``sensor_*_deg`` and ``single_*_deg``
+            with ``final``, ``rms`` and ``max`` for the star, and the fields of `Cost`. Where
+            nothing is known to compare with, one row an algorithm.
+        """
+        table = self.summary
+        if table.empty:
+            table = table.reindex(range(len(self.runs)))
+            table["algorithm"] = [run.algorithm for run in self.runs]
+        shares = pd.DataFrame([_flat(share) for share in self.shares], columns=_flat_names())
+        costs = pd.DataFrame(
+            [vars(cost) for cost in self.costs], columns=[f.name for f in fields(Cost)]
+        )
+        table = table.merge(shares, on="algorithm", how="left")
+        return table.merge(costs, on="algorithm", how="left")
+
+    def plot(self, kind: str = "cost") -> Figure:
+        """Draw one chart, as the report shows it.
+
+        Parameters
+        ----------
+        kind : str
+            ``cost``, ``sweep``, ``gyro``, ``attitude``, ``error``, ``reference-error``,
+            ``difference``, ``share``, ``trials`` or ``peers``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Of no window and no global state; it shows itself in a notebook.
+
+        Raises
+        ------
+        ConfigError
+            There is no such chart, or nothing to show in it.
+        """
+        from strapdown.report.attitude_view import plot
+
+        return plot(self, kind)
+
+    def _repr_html_(self) -> str:
+        """The answer and the table of results, for a notebook."""
+        from strapdown.report.attitude_view import short_html
+
+        return short_html(self)
+
+
+_PARTS, _MOMENTS = ("own", "sensor", "single"), ("final", "rms", "max")
+
+
+def _flat_names() -> list[str]:
+    return ["algorithm", *(f"{part}_{moment}_deg" for part in _PARTS for moment in _MOMENTS)]
+
+
+def _flat(share: Share) -> list[Any]:
+    known = (share.own_deg, share.sensor_deg, share.single_deg)
+    values = [v for three in known for v in (three or (nan, nan, nan))]
+    return [share.algorithm, *values]

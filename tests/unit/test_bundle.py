@@ -43,6 +43,10 @@ def test_what_a_run_writes(sealed):
         "attitude.csv",
         "attitude.json",
         "report.html",
+        "sweep.csv",
+        "figures/cost.svg",
+        "figures/sweep.svg",
+        "figures/share.svg",
         "figures/gyro.svg",
         "figures/attitude.svg",
         "figures/error.svg",
@@ -53,6 +57,12 @@ def test_what_a_run_writes(sealed):
         "inputs/gyro-bias/log.csv",
         "manifest.json",
     }
+
+
+def test_pictures_of_the_second_form_verify_too(tmp_path):
+    seal = write_attitude(bench_attitude("alexiev-fig2a"), tmp_path / "out", png=True)
+    assert (seal.path / "figures" / "gyro.png").is_file()
+    assert verify(seal.path).verdict == "identical"
 
 
 def test_it_verifies_where_it_stands_and_elsewhere_without_its_inputs(sealed, copy, log):
@@ -209,7 +219,7 @@ def reseal(folder, name, data, *, elsewhere=False):
 FORGERIES = [
     ("report.html", lambda data: data.replace(b"</h1>", b"!</h1>")),
     ("figures/gyro.svg", lambda data: b"<svg/>"),
-    ("attitude.json", lambda data: data.replace(b'"headline": "At', b'"headline": "In')),
+    ("attitude.json", lambda data: data.replace(b'"headline": "', b'"headline": "Not so: ')),
     ("attitude.json", lambda data: data.replace(b'"error_deg": ', b'"error_deg": 1', 1)),
     ("attitude.csv", lambda data: data[:-2] + b"7\n"),
 ]

@@ -211,16 +211,9 @@ def attitude(
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
     from strapdown.bundle import check_destination, write_timing
-    from strapdown.cli.console import (
-        Stopwatch,
-        console,
-        print_findings,
-        print_seal,
-        print_table,
-        progress,
-    )
+    from strapdown.cli.attitude_tables import print_bench
+    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.formats.columns import parse_column_option
-    from strapdown.report import attitude_words as words
     from strapdown.report.attitude import attitude_json, write_attitude
     from strapdown.report.attitude_c import check_c, write_c
     from strapdown.systems.attitude_bench import bench_attitude
@@ -267,22 +260,7 @@ def attitude(
         return
     if quiet:
         return
-    page = console()
-    page.print(bench.source, style="bold")
-    if bench.readings:
-        page.print("Read as:")
-        print_table(
-            ["column", "taken as", "unit", "first value"],
-            [[r.source, r.quantity, r.unit, words.first_value(r)] for r in bench.readings],
-        )
-    for name, text in words.facts(bench):
-        page.print(f"{name}: {text}")
-    print_table(words.result_columns(bench), words.result_rows(bench))
-    for line in words.reference_lines(bench):
-        page.print(line)
-    page.print(words.headline(bench), style="bold")
-    if not bench.scores:
-        page.print(words.HOW_TO_REFERENCE)
+    print_bench(bench)
     print_findings(bench.findings)
     print_seal(seal, "report.html")
     if export_c is not None:

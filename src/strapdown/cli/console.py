@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Redirected output has no width of its own; a table is then as wide as it is.
 PIPE_WIDTH = 160
+# A name with many options is broken where many numbers stand beside it.
+_NAME_WIDTH, _MANY_COLUMNS = 24, 6
 
 
 def console(*, err: bool = False) -> Console:
@@ -80,18 +82,44 @@ def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
         yield lambda stage, share: bar.update(task, description=stage, completed=share)
 
 
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table whose first and last columns are text and the others numbers."""
+def print_table(
+    columns: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    *,
+    text: Sequence[int] | None = None,
+    strong: Container[int] = (),
+) -> None:
+    """Print a table.
+
+    Parameters
+    ----------
+    columns : sequence of str
+    rows : sequence of sequence of str
+    text : sequence of int, optional
+        Columns of text, to the left; the first and the last if not given. The others are
+        numbers, to the right, and are never broken.
+    strong : container of int
+        Rows that stand out.
+    """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
+    left = {0, len(columns) - 1} if text is None else set(text)
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 1), header_style="bold")
     for k, name in enumerate(columns):
-        text = k in (0, len(columns) - 1)
-        table.add_column(name, justify="left" if text else "right", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
+        if k in left:
+            table.add_column(name, justify="left", overflow="fold")
+        else:
+            table.add_column(name, justify="right", no_wrap=True)
+    for k, row in enumerate(rows):
+        first = _broken(row[0]) if len(columns) > _MANY_COLUMNS else row[0]
+        table.add_row(first, *row[1:], style="bold" if k in strong else None)
     console().print(table, soft_wrap=False)
+
+
+def _broken(name: str) -> str:
+    """A long name with its options below each other."""
+    return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
 
 
 def print_findings(findings: Sequence[Finding]) -> None:

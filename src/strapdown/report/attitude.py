@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown import __version__
 from strapdown.bundle import Seal, to_json, write_bundle
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
+from strapdown.report.attitude_answer_charts import share_basis
 from strapdown.report.attitude_charts import charts
-from strapdown.report.chart import Chart
-from strapdown.report.page import embedded, render
-from strapdown.report.plotly_chart import figure
+from strapdown.report.attitude_json import attitude_json
+from strapdown.report.attitude_page import attitude_page
 from strapdown.report.svg_chart import draw
 from strapdown.results import AttitudeBench
 from strapdown.tables import EULER, QUATERNION
@@ -24,7 +22,9 @@ from strapdown.tables import EULER, QUATERNION
 __all__ = ["attitude_json", "attitude_page", "write_attitude"]
 
 
-def write_attitude(bench: AttitudeBench, out: str | Path, *, force: bool = False) -> Seal:
+def write_attitude(
+    bench: AttitudeBench, out: str | Path, *, force: bool = False, png: bool = False
+) -> Seal:
     """Write a bench as a sealed bundle.
 
     Parameters
@@ -34,6 +34,8 @@ def write_attitude(bench: AttitudeBench, out: str | Path, *, force: bool = False
         Folder to make.
     force : bool
         Replace a bundle that is there.
+    png : bool
+        Write each figure as PNG, too.
 
     Returns
     -------
@@ -59,91 +61,17 @@ def write_attitude(bench: AttitudeBench, out: str | Path, *, force: bool = False
             to_json(attitude_json(bench)), encoding="utf-8", newline="\n"
         )
         _write_csv(bench, folder / "attitude.csv")
+        if len(bench.sweep):
+            _write_sweep(bench, folder / "sweep.csv")
         (folder / "figures").mkdir()
         drawn = charts(bench)
         for chart in drawn:
-            draw(chart, folder / "figures" / f"{chart.slug}.svg")
+            for ending in ("svg", "png") if png else ("svg",):
+                draw(chart, folder / "figures" / f"{chart.slug}.{ending}")
         (folder / "report.html").write_text(
             attitude_page(bench, drawn), encoding="utf-8", newline="\n"
         )
     return seals[0]
-
-
-def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
-    """Return a bench as plain data; every key carries its unit.
-
-    Parameters
-    ----------
-    bench : AttitudeBench
-
-    Returns
-    -------
-    dict
-    """
-    return {
-        "schema": "strapdown attitude 1",
-        "source": bench.source,
-        "description": bench.description,
-        "conventions": dict(words.CONVENTIONS),
-        "initial": bench.initial,
-        "gyro_bias": bench.gyro_bias,
-        "headline": words.headline(bench),
-        "algorithms": [
-            {
-                "algorithm": run.algorithm,
-                "title": run.title,
-                "equations": f"Alexiev (2021) {run.equations}",
-                "final": _final(run.attitude.iloc[-1], float(run.attitude.index[-1])),
-                "diagnostics": run.diagnostics,
-                "scores": [
-                    {
-                        "against": s.against,
-                        "time_s": s.time,
-                        "error_deg": s.error_deg,
-                        "rms_deg": s.rms_deg,
-                        "max_deg": s.max_deg,
-                        "turned_deg": s.turned_deg,
-                        "expected_deg": s.expected_deg,
-                        "sd_deg": s.sd_deg,
-                    }
-                    for s in bench.scores
-                    if s.algorithm == run.algorithm
-                ],
-            }
-            for run in bench.runs
-        ],
-        "sampling_error_deg": _sampling_error(bench),
-        "largest_difference_deg": {
-            name: {other: float(v) for other, v in row.items()}
-            for name, row in bench.differences_deg.iterrows()
-        },
-        "rests": [
-            {
-                "start_s": r.start,
-                "end_s": r.end,
-                "gyro_mean_rad_per_s": r.gyro_mean,
-                "gyro_sd_rad_per_s": r.gyro_sd,
-                "accel_mean_m_per_s2": r.accel_mean,
-            }
-            for r in bench.rests
-        ],
-        "readings": [vars(r) for r in bench.readings],
-        "findings": [vars(f) for f in bench.findings],
-    }
-
-
-def _sampling_error(bench: AttitudeBench) -> dict[str, float] | None:
-    if bench.sampling_error_deg is None:
-        return None
-    return dict(zip(("final", "max"), bench.sampling_error_deg, strict=True))
-
-
-def _final(row: Any, time: float) -> dict[str, float]:
-    return (
-        {"time_s": time}
-        | {q: float(row[q]) for q in QUATERNION}
-        | {f"{e}_deg": float(row[e]) for e in EULER}
-    )
 
 
 def _write_csv(bench: AttitudeBench, path: Path) -> None:
@@ -152,7 +80,8 @@ def _write_csv(bench: AttitudeBench, path: Path) -> None:
         "time_s": bench.runs[0].attitude.index.to_numpy(dtype=np.float64)
     }
     for run in bench.runs:
-        name = run.algorithm.replace(",", ";")
+        # Neither a comma nor a semicolon, which a reader may take for what parts the columns.
+        name = run.algorithm.replace(",", " ")
         columns |= {f"{name} {q}": np.round(run.attitude[q].to_numpy(), 9) for q in QUATERNION}
         columns |= {f"{name} {e}_deg": np.round(run.attitude[e].to_numpy(), 6) for e in EULER}
     csv.write(
@@ -160,68 +89,22 @@ def _write_csv(bench: AttitudeBench, path: Path) -> None:
     )
 
 
-def attitude_page(bench: AttitudeBench, drawn: Sequence[Chart] | None = None) -> str:
-    """Return a bench as one offline HTML page.
-
-    Parameters
-    ----------
-    bench : AttitudeBench
-    drawn : sequence of Chart, optional
-        Its charts, where they have been made already.
-
-    Returns
-    -------
-    str
-    """
-    shown = []
-    for chart in charts(bench) if drawn is None else drawn:
-        data = figure(chart)
-        shown.append(
-            {
-                "slug": chart.slug,
-                "title": chart.title,
-                "caption": chart.caption,
-                "height": data["layout"]["height"],
-                "json": embedded(data),
-            }
-        )
-    names = [run.algorithm for run in bench.runs]
-    table = bench.differences_deg.to_numpy()
-    return render(
-        "attitude.html",
+def _write_sweep(bench: AttitudeBench, path: Path) -> None:
+    """Write the errors at every rate; a field is empty where nothing is known."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name in bench.sweep.columns:
+        values = bench.sweep[name].to_numpy()
+        if values.dtype.kind == "f":
+            # What is missing is left empty, and not called NaN.
+            values = np.array([None if np.isnan(v) else v for v in values.tolist()], dtype=object)
+        columns[str(name)] = values
+    csv.write(
+        path,
+        columns,
         {
-            "title": bench.source,
-            "headline": words.headline(bench),
-            "columns": words.result_columns(bench),
-            "rows": words.result_rows(bench),
-            "references": words.reference_lines(bench),
-            "hint": "" if bench.scores else words.HOW_TO_REFERENCE,
-            "findings": [
-                {
-                    "place": ", ".join(
-                        str(part)
-                        for part in (f.file, f"row {f.row}" if f.row else None, f.quantity)
-                        if part
-                    ),
-                    "what": f.what,
-                    "remedy": f.remedy,
-                }
-                for f in bench.findings
-            ],
-            "charts": shown,
-            "differences": {
-                "names": names,
-                "rows": [
-                    (name, ["–" if i == j else words.degrees(float(v)) for j, v in enumerate(row)])
-                    for i, (name, row) in enumerate(zip(names, table, strict=True))
-                ],
-            }
-            if len(names) > 1
-            else None,
-            "facts": words.facts(bench),
-            "readings": bench.readings,
-            "first_value": words.first_value,
-            "conventions": words.CONVENTIONS,
-            "version": __version__,
-        },
+            "meaning": "drop: samples are left out; sum: increments are summed",
+            "error_deg": "what the answer judges: the largest of what is known, else own_deg",
+            "own_deg": share_basis(bench),
+        }
+        | {key.lower().replace(" ", "_"): text for key, text in words.CONVENTIONS},
     )

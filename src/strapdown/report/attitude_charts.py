@@ -5,11 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from strapdown.evaluation.differences import error_angles
+from strapdown.report.attitude_answer_charts import (
+    LEAST_ERROR,
+    LEAST_WORDS,
+    answer_charts,
+    judgement_charts,
+)
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
-    DASHES,
-    SERIES_COLOURS,
+    BUCKETS,
     Band,
     Chart,
     Line,
@@ -17,17 +22,16 @@ from strapdown.report.chart import (
     Panel,
     break_jumps,
     curve,
+    look,
 )
 from strapdown.results import AttitudeBench
 from strapdown.tables import EULER, GYRO
 
-# A logarithmic axis has no zero; what is less is drawn here.
-LEAST_ERROR = 1e-6  # deg
 _TIME = "time, s"
 
 
 def charts(bench: AttitudeBench) -> list[Chart]:
-    """Return the charts that this bench has something to show in.
+    """Return the charts that this bench has something to show in, in the order of the page.
 
     Parameters
     ----------
@@ -37,7 +41,22 @@ def charts(bench: AttitudeBench) -> list[Chart]:
     -------
     list of Chart
     """
-    found = [_gyro(bench), _attitude(bench)]
+    return [
+        *answer_charts(bench),
+        *log_charts(bench),
+        *error_charts(bench),
+        *judgement_charts(bench),
+    ]
+
+
+def log_charts(bench: AttitudeBench) -> list[Chart]:
+    """Return the signals and the attitudes over time."""
+    return [_gyro(bench), _attitude(bench)]
+
+
+def error_charts(bench: AttitudeBench) -> list[Chart]:
+    """Return the errors and the differences over time."""
+    found = []
     if bench.truth is not None:
         found.append(_error(bench))
     if len(bench.references):
@@ -45,6 +64,11 @@ def charts(bench: AttitudeBench) -> list[Chart]:
     if len(bench.runs) > 1:
         found.append(_difference(bench))
     return found
+
+
+def _buckets(bench: AttitudeBench) -> int:
+    """Fewer points a curve where there are many, so that a page stays a page."""
+    return min(BUCKETS, 4500 // max(1, len(bench.runs)))
 
 
 def _marks(bench: AttitudeBench) -> tuple[Mark, ...]:
@@ -93,8 +117,9 @@ def _attitude(bench: AttitudeBench) -> Chart:
                 run.algorithm,
                 run.attitude.index.to_numpy(dtype=np.float64),
                 break_jumps(run.attitude[angle].to_numpy()),
-                SERIES_COLOURS[k % len(SERIES_COLOURS)],
-                DASHES[k % len(DASHES)],
+                look(k)["colour"],
+                look(k)["dash"],
+                buckets=_buckets(bench),
             )
             for k, run in enumerate(bench.runs)
         ]
@@ -138,15 +163,16 @@ def _error(bench: AttitudeBench) -> Chart:
                 run.algorithm,
                 errors.index.to_numpy(dtype=np.float64),
                 np.maximum(errors.to_numpy(), LEAST_ERROR),
-                SERIES_COLOURS[k % len(SERIES_COLOURS)],
-                DASHES[k % len(DASHES)],
+                look(k)["colour"],
+                look(k)["dash"],
+                buckets=_buckets(bench),
             )
         )
     return Chart(
         "error",
         "Error against the truth",
         "Rotation angle between the computed and the true attitude, where the truth counts. "
-        f"Drawn at {LEAST_ERROR:g}° where it is less.",
+        f"Drawn at {LEAST_WORDS} where it is less.",
         _TIME,
         (Panel("error, deg", tuple(lines), log=True),),
         _marks(bench),
@@ -161,8 +187,10 @@ def _reference_error(bench: AttitudeBench) -> Chart:
         ]
         at = np.array([s.time for s in scores])
         errors = np.array([s.error_deg for s in scores])
-        colour = SERIES_COLOURS[k % len(SERIES_COLOURS)]
-        lines.append(Line(run.algorithm, at, errors, colour, points=True))
+        style = look(k)
+        lines.append(
+            Line(run.algorithm, at, errors, style["colour"], points=True, symbol=style["symbol"])
+        )
     return Chart(
         "reference-error",
         "Error at the reference points",
@@ -180,8 +208,9 @@ def _difference(bench: AttitudeBench) -> Chart:
             run.algorithm,
             run.attitude.index.to_numpy(dtype=np.float64),
             np.maximum(error_angles(run.attitude, base.attitude).to_numpy(), LEAST_ERROR),
-            SERIES_COLOURS[k % len(SERIES_COLOURS)],
-            DASHES[k % len(DASHES)],
+            look(k)["colour"],
+            look(k)["dash"],
+            buckets=_buckets(bench),
         )
         for k, run in enumerate(bench.runs)
         if run is not base
@@ -190,7 +219,7 @@ def _difference(bench: AttitudeBench) -> Chart:
         "difference",
         f"Difference from {base.algorithm}",
         "Rotation angle between the algorithms on the same samples: what the choice of the "
-        f"algorithm makes, whatever the sensor did. Drawn at {LEAST_ERROR:g}° where it is less.",
+        f"algorithm makes, whatever the sensor did. Drawn at {LEAST_WORDS} where it is less.",
         _TIME,
         (Panel("difference, deg", tuple(lines), log=True),),
     )

@@ -49,7 +49,12 @@ def seconds(value: float) -> str:
 
 
 def headline(bench: AttitudeBench) -> str:
-    """The answer first, in a sentence or two."""
+    """The answer first, then how the algorithms stand."""
+    return f"{bench.answer.sentence} {standing(bench)}"
+
+
+def standing(bench: AttitudeBench) -> str:
+    """How the algorithms stand at the end, in a sentence or two."""
     scores = [s for s in bench.scores if s.against == "truth"]
     if scores:
         answer = f"At {seconds(scores[0].time)}, {_ranked(bench, scores, 'from the truth')}."
@@ -106,29 +111,6 @@ def _whose_error(bench: AttitudeBench, scores: list[Score]) -> str:
         " Direction cosines and quaternion agree with each other to rounding: what is left comes "
         "from the sensor, its rate, its bias or the reference, and not from arithmetic."
     )
-
-
-def result_columns(bench: AttitudeBench) -> list[str]:
-    """Headings of the table of results."""
-    columns = ["algorithm"]
-    if any(s.against == "truth" for s in bench.scores):
-        columns += ["final error", "RMS", "largest"]
-    columns += [f"error at R{number}" for number in range(1, len(bench.references) + 1)]
-    return [*columns, "Alexiev Eq.", "own condition"]
-
-
-def result_rows(bench: AttitudeBench) -> list[list[str]]:
-    """Rows of the table of results, one an algorithm."""
-    rows = []
-    for run in bench.runs:
-        scores = [s for s in bench.scores if s.algorithm == run.algorithm]
-        row = [run.algorithm]
-        for s in scores:
-            row.append(degrees(s.error_deg))
-            if s.against == "truth":
-                row += [degrees(s.rms_deg), degrees(s.max_deg)]
-        rows.append([*row, run.equations, condition(run.diagnostics)])
-    return rows
 
 
 def condition(diagnostics: dict[str, float]) -> str:

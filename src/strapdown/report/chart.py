@@ -13,8 +13,21 @@ Array = NDArray[np.float64]
 ORANGE, SKY, GREEN, BLUE = "#E69F00", "#56B4E9", "#009E73", "#0072B2"
 VERMILLION, PURPLE, BLACK, GREY = "#D55E00", "#CC79A7", "#1b1f24", "#8a939e"
 AXIS_COLOURS = (VERMILLION, GREEN, BLUE)
-SERIES_COLOURS = (ORANGE, VERMILLION, GREEN, BLUE, PURPLE, SKY, "#7f6000", GREY)
-DASHES = ("solid", "solid", "solid", "dash", "dot", "dashdot", "dash", "dot")
+SERIES_COLOURS = (ORANGE, VERMILLION, GREEN, BLUE, PURPLE, SKY, "#7f6000", GREY, "#882255")
+# Who sees no colour tells lines by these. Nine of each: as many as there are algorithms in a
+# usual comparison.
+DASHES = ("solid", "solid", "solid", "dash", "dot", "dashdot", "dash", "dot", "longdash")
+SYMBOLS = (
+    "circle",
+    "square",
+    "diamond",
+    "triangle-up",
+    "triangle-down",
+    "cross",
+    "x",
+    "star",
+    "pentagon",
+)
 
 # Points that a screen can show; more only makes the file larger.
 BUCKETS = 1500
@@ -22,7 +35,35 @@ BUCKETS = 1500
 
 @dataclass(frozen=True)
 class Line:
-    """One curve, thinned by `curve`, or points alone. `dash` is solid, dash, dot or dashdot."""
+    """One curve, thinned by `curve`, or points, or both.
+
+    Attributes
+    ----------
+    name : str
+        For the legend; lines of one name are one entry.
+    x, y : ndarray, (n,)
+        NaN in `y` breaks the curve.
+    colour : str
+    dash : {'solid', 'dash', 'dot', 'dashdot', 'longdash'}
+    width : float
+    points : bool
+        Points alone.
+    symbol : str
+        One of `SYMBOLS`.
+    dots : bool
+        Points on the curve.
+    hollow : bool
+        Points are drawn as outlines.
+    size : float
+        Of a point, in pixels.
+    labels : tuple of str
+        One a point, or none.
+    places : tuple of (int, int)
+        Where each label stands (`label_places.PLACES`); above its point if not given.
+    low, high : ndarray, (n,), or None
+        Ends of a horizontal bar through each point.
+    legend : bool
+    """
 
     name: str
     x: Array
@@ -31,13 +72,30 @@ class Line:
     dash: str = "solid"
     width: float = 1.4
     points: bool = False
+    symbol: str = "diamond"
+    dots: bool = False
+    hollow: bool = False
+    size: float = 9.0
+    labels: tuple[str, ...] = ()
+    places: tuple[tuple[int, int], ...] = ()
+    low: Array | None = None
+    high: Array | None = None
+    legend: bool = True
 
 
 @dataclass(frozen=True)
 class Mark:
-    """An instant that matters, as a vertical line with a label."""
+    """A value of the horizontal axis that matters, as a vertical line with a label."""
 
     x: float
+    label: str
+
+
+@dataclass(frozen=True)
+class Level:
+    """A value of the vertical axis that matters, as a horizontal line with a label."""
+
+    y: float
     label: str
 
 
@@ -52,16 +110,32 @@ class Band:
 
 @dataclass(frozen=True)
 class Panel:
-    """One set of axes."""
+    """One set of axes.
+
+    Attributes
+    ----------
+    y_label : str
+        With its unit.
+    lines : tuple of Line
+    log : bool
+        Whether the vertical axis is logarithmic.
+    title : str
+    levels : tuple of Level
+    categories : tuple of str
+        Names on the vertical axis at 0, 1, …, from the top.
+    """
 
     y_label: str
     lines: tuple[Line, ...]
     log: bool = False
+    title: str = ""
+    levels: tuple[Level, ...] = ()
+    categories: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Panels above each other that share the horizontal axis.
+    """Panels above each other that share the horizontal axis, or beside each other.
 
     Attributes
     ----------
@@ -73,6 +147,10 @@ class Chart:
     panels : tuple of Panel
     marks : tuple of Mark
     bands : tuple of Band
+    log_x : bool
+        Whether the horizontal axis is logarithmic.
+    beside : bool
+        Whether the panels stand beside each other, each with its own horizontal axis.
     """
 
     slug: str
@@ -82,32 +160,57 @@ class Chart:
     panels: tuple[Panel, ...]
     marks: tuple[Mark, ...] = field(default=())
     bands: tuple[Band, ...] = field(default=())
+    log_x: bool = False
+    beside: bool = False
+
+
+def look(k: int) -> dict[str, str]:
+    """Colour, dash and symbol of the k-th series; the same in every chart of a page."""
+    return {
+        "colour": SERIES_COLOURS[k % len(SERIES_COLOURS)],
+        "dash": DASHES[k % len(DASHES)],
+        "symbol": SYMBOLS[k % len(SYMBOLS)],
+    }
+
+
+def short_span(values: ArrayLike) -> bool:
+    """Tell whether positive numbers span so little that powers of ten would not label them."""
+    v = np.asarray(values, dtype=np.float64)
+    v = v[np.isfinite(v) & (v > 0.0)]
+    return not v.size or float(v.max() / v.min()) < 30.0
 
 
 def curve(
-    name: str, x: ArrayLike, y: ArrayLike, colour: str, dash: str = "solid", width: float = 1.4
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    colour: str,
+    dash: str = "solid",
+    width: float = 1.4,
+    buckets: int = BUCKETS,
 ) -> Line:
     """Make a line of as many points as a screen can show."""
-    return Line(name, *thin(x, y), colour, dash, width)
+    return Line(name, *thin(x, y, buckets), colour, dash, width)
 
 
-def thin(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+def thin(x: ArrayLike, y: ArrayLike, buckets: int = BUCKETS) -> tuple[Array, Array]:
     """Thin a curve to what a screen shows, keeping every peak.
 
     Parameters
     ----------
     x, y : array_like, (n,)
         NaN in `y` breaks the curve.
+    buckets : int
 
     Returns
     -------
     x, y : ndarray
-        The least and the greatest of each of 1500 equal runs of samples, in their order.
+        The least and the greatest of each of so many equal runs of samples, in their order.
     """
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if xs.size <= 2 * BUCKETS:
+    if xs.size <= 2 * buckets:
         return xs, ys
-    width = -(-xs.size // BUCKETS)
+    width = -(-xs.size // buckets)
     first = np.arange(0, xs.size, width)
     # The last run is filled up with its own last value, which adds no peak and no break.
     body = np.pad(ys, (0, first.size * width - xs.size), mode="edge").reshape(-1, width)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import html
+import math
 from typing import Any
 
 import numpy as np
 
-from strapdown.report.chart import Array, Chart, Panel
+from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span
 
-_GRID = "#e6e9ed"
-_FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": "#1b1f24"}
+_GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
+FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
+_ROW = 30  # pixels a category
+_SPACE = {False: 0.06, True: 0.09}  # between panels, above or beside each other
 
 
 def figure(chart: Chart) -> dict[str, Any]:
@@ -26,96 +29,256 @@ def figure(chart: Chart) -> dict[str, Any]:
         For ``Plotly.newPlot``. Names are escaped, because plotly reads some HTML in them.
     """
     count = len(chart.panels)
-    gap = 0.06
-    height = (1.0 - gap * (count - 1)) / count
     layout: dict[str, Any] = {
-        "font": _FONT,
+        "font": FONT,
         "paper_bgcolor": "#ffffff",
         "plot_bgcolor": "#ffffff",
-        "margin": {"l": 70, "r": 18, "t": 34, "b": 46},
-        "height": 150 + 190 * count if count > 1 else 380,
-        "hovermode": "x unified",
+        "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
+        "height": _height(chart),
+        "hovermode": "closest" if chart.log_x else "x unified",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
-        "xaxis": {
-            "title": {"text": html.escape(chart.x_label)},
-            "gridcolor": _GRID,
-            "zeroline": False,
-            "anchor": "y" if count == 1 else f"y{count}",
-        },
         "shapes": [],
         "annotations": [],
     }
+    if any(panel.title for panel in chart.panels):
+        # The panels' titles stand where the legend would.
+        layout["legend"] |= {"y": -60.0 / layout["height"] - 0.06, "yanchor": "top"}
     traces: list[dict[str, Any]] = []
+    named: set[str] = set()
+    length = (1.0 - _SPACE[chart.beside] * (count - 1)) / count
     for number, panel in enumerate(chart.panels):
-        top = 1.0 - number * (height + gap)
         suffix = "" if number == 0 else str(number + 1)
-        layout[f"yaxis{suffix}"] = _axis(panel, (max(0.0, top - height), top))
-        traces += _traces(panel, f"y{suffix}", legend=number == 0)
-    for band in chart.bands:
-        layout["shapes"].append(
-            _shape("rect", band.start, band.end, fillcolor="#0072B2", opacity=0.07, line_width=0)
-        )
-    for mark in chart.marks:
-        layout["shapes"].append(_shape("line", mark.x, mark.x, line_width=1.4))
-        layout["annotations"].append(
-            {
-                "x": mark.x,
-                "y": 1.0,
-                "yref": "paper",
-                "yanchor": "top",
-                "xanchor": "left",
-                "showarrow": False,
-                "text": html.escape(mark.label),
-                "font": {"size": 11, "color": "#b42318"},
-                "bgcolor": "rgba(255,255,255,0.8)",
-            }
-        )
+        start = number * (length + _SPACE[chart.beside])
+        x_suffix = suffix if chart.beside else ""
+        whole = chart.beside or count == 1
+        domain = (0.0, 1.0) if whole else (max(0.0, 1.0 - start - length), 1.0 - start)
+        layout[f"yaxis{suffix}"] = _y_axis(panel, domain) | {"anchor": f"x{x_suffix}"}
+        if chart.beside or number == 0:
+            across = (start, min(1.0, start + length)) if chart.beside else (0.0, 1.0)
+            anchor = f"y{suffix}" if chart.beside or count == 1 else f"y{count}"
+            layout[f"xaxis{x_suffix}"] = _x_axis(chart, across) | {"anchor": anchor}
+            if x_suffix:
+                # What stands beside each other is to be compared.
+                layout[f"xaxis{x_suffix}"]["matches"] = "x"
+                if not panel.categories:
+                    layout[f"yaxis{suffix}"]["matches"] = "y"
+            _mark(layout, chart, x_suffix)
+        _decorate(layout, panel, f"x{x_suffix}", f"y{suffix}", chart.log_x)
+        traces += _traces(panel, f"x{x_suffix}", f"y{suffix}", named)
+    layout["showlegend"] = any(trace["showlegend"] for trace in traces)
     return {"data": traces, "layout": layout}
 
 
-def _axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
+def _height(chart: Chart) -> int:
+    rows = max(len(panel.categories) for panel in chart.panels)
+    if rows:
+        return 150 + _ROW * rows
+    if chart.beside:
+        return 440
+    count = len(chart.panels)
+    return 150 + 190 * count if count > 1 else 400
+
+
+def _log_ticks(values: Array) -> dict[str, Any]:
+    """Labels at powers of ten, or at 1, 2 and 5 where those would be too few."""
     return {
-        "title": {"text": html.escape(panel.y_label)},
+        "type": "log",
+        "tickformat": "~g",
+        "dtick": "D2" if short_span(values) else 1,
+    }
+
+
+def _all(lines: tuple[Line, ...], what: str) -> Array:
+    found = [getattr(line, what) for line in lines]
+    return np.concatenate([v for v in found if v is not None] or [np.empty(0)])
+
+
+def _x_axis(chart: Chart, domain: tuple[float, float]) -> dict[str, Any]:
+    axis: dict[str, Any] = {
+        "title": {"text": html.escape(chart.x_label), "font": {"size": 13}, "standoff": 8},
         "gridcolor": _GRID,
         "zeroline": False,
         "domain": list(domain),
-        "type": "log" if panel.log else "linear",
-    } | ({"exponentformat": "power", "dtick": 1} if panel.log else {})
+    }
+    if not chart.log_x:
+        return axis
+    values = [_all(p.lines, what) for p in chart.panels for what in ("x", "low", "high")]
+    marks = np.array([mark.x for mark in chart.marks])
+    return axis | _log_ticks(np.concatenate([*values, marks]))
 
 
-def _shape(kind: str, x0: float, x1: float, **style: Any) -> dict[str, Any]:
-    width = style.pop("line_width")
+def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
+    axis: dict[str, Any] = {
+        "title": {"text": html.escape(panel.y_label), "font": {"size": 13}},
+        "gridcolor": _GRID,
+        "zeroline": False,
+        "domain": list(domain),
+        "type": "linear",
+    }
+    if panel.categories:
+        last = len(panel.categories) - 0.5
+        return axis | {
+            "tickvals": list(range(len(panel.categories))),
+            "ticktext": [html.escape(name) for name in panel.categories],
+            "range": [last, -0.5],
+            "automargin": True,
+        }
+    if panel.log:
+        levels = np.array([level.y for level in panel.levels])
+        return axis | _log_ticks(np.concatenate([_all(panel.lines, "y"), levels]))
+    return axis
+
+
+def _mark(layout: dict[str, Any], chart: Chart, suffix: str) -> None:
+    """Draw what stands at one value, or between two, of a horizontal axis."""
+    axis = f"x{suffix}"
+    for band in chart.bands:
+        layout["shapes"].append(
+            _upright("rect", axis, band.start, band.end)
+            | {"fillcolor": "#0072B2", "opacity": 0.07, "line": {"width": 0}}
+        )
+    for mark in chart.marks:
+        layout["shapes"].append(
+            _upright("line", axis, mark.x, mark.x)
+            | {"line": {"width": 1.4, "color": _RED, "dash": "dot"}}
+        )
+        layout["annotations"].append(_mark_label(mark, axis, chart.log_x))
+
+
+def _upright(kind: str, axis: str, x0: float, x1: float) -> dict[str, Any]:
+    edges = {"x0": x0, "x1": x1, "y0": 0, "y1": 1}
+    return {"type": kind, "xref": axis, "yref": "paper", "layer": "below"} | edges
+
+
+def _mark_label(mark: Mark, axis: str, log: bool) -> dict[str, Any]:
+    # Plotly wants an annotation's place on a logarithmic axis as a logarithm, a shape's not.
     return {
-        "type": kind,
-        "xref": "x",
+        "x": math.log10(mark.x) if log else mark.x,
+        "xref": axis,
+        "y": 1.0,
         "yref": "paper",
-        "x0": x0,
-        "x1": x1,
-        "y0": 0,
-        "y1": 1,
-        "line": {"width": width, "color": "#b42318", "dash": "dot"},
-        "layer": "below",
-    } | style
+        "yanchor": "top",
+        "xanchor": "left",
+        "showarrow": False,
+        "text": html.escape(mark.label),
+        "font": {"size": 11, "color": _RED},
+        "bgcolor": "rgba(255,255,255,0.8)",
+    }
 
 
-def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
-    out = []
-    for line in panel.lines:
-        out.append(
+def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool) -> None:
+    """Draw a panel's title and its levels."""
+    if panel.title:
+        layout["annotations"].append(
             {
-                "type": "scatter",
-                "mode": "markers" if line.points else "lines",
-                "name": html.escape(line.name),
-                "legendgroup": html.escape(line.name),
-                "showlegend": legend,
-                "x": _numbers(line.x, 9),
-                "y": _numbers(line.y, 6),
-                "xaxis": "x",
-                "yaxis": axis,
-                "line": {"color": line.colour, "width": line.width, "dash": line.dash},
-                "marker": {"color": line.colour, "size": 9, "symbol": "diamond"},
+                "x": 0,
+                "xref": f"{x} domain",
+                "y": 1,
+                "yref": f"{y} domain",
+                "xanchor": "left",
+                "yanchor": "bottom",
+                "yshift": 6,
+                "showarrow": False,
+                "text": f"<b>{html.escape(panel.title)}</b>",
             }
         )
+    for line in panel.lines:
+        layout["annotations"] += _labels(line, x, y, (log_x, panel.log))
+    for level in panel.levels:
+        layout["shapes"].append(
+            {
+                "type": "line",
+                "xref": f"{x} domain",
+                "x0": 0,
+                "x1": 1,
+                "yref": y,
+                "y0": level.y,
+                "y1": level.y,
+                "line": {"width": 1.4, "color": _RED, "dash": "dash"},
+                "layer": "below",
+            }
+        )
+        layout["annotations"].append(
+            {
+                "x": 1,
+                "xref": f"{x} domain",
+                "y": math.log10(level.y) if panel.log else level.y,
+                "yref": y,
+                "xanchor": "right",
+                "yanchor": "bottom",
+                "showarrow": False,
+                "text": html.escape(level.label),
+                "font": {"size": 11, "color": _RED},
+            }
+        )
+
+
+def _labels(line: Line, x: str, y: str, log: tuple[bool, bool]) -> list[dict[str, Any]]:
+    """Return the labels of points as annotations, a thin line leading to those farther off."""
+    found = []
+    places = line.places or ((0, 1),) * len(line.labels)
+    for at, value, label, (side, rise) in zip(
+        line.x.tolist(), line.y.tolist(), line.labels, places, strict=False
+    ):
+        found.append(
+            {
+                "x": math.log10(at) if log[0] else at,
+                "xref": x,
+                "y": math.log10(value) if log[1] else value,
+                "yref": y,
+                "ax": 10 * side,
+                "ay": -15 * rise,
+                "xanchor": {-1: "right", 0: "center", 1: "left"}[side],
+                "yanchor": "middle",
+                "showarrow": True,
+                "arrowhead": 0,
+                "arrowwidth": 0.7,
+                "arrowcolor": _FAINT if abs(rise) > 1 else "rgba(0,0,0,0)",
+                "text": html.escape(label),
+                "font": {"size": 11},
+            }
+        )
+    return found
+
+
+def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dict[str, Any]]:
+    out = []
+    for line in panel.lines:
+        name = html.escape(line.name)
+        shown = line.legend and name not in named
+        if shown:
+            named.add(name)
+        trace: dict[str, Any] = {
+            "type": "scatter",
+            "mode": "markers" if line.points else "lines+markers" if line.dots else "lines",
+            "name": name,
+            "legendgroup": name,
+            "showlegend": shown,
+            "x": _numbers(line.x, 9),
+            "y": _numbers(line.y, 6),
+            "xaxis": x_axis,
+            "yaxis": y_axis,
+            "line": {"color": line.colour, "width": line.width, "dash": line.dash},
+            "marker": {
+                "color": line.colour,
+                "size": line.size,
+                "symbol": line.symbol + ("-open" if line.hollow else ""),
+            },
+        }
+        if line.hollow:
+            trace["marker"]["line"] = {"width": 1.8}
+        if panel.categories:
+            trace["hovertemplate"] = f"%{{x:.3g}}<extra>{name}</extra>"
+        if line.low is not None and line.high is not None:
+            trace["error_x"] = {
+                "type": "data",
+                "symmetric": False,
+                "array": _numbers(line.high - line.x, 6),
+                "arrayminus": _numbers(line.x - line.low, 6),
+                "thickness": 1.6,
+                "width": 5,
+            }
+        out.append(trace)
     return out
 
 

@@ -1,13 +1,38 @@
-"""Charts as SVG pictures, the same bytes every time."""
+"""Charts as pictures: SVG and PNG, the same bytes every time, or a figure for a notebook."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from strapdown.report.chart import Chart
+from strapdown.report.chart import Chart, Line, Panel
 
-_DASH = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+_RED, _FAINT = "#b42318", "#8a939e"
+_DASH: dict[str, Any] = {
+    "solid": "-",
+    "dash": "--",
+    "dot": ":",
+    "dashdot": "-.",
+    "longdash": (0, (8, 3)),
+}
+_MARKER = {
+    "circle": "o",
+    "square": "s",
+    "diamond": "D",
+    "triangle-up": "^",
+    "triangle-down": "v",
+    "cross": "P",
+    "x": "X",
+    "star": "*",
+    "pentagon": "p",
+}
 _STYLE: Any = {
     "svg.hashsalt": "strapdown",
     "svg.fonttype": "path",
@@ -19,60 +44,188 @@ _STYLE: Any = {
     "axes.axisbelow": True,
     "text.parse_math": False,
 }
+_WIDTH = 9.0  # inches
+_DPI = 160
 
 
 def draw(chart: Chart, path: Path) -> None:
-    """Draw a chart into an SVG file.
+    """Draw a chart into an SVG or a PNG file, as its ending says.
 
     Parameters
     ----------
     chart : Chart
     path : Path
     """
+    with _own_style():
+        figure = _figure(chart)
+        if path.suffix == ".png":
+            figure.savefig(path, format="png", dpi=_DPI, metadata={"Software": None})
+        else:
+            figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "strapdown"})
+
+
+def notebook_figure(chart: Chart) -> Figure:
+    """Return a chart as a figure, which belongs to no window and to no global state.
+
+    Parameters
+    ----------
+    chart : Chart
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        It shows itself in a notebook; `savefig` writes it.
+    """
+    with _own_style():
+        return _figure(chart)
+
+
+@contextmanager
+def _own_style() -> Iterator[None]:
+    """Not the style of whoever runs it: the picture belongs to the seal."""
     import matplotlib as mpl
-    from matplotlib.backends.backend_svg import FigureCanvasSVG
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import FuncFormatter
 
     with mpl.rc_context():
-        # Not the style of whoever runs it: the picture belongs to the seal.
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
-        count = len(chart.panels)
-        figure = Figure(figsize=(9.0, 1.4 + 2.0 * count), layout="constrained")
-        FigureCanvasSVG(figure)
-        axes = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
-        for panel, axis in zip(chart.panels, axes, strict=True):
-            for line in panel.lines:
-                style: dict[str, Any] = {"color": line.colour}
-                if line.points:
-                    style |= {"ls": "", "marker": "D", "ms": 5}
-                else:
-                    style |= {"ls": _DASH[line.dash], "lw": line.width}
-                axis.plot(line.x, line.y, label=line.name, **style)
-            if panel.log:
-                axis.set_yscale("log")
-                # Matplotlib's own label is mathematics, which is switched off for the sake of
-                # names that contain a dollar sign.
-                axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-            axis.set_ylabel(panel.y_label)
-            for band in chart.bands:
-                axis.axvspan(band.start, band.end, color="#0072B2", alpha=0.07, lw=0)
-            for mark in chart.marks:
-                axis.axvline(mark.x, color="#b42318", ls=":", lw=1.2)
-        for mark in chart.marks:
-            axes[0].annotate(
-                mark.label,
-                (mark.x, 1.0),
-                xycoords=("data", "axes fraction"),
-                color="#b42318",
-                fontsize=7,
-                va="top",
-                rotation=90,
-                ha="right",
-            )
-        axes[-1].set_xlabel(chart.x_label)
-        figure.suptitle(chart.title, x=0.01, ha="left", fontweight="bold")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower left", ncols=6, frameon=False)
-        figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "strapdown"})
+        yield
+
+
+def _figure(chart: Chart) -> Figure:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    class Picture(Figure):
+        """Shows itself where pyplot, which would do it otherwise, was never loaded."""
+
+        def _repr_png_(self) -> bytes:
+            from io import BytesIO
+
+            with _own_style(), BytesIO() as stream:
+                self.savefig(stream, format="png", dpi=_DPI)
+                return stream.getvalue()
+
+    count = len(chart.panels)
+    figure = Picture(figsize=(_WIDTH, _height(chart)), layout="constrained")
+    FigureCanvasAgg(figure)
+    shape = (1, count) if chart.beside else (count, 1)
+    share_y = chart.beside and not any(panel.categories for panel in chart.panels)
+    axes = figure.subplots(*shape, sharex=True, sharey=share_y, squeeze=False).ravel()
+    for panel, axis in zip(chart.panels, axes, strict=True):
+        _draw_panel(panel, axis, chart)
+    for axis in axes if chart.beside else axes[-1:]:
+        axis.set_xlabel(chart.x_label)
+    for mark in chart.marks:
+        axes[0].annotate(
+            mark.label,
+            (mark.x, 1.0),
+            xycoords=("data", "axes fraction"),
+            color=_RED,
+            fontsize=7,
+            va="top",
+            rotation=90,
+            ha="right",
+        )
+    figure.suptitle(chart.title, x=0.01, ha="left", fontweight="bold")
+    entries: dict[str, Any] = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if entries:
+        widest = max(len(name) for name in entries)
+        figure.legend(
+            list(entries.values()),
+            list(entries),
+            loc="outside lower left",
+            ncols=max(1, min(6, 110 // (widest + 6))),
+            frameon=False,
+        )
+    return figure
+
+
+def _height(chart: Chart) -> float:
+    rows = max(len(panel.categories) for panel in chart.panels)
+    if rows:
+        return 1.5 + 0.3 * rows
+    return 4.6 if chart.beside else 1.4 + 2.0 * len(chart.panels) + (len(chart.panels) == 1)
+
+
+def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
+    for line in panel.lines:
+        _draw_line(line, axis)
+    if chart.log_x:
+        axis.set_xscale("log")
+        _plain_labels(axis.xaxis)
+    if panel.log:
+        axis.set_yscale("log")
+        _plain_labels(axis.yaxis)
+    if panel.categories:
+        axis.set_yticks(range(len(panel.categories)), panel.categories)
+        axis.set_ylim(len(panel.categories) - 0.5, -0.5)
+    axis.set_ylabel(panel.y_label)
+    if panel.title:
+        axis.set_title(panel.title, loc="left", fontsize=9, fontweight="bold")
+    for level in panel.levels:
+        axis.axhline(level.y, color=_RED, ls="--", lw=1.2, zorder=1.5)
+        axis.annotate(
+            level.label,
+            (1.0, level.y),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            color=_RED,
+            fontsize=7,
+            ha="right",
+        )
+    for band in chart.bands:
+        axis.axvspan(band.start, band.end, color="#0072B2", alpha=0.07, lw=0)
+    for mark in chart.marks:
+        axis.axvline(mark.x, color=_RED, ls=":", lw=1.2)
+
+
+def _draw_line(line: Line, axis: Axes) -> None:
+    # Matplotlib leaves a name that begins with an underscore out of the legend.
+    style: dict[str, Any] = {
+        "color": line.colour,
+        "label": line.name if line.legend else "_",
+        "ls": "" if line.points else _DASH[line.dash],
+        "lw": line.width,
+    }
+    if line.points or line.dots:
+        style |= {"marker": _MARKER[line.symbol], "ms": 0.6 * line.size}
+        if line.hollow:
+            style |= {"mfc": "none", "mew": 1.2}
+    if line.low is not None and line.high is not None:
+        ends = [line.x - line.low, line.high - line.x]
+        axis.errorbar(line.x, line.y, xerr=ends, capsize=3, elinewidth=1.3, **style)
+    else:
+        axis.plot(line.x, line.y, **style)
+    places = line.places or ((0, 1),) * len(line.labels)
+    for x, y, label, (side, rise) in zip(line.x, line.y, line.labels, places, strict=False):
+        axis.annotate(
+            label,
+            (x, y),
+            xytext=(7 * side, 10 * rise),
+            textcoords="offset points",
+            fontsize=7.5,
+            ha={-1: "right", 0: "center", 1: "left"}[side],
+            va="center",
+            arrowprops={"arrowstyle": "-", "lw": 0.5, "color": _FAINT} if abs(rise) > 1 else None,
+        )
+
+
+def _plain_labels(axis: Axis) -> None:
+    """Label a logarithmic axis without mathematics.
+
+    Matplotlib's own labels are mathematics, which is switched off for the sake of names that
+    contain a dollar sign.
+    """
+    from matplotlib.ticker import FuncFormatter
+
+    def between(value: float, _: int | None) -> str:
+        low, high = axis.get_view_interval()
+        digit = f"{value:.0e}"[0]
+        return f"{value:g}" if high < 30.0 * low and digit in "25" else ""
+
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(FuncFormatter(between))

@@ -61,15 +61,17 @@ class Verification:
     details: tuple[str, ...]
 
 
-def _rerun_attitude(configuration: dict[str, Any], out: Path) -> Seal:
-    return write_attitude(run_bench(AttitudeSpec.model_validate(configuration)), out)
+def _rerun_attitude(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    # Pictures that were asked for in a second form change no number and are no configuration.
+    png = any(name.endswith(".png") for name in sealed)
+    return write_attitude(run_bench(AttitudeSpec.model_validate(configuration)), out, png=png)
 
 
-def _rerun_simulation(configuration: dict[str, Any], out: Path) -> Seal:
+def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
     return write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
-RERUNS: dict[str, Callable[[dict[str, Any], Path], Seal]] = {
+RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "attitude": _rerun_attitude,
     "simulate": _rerun_simulation,
 }
@@ -110,7 +112,8 @@ def verify(bundle: str | Path) -> Verification:
         again = Path(folder) / "again"
         configuration = _resolved(manifest["configuration"], root)
         try:
-            RERUNS[manifest["command"]](configuration, again)
+            sealed = {item["name"] for item in manifest["outputs"]}
+            RERUNS[manifest["command"]](configuration, again, sealed)
         except ValidationError as error:
             raise DataError(
                 f"its configuration is not understood: {error.errors()[0]['msg']}",
@@ -210,11 +213,14 @@ def _column_difference(one: dict[str, NDArray[Any]], two: dict[str, NDArray[Any]
 
 def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
     """Largest difference, relative where a number exceeds 1; infinite where one is no number."""
-    apart = np.abs(one - two)
+    if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
+        return 0.0 if np.array_equal(one, two) else math.inf
+    # An empty field on both sides is the same.
+    apart = np.where(np.isnan(one) & np.isnan(two), 0.0, np.abs(one - two))
     if name.endswith("heading_deg"):
         # Just under 360 may come out just above 0 elsewhere.
         apart = np.minimum(apart, np.abs(apart - 360.0))
-    largest = float(np.max(apart / np.maximum(1.0, np.abs(one)), initial=0.0))
+    largest = float(np.max(apart / np.fmax(1.0, np.abs(one)), initial=0.0))
     return largest if math.isfinite(largest) else math.inf
 
 

@@ -17,7 +17,7 @@ from strapdown.evaluation.reference_points import (
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
-from strapdown.report.attitude_words import headline
+from strapdown.report.attitude_words import standing
 from strapdown.tables import imu_table
 
 
@@ -201,7 +201,7 @@ def test_turns_that_the_gyro_did_not_see_are_questioned(words, said):
 def test_the_same_point_twice_is_two_points():
     bench = bench_attitude("alexiev-fig2a", reference=["end same as start"] * 2)
     assert [s.reference for s in bench.scores if s.algorithm == "dcm"] == [None, 1, 2]
-    assert headline(bench).count("quaternion") == 1
+    assert standing(bench).count("quaternion") == 1
 
 
 def test_what_passed_the_pole_is_not_named_as_the_best():
@@ -210,4 +210,4 @@ def test_what_passed_the_pole_is_not_named_as_the_best():
     bench = bench_attitude("alexiev-fig4", rate=100, algorithms=names)
     errors = {s.algorithm: s.error_deg for s in bench.scores}
     assert errors["euler:step=rk4"] < errors["naive"]
-    assert headline(bench).startswith("At 5 s, naive is")
+    assert standing(bench).startswith("At 5 s, naive is")

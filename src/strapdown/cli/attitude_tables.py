@@ -1,0 +1,65 @@
+"""What ``strapdown attitude`` prints of a bench."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from strapdown.report.attitude_tables import TextTable
+    from strapdown.results import AttitudeBench
+
+
+def print_bench(bench: AttitudeBench) -> None:
+    """Print what the run stood on, its tables, and the answer last, where it is seen.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+    """
+    from strapdown.cli.console import console, print_table
+    from strapdown.report import attitude_tables as tables
+    from strapdown.report import attitude_words as words
+
+    page = console()
+    page.print(bench.source, style="bold")
+    if bench.readings:
+        page.print("Read as:")
+        print_table(
+            ["column", "taken as", "unit", "first value"],
+            [[r.source, r.quantity, r.unit, words.first_value(r)] for r in bench.readings],
+        )
+    for name, text in words.facts(bench):
+        page.print(f"{name}: {text}")
+    shown = [
+        *tables.result_tables(bench),
+        *tables.sweep_tables(bench),
+        tables.cost_table(bench),
+        tables.condition_table(bench),
+        tables.trial_table(bench),
+        tables.peer_table(bench),
+    ]
+    for table in shown:
+        if table is not None:
+            _print(table, page)
+    for line in words.reference_lines(bench):
+        page.print(line)
+    page.print(bench.answer.sentence, style="bold")
+    page.print(words.standing(bench))
+    for title, lines in (("Why", bench.answer.why), ("What would help", bench.answer.helps)):
+        if lines:
+            page.print(f"{title}:")
+        for line in lines:
+            page.print(f"  - {line}")
+    if not bench.scores:
+        page.print(words.HOW_TO_REFERENCE)
+
+
+def _print(table: TextTable, page: Console) -> None:
+    from strapdown.cli.console import print_table
+
+    page.print(f"\n{table.title}", style="bold")
+    print_table(table.columns, table.rows, text=table.text, strong=table.strong)
+    if table.note:
+        page.print(table.note, style="dim")

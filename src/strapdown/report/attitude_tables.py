@@ -1,0 +1,324 @@
+"""The tables of the attitude bench; terminal and page show the same cells."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from strapdown.attitude import ALGORITHMS
+from strapdown.report.attitude_answer_charts import share_basis
+from strapdown.report.attitude_numbers import (
+    MEANINGS,
+    full_rate_errors,
+    largest_known,
+    like_with_like,
+    sweep_grid,
+)
+from strapdown.report.attitude_words import condition, degrees
+from strapdown.results import AttitudeBench, AttitudeRun, PeerRun, Score
+
+__all__ = [
+    "TextTable",
+    "condition_table",
+    "cost_table",
+    "difference_table",
+    "peer_table",
+    "result_tables",
+    "source_of",
+    "sweep_tables",
+    "trial_table",
+]
+
+# More comparisons than these leave no room in a terminal for the parts of an error.
+_MOST_BESIDE = 4
+_NONE = "–"
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table in words.
+
+    Attributes
+    ----------
+    title : str
+    columns : tuple of str
+    rows : tuple of tuple of str
+    text : tuple of int
+        Columns that hold text, to the left; the others hold numbers, to the right.
+    note : str
+        What a reader must know of it.
+    passed : frozenset of (int, int)
+        Row and column of cells that are accurate enough; a tick stands in them, too.
+    strong : frozenset of int
+        Rows that the answer names.
+    """
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    text: tuple[int, ...] = (0,)
+    note: str = ""
+    passed: frozenset[tuple[int, int]] = frozenset()
+    strong: frozenset[int] = frozenset()
+
+
+def _named(bench: AttitudeBench) -> frozenset[int]:
+    names = [run.algorithm for run in bench.runs]
+    answer = bench.answer.algorithm
+    return frozenset({names.index(answer)} if answer in names else ())
+
+
+def number(value: float) -> str:
+    """A count to three digits, without a needless point."""
+    return f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def result_tables(bench: AttitudeBench) -> list[TextTable]:
+    """Return the errors of each algorithm, and what they are made of; two tables if wide.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    list of TextTable
+    """
+    truth = any(s.against == "truth" for s in bench.scores)
+    columns = (["final", "RMS", "largest"] if truth else []) + [
+        f"at R{k}" for k in range(1, len(bench.references) + 1)
+    ]
+    parts, cells = _parts(bench)
+    compared, made = [], []
+    for run in bench.runs:
+        scores = [s for s in bench.scores if s.algorithm == run.algorithm]
+        compared.append(_compared(scores, len(columns)))
+        made.append([cells[column].get(run.algorithm, _NONE) for column in parts])
+    names = [run.algorithm for run in bench.runs]
+    strong, note = _named(bench), _part_note(bench)
+    if len(columns) > _MOST_BESIDE:
+        return [
+            _table("Results", ["algorithm", *columns], names, compared, strong, ""),
+            _table("What the error is made of", ["algorithm", *parts], names, made, strong, note),
+        ]
+    rows = [[*left, *right] for left, right in zip(compared, made, strict=True)]
+    return [_table("Results", ["algorithm", *columns, *parts], names, rows, strong, note)]
+
+
+def _table(
+    title: str,
+    columns: list[str],
+    names: list[str],
+    rows: list[list[str]],
+    strong: frozenset[int],
+    note: str,
+) -> TextTable:
+    named = tuple((name, *row) for name, row in zip(names, rows, strict=True))
+    return TextTable(title, tuple(columns), named, note=note, strong=strong)
+
+
+def _compared(scores: list[Score], count: int) -> list[str]:
+    cells = []
+    for s in scores:
+        cells.append(degrees(s.error_deg))
+        if s.against == "truth":
+            cells += [degrees(s.rms_deg), degrees(s.max_deg)]
+    return cells + [_NONE] * (count - len(cells))
+
+
+def _parts(bench: AttitudeBench) -> tuple[list[str], dict[str, dict[str, str]]]:
+    """Columns for what an error is made of and costs, and their cells by algorithm."""
+    cells: dict[str, dict[str, str]] = {}
+    if bench.shares:
+        cells["own"] = {s.algorithm: degrees(s.own_deg[2]) for s in bench.shares}
+        if any(s.sensor_deg is not None for s in bench.shares):
+            cells["sensor"] = {
+                s.algorithm: degrees(None if s.sensor_deg is None else s.sensor_deg[2])
+                for s in bench.shares
+            }
+        cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
+    if bench.costs:
+        cells["cycles"] = {c.algorithm: number(c.cycles) for c in bench.costs}
+        cells["memory"] = {c.algorithm: str(c.memory) for c in bench.costs}
+    return list(cells), cells
+
+
+def _part_note(bench: AttitudeBench) -> str:
+    if not bench.shares:
+        return ""
+    sensor = any(share.sensor_deg is not None for share in bench.shares)
+    return (
+        "own, "
+        + ("sensor, " if sensor else "")
+        + "float32: the largest that the algorithm with the rate, "
+        + ("the sensor " if sensor else "")
+        + f"and single precision make. {share_basis(bench)} cycles: of a Cortex-M4F, one sample; "
+        "memory: numbers kept between samples."
+    )
+
+
+def source_of(run: AttitudeRun) -> str:
+    """Where an algorithm stands, as ``Alexiev (2021) Eq. (2)``."""
+    cls = ALGORITHMS.get(run.algorithm.partition(":")[0])
+    return f"{'' if cls is None else cls.source + ' '}Eq. {run.equations}"
+
+
+def condition_table(bench: AttitudeBench) -> TextTable:
+    """Return where each algorithm comes from, and what it says of its own condition."""
+    rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
+    columns = ("algorithm", "source", "own condition")
+    return TextTable("The algorithms", columns, rows, text=(0, 1, 2), strong=_named(bench))
+
+
+def cost_table(bench: AttitudeBench) -> TextTable | None:
+    """Return the operations of one sample of each algorithm; None where none were counted."""
+    if not bench.costs:
+        return None
+    rows = tuple(
+        (
+            c.algorithm,
+            *(number(v) for v in (c.add, c.multiply, c.divide, c.sqrt, c.trig, c.cycles)),
+            str(c.memory),
+        )
+        for c in bench.costs
+    )
+    return TextTable(
+        "What a sample costs",
+        ("algorithm", "add", "multiply", "divide", "root", "sin, cos", "cycles", "memory"),
+        rows,
+        note="Operations counted on the kernel itself on this log's larger steps; cycles: the "
+        "same weighed as a Cortex-M4F's floating-point unit takes them, for ranking; memory: "
+        "numbers kept between samples.",
+        strong=_named(bench),
+    )
+
+
+def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
+    """Return the judged error at every rate, one table a way to come to it."""
+    tables = []
+    answer = bench.answer
+    for meaning, words in MEANINGS.items():
+        grid = sweep_grid(bench, meaning)
+        values = grid.to_numpy(dtype=float)
+        if not values.size or not math.isfinite(float(grid.min().min())):
+            continue
+        passed = {
+            (i, j + 1)
+            for i, row in enumerate(values)
+            for j, value in enumerate(row)
+            if value <= answer.tolerance_deg
+        }
+        rows = tuple(
+            (
+                name,
+                *(
+                    ("✓ " if (i, j + 1) in passed else "")
+                    + (degrees(float(v)) if math.isfinite(v) else _NONE)
+                    for j, v in enumerate(values[i])
+                ),
+            )
+            for i, name in enumerate(grid.index)
+        )
+        tables.append(
+            TextTable(
+                f"Error by rate, {words}",
+                ("algorithm", *(f"{number(float(rate))} Hz" for rate in grid.columns)),
+                rows,
+                note=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}.",
+                passed=frozenset(passed),
+                strong=_named(bench),
+            )
+        )
+    return tables
+
+
+def difference_table(bench: AttitudeBench) -> TextTable | None:
+    """Return the largest difference of each pair of algorithms; None of one alone."""
+    names = [run.algorithm for run in bench.runs]
+    if len(names) < 2:
+        return None
+    rows = tuple(
+        (name, *(_NONE if i == j else degrees(float(v)) for j, v in enumerate(values)))
+        for i, (name, values) in enumerate(
+            zip(names, bench.differences_deg.to_numpy(), strict=True)
+        )
+    )
+    return TextTable("Largest difference between the algorithms", ("", *names), rows)
+
+
+def luck_words(luck: float) -> str:
+    """Say whether a rank above the next one is luck."""
+    if not math.isfinite(luck):
+        return _NONE
+    if luck < 0.05:
+        return f"not luck ({luck:.2g})"
+    return f"may be luck ({luck:.2g})"
+
+
+def trial_table(bench: AttitudeBench) -> TextTable | None:
+    """Return the ranking over several trials; None where there was one alone."""
+    if bench.trials is None:
+        return None
+    rows = tuple(
+        (
+            str(row["algorithm"]),
+            degrees(float(row["mean_deg"])),
+            _interval(float(row["low_deg"]), float(row["high_deg"])),
+            luck_words(float(row["luck"])),
+        )
+        for _, row in bench.trials.ranking.iterrows()
+    )
+    names = [row[0] for row in rows]
+    answer = bench.answer.algorithm
+    return TextTable(
+        f"Over {len(bench.trials.names)} trials",
+        ("algorithm", "mean error", "95 % interval", "its rank above the next is"),
+        rows,
+        text=(0, 3),
+        note="In brackets: the probability that the next one is no worse, from paired differences.",
+        strong=frozenset({names.index(answer)} if answer in names else ()),
+    )
+
+
+def _interval(low: float, high: float) -> str:
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return _NONE
+    return f"{degrees(max(low, 0.0))} to {degrees(high)}"
+
+
+def peer_table(bench: AttitudeBench) -> TextTable | None:
+    """Return other libraries beside these algorithms, gyro alone apart from aided ones.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    TextTable or None
+        None where no other library ran.
+    """
+    if not bench.peers:
+        return None
+    alone, aided = like_with_like(bench)
+    judged = bool(bench.scores)
+    rows = [
+        (f"strapdown {name}", degrees(error) if judged else _NONE, "", "gyro")
+        for name, error in full_rate_errors(bench).items()
+    ]
+    rows += [(p.peer, _peer_error(p), "", p.aiding) for p in alone]
+    rows += [(p.peer, "", _peer_error(p), p.aiding) for p in aided]
+    return TextTable(
+        "Other libraries on the same log",
+        ("who", "gyro alone", "aided", "uses"),
+        tuple(rows),
+        text=(0, 3),
+        note="Largest error against what is known. An aided filter corrects what gyros alone "
+        "cannot: its column is not to be compared with the other.",
+        strong=_named(bench),
+    )
+
+
+def _peer_error(peer: PeerRun) -> str:
+    error = largest_known(peer.scores)
+    return _NONE if error is None else degrees(error)

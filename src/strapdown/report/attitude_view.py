@@ -1,0 +1,105 @@
+"""A bench in a notebook: a short text with its table, and its charts as figures."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.report import attitude_words as words
+from strapdown.report.attitude_charts import charts
+from strapdown.report.attitude_tables import TextTable, result_tables
+from strapdown.report.svg_chart import notebook_figure
+from strapdown.results import AttitudeBench
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["KINDS", "plot", "short_html"]
+
+#: What can be plotted, and what a bench must have for it.
+KINDS = {
+    "cost": "costs",
+    "sweep": "a sweep of rates",
+    "gyro": "samples",
+    "attitude": "a run",
+    "error": "a truth",
+    "reference-error": "reference points",
+    "difference": "two algorithms",
+    "share": "shares",
+    "trials": "trials",
+    "peers": "scores of other libraries",
+}
+
+
+def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
+    """Draw one chart of a bench, as the page shows it.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+    kind : str
+        One of `KINDS`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Of no window and no global state; it shows itself in a notebook.
+
+    Raises
+    ------
+    ConfigError
+        There is no such chart, or the bench has nothing to show in it.
+    """
+    if kind not in KINDS:
+        raise ConfigError(
+            f"'{kind}' is no chart of this bench", quantity="kind", remedy=nearest(kind, KINDS)
+        )
+    drawn = {chart.slug: chart for chart in charts(bench)}
+    if kind not in drawn:
+        raise ConfigError(
+            f"there is nothing to draw: it needs {KINDS[kind]}",
+            quantity=f"kind '{kind}'",
+            remedy=f"plot one of {', '.join(drawn)}",
+        )
+    return notebook_figure(drawn[kind])
+
+
+def short_html(bench: AttitudeBench) -> str:
+    """Return the answer and the table of results as HTML for a notebook.
+
+    Parameters
+    ----------
+    bench : AttitudeBench
+
+    Returns
+    -------
+    str
+        Everything from outside is escaped.
+    """
+    parts = [
+        f"<div><b>{escape(bench.source)}</b></div>",
+        f'<p style="font-size:1.25em;margin:.3em 0"><b>{escape(bench.answer.sentence)}</b></p>',
+        f'<p style="margin:.3em 0">{escape(words.standing(bench))}</p>',
+        *(_table(table) for table in result_tables(bench)),
+    ]
+    return "<div>" + "".join(parts) + "</div>"
+
+
+def _table(table: TextTable) -> str:
+    def row(cells: tuple[str, ...], tag: str, bold: bool) -> str:
+        weight = ";font-weight:bold" if bold else ""
+        return (
+            "<tr>"
+            + "".join(
+                f'<{tag} style="text-align:{"left" if k in table.text else "right"}{weight}">'
+                f"{escape(cell)}</{tag}>"
+                for k, cell in enumerate(cells)
+            )
+            + "</tr>"
+        )
+
+    rows = "".join(row(r, "td", k in table.strong) for k, r in enumerate(table.rows))
+    note = f"<div><small>{escape(table.note)}</small></div>" if table.note else ""
+    head = row(table.columns, "th", False)
+    return f"<table><thead>{head}</thead><tbody>{rows}</tbody></table>{note}"
