@@ -284,7 +284,9 @@ def _move(staging: Path, out: Path) -> None:
     shutil.rmtree(old)
 
 
-def write_timing(seal: Seal, seconds: dict[str, float]) -> None:
+def write_timing(
+    seal: Seal, seconds: dict[str, float], sample_ns: dict[str, dict[str, float]] | None = None
+) -> None:
     """Put the times that a run took beside its bundle's seal.
 
     Parameters
@@ -292,9 +294,13 @@ def write_timing(seal: Seal, seconds: dict[str, float]) -> None:
     seal : Seal
     seconds : dict of str to float
         Stage to seconds.
+    sample_ns : dict of str to dict, optional
+        Algorithm to nanoseconds of a sample in each precision.
     """
-    rounded = {stage: round(taken, 4) for stage, taken in seconds.items()}
-    (seal.path / TIMING).write_text(to_json({"seconds": rounded}), encoding="utf-8", newline="\n")
+    timing: dict[str, Any] = {"seconds": {stage: round(t, 4) for stage, t in seconds.items()}}
+    if sample_ns:
+        timing["sample_ns"] = sample_ns
+    (seal.path / TIMING).write_text(to_json(timing), encoding="utf-8", newline="\n")
 
 
 def read_manifest(bundle: Path) -> dict[str, Any]:

@@ -352,8 +352,8 @@ class Cost:
     ----------
     algorithm : str
     add, multiply, divide, sqrt, trig : float
-        Operations, counted on the kernel itself while it ran on this log's larger steps, and
-        averaged over the samples of a block. Subtractions count as additions.
+        Operations, counted on the kernel itself in steps of 0.01 rad, and averaged over the
+        samples of a block. Subtractions count as additions.
     cycles : float
         The same in cycles of a Cortex-M4F (`constants.CORTEX_M4F_CYCLES`): a weight for ranking.
     memory : int
@@ -512,7 +512,7 @@ class AttitudeBench:
         integrates would), ``factor``, ``rate_hz``, ``own_deg`` (largest error of algorithm and
         rate, as in `Share`), ``final_deg``, ``rms_deg``, ``max_deg`` (against the truth),
         ``reference_deg`` (largest at a reference point), ``error_deg`` (the one that the answer
-        judges: the largest of what is known, else ``own_deg``).
+        judges: against the truth, else at the reference points, else ``own_deg``).
     answer : Answer
     trials : Trials or None
     peers : tuple of PeerRun

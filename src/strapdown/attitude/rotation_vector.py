@@ -38,7 +38,7 @@ class RotationVector(AttitudeAlgorithm):
 
     name = "rotvec"
     title = "Rotation vector"
-    equations = "Bortz's equation"
+    equations = ""
     source = "Bortz (1971), Miller (1983)"
     summary = "rotation vector of 1 to 4 increments, compensated for coning"
     width = 4

@@ -196,6 +196,17 @@ def attitude(
     force: Annotated[
         bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
     ] = False,
+    speed: Annotated[
+        bool,
+        typer.Option(
+            "--speed",
+            help="Print how long a sample takes on this machine (it is in timing.json, too).",
+            rich_help_panel=_OUT,
+        ),
+    ] = False,
+    png: Annotated[
+        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=_OUT)
+    ] = False,
     json: Annotated[
         bool,
         typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
@@ -210,9 +221,11 @@ def attitude(
     them with what is known, splits their error into the sensor's and their own, counts what they
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
+    from strapdown.attitude import make_algorithm
+    from strapdown.attitude.speed import time_algorithms
     from strapdown.bundle import check_destination, write_timing
-    from strapdown.cli.attitude_tables import print_bench
-    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.attitude_tables import print_bench, print_speed
+    from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.formats.columns import parse_column_option
     from strapdown.report.attitude import attitude_json, write_attitude
     from strapdown.report.attitude_c import check_c, write_c
@@ -250,21 +263,29 @@ def attitude(
             progress=report,
         )
         report("writing", 0.95)
-        seal = write_attitude(bench, folder, force=force)
+        seal = write_attitude(bench, folder, force=force, png=png)
         if export_c is not None:
             exported = write_c(bench, export_c, force=force)
+        report("timing", 0.99)
+        taken = time_algorithms([make_algorithm(run.algorithm) for run in bench.runs])
         report.stop()
-        write_timing(seal, report.seconds)
+        of_sample = {
+            str(name): {"float64": round(double, 1), "float32": round(single, 1)}
+            for name, double, single in taken.itertuples(index=False)
+        }
+        write_timing(seal, report.seconds, of_sample)
     if json:
         typer.echo(json_module.dumps(attitude_json(bench), indent=2, ensure_ascii=False))
         return
     if quiet:
         return
     print_bench(bench)
+    if speed:
+        print_speed(taken)
     print_findings(bench.findings)
     print_seal(seal, "report.html")
     if export_c is not None:
-        page.print(f"C99   {export_c}: {exported}")
+        console().print(f"C99   {export_c}: {exported}", soft_wrap=True)
 
 
 def _numbers(text: str | None) -> list[float]:

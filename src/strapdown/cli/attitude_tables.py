@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    import pandas as pd
     from rich.console import Console
 
     from strapdown.report.attitude_tables import TextTable
@@ -21,6 +22,7 @@ def print_bench(bench: AttitudeBench) -> None:
     from strapdown.cli.console import console, print_table
     from strapdown.report import attitude_tables as tables
     from strapdown.report import attitude_words as words
+    from strapdown.report.attitude_places import offer_lines, place_table
 
     page = console()
     page.print(bench.source, style="bold")
@@ -35,9 +37,8 @@ def print_bench(bench: AttitudeBench) -> None:
     shown = [
         *tables.result_tables(bench),
         *tables.sweep_tables(bench),
-        tables.cost_table(bench),
-        tables.condition_table(bench),
         tables.trial_table(bench),
+        place_table(bench),
         tables.peer_table(bench),
     ]
     for table in shown:
@@ -54,6 +55,27 @@ def print_bench(bench: AttitudeBench) -> None:
             page.print(f"  - {line}")
     if not bench.scores:
         page.print(words.HOW_TO_REFERENCE)
+    if offers := offer_lines(bench):
+        page.print("These rests look alike, and could be reference points:")
+    for line in offers:
+        page.print(f"  {line}")
+
+
+def print_speed(taken: pd.DataFrame) -> None:
+    """Print how long a sample takes each algorithm here.
+
+    Parameters
+    ----------
+    taken : DataFrame
+        From `attitude.speed.time_algorithms`.
+    """
+    from strapdown.cli.console import console, print_table
+
+    console().print("\nTime of a sample on this machine")
+    print_table(
+        ["algorithm", "float64, ns", "float32, ns"],
+        [[str(a), f"{d:.3g}", f"{f:.3g}"] for a, d, f in taken.itertuples(index=False)],
+    )
 
 
 def _print(table: TextTable, page: Console) -> None:

@@ -190,6 +190,8 @@ def _units(
         if stated is None or stated[1].startswith("stated by --"):
             asked.add(triad)
         try:
+            if stated is None:
+                _refuse_open(found, triad)
             units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
         except DataError as error:
             if triad == "gyro":
@@ -199,6 +201,21 @@ def _units(
     plain = {t: u for t, (u, _) in units.items()}
     report_contradictions(said, plain, asked, mirrored, raw.name, findings)
     return units
+
+
+def _refuse_open(found: dict[str, Column], triad: str) -> None:
+    """Refuse a unit that the file leaves open: of f and -f the numbers cannot tell which.
+
+    Raises
+    ------
+    DataError
+    """
+    unit = found[f"{triad}_x"].unit
+    if unit and " or " in unit:
+        raise DataError(
+            f"the file leaves open whether it is in {unit}",
+            remedy=f"state it with --{triad}-unit",
+        )
 
 
 def _stated_unit(

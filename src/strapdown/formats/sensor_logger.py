@@ -258,7 +258,7 @@ def _force(
     standard = meta.get("standardisation", "").strip().lower() == "true"
     known = platform in ("android", "ios")
     turned = platform == "ios" and not standard
-    unit = ("-m/s2" if turned else "m/s2") if known else None
+    unit = ("-m/s2" if turned else "m/s2") if known else "m/s2 or -m/s2"
     if total in sensors:
         logs = [_log(sensors[total], "accel", unit)]
     elif linear in sensors and gravity in sensors:

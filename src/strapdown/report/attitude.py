@@ -103,7 +103,8 @@ def _write_sweep(bench: AttitudeBench, path: Path) -> None:
         columns,
         {
             "meaning": "drop: samples are left out; sum: increments are summed",
-            "error_deg": "what the answer judges: the largest of what is known, else own_deg",
+            "error_deg": "what the answer judges: against the truth, else at the reference "
+            "points, else own_deg",
             "own_deg": share_basis(bench),
         }
         | {key.lower().replace(" ", "_"): text for key, text in words.CONVENTIONS},

@@ -7,6 +7,7 @@ from typing import Any
 
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_answer_charts import share_basis
+from strapdown.report.attitude_places import places_json
 from strapdown.report.attitude_tables import source_of
 from strapdown.results import AttitudeBench, Cost, Score, Share
 from strapdown.tables import EULER, QUATERNION
@@ -61,6 +62,7 @@ def attitude_json(bench: AttitudeBench) -> dict[str, Any]:
             }
             for peer in bench.peers
         ],
+        **places_json(bench),
         "sampling_error_deg": _sampling_error(bench),
         "largest_difference_deg": {
             name: {other: float(v) for other, v in row.items()}

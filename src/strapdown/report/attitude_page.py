@@ -11,6 +11,7 @@ from strapdown.report import attitude_tables as tables
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_body import body_caption, body_figure
 from strapdown.report.attitude_charts import charts
+from strapdown.report.attitude_places import offer_lines, place_table
 from strapdown.report.chart import Chart
 from strapdown.report.page import embedded, render
 from strapdown.report.plotly_chart import figure
@@ -66,6 +67,8 @@ def attitude_page(bench: AttitudeBench, drawn: Sequence[Chart] | None = None) ->
             "trials": tables.trial_table(bench),
             "peers": tables.peer_table(bench),
             "references": words.reference_lines(bench),
+            "places": place_table(bench),
+            "offers": offer_lines(bench),
             "hint": "" if bench.scores else words.HOW_TO_REFERENCE,
             "findings": _findings(bench.findings),
             "differences": tables.difference_table(bench),

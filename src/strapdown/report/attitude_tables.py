@@ -160,7 +160,8 @@ def _part_note(bench: AttitudeBench) -> str:
 def source_of(run: AttitudeRun) -> str:
     """Where an algorithm stands, as ``Alexiev (2021) Eq. (2)``."""
     cls = ALGORITHMS.get(run.algorithm.partition(":")[0])
-    return f"{'' if cls is None else cls.source + ' '}Eq. {run.equations}"
+    source = "" if cls is None else cls.source
+    return f"{source} Eq. {run.equations}".strip() if run.equations else source
 
 
 def condition_table(bench: AttitudeBench) -> TextTable:
@@ -186,7 +187,7 @@ def cost_table(bench: AttitudeBench) -> TextTable | None:
         "What a sample costs",
         ("algorithm", "add", "multiply", "divide", "root", "sin, cos", "cycles", "memory"),
         rows,
-        note="Operations counted on the kernel itself on this log's larger steps; cycles: the "
+        note="Operations counted on the kernel itself, in steps of 0.01 rad; cycles: the "
         "same weighed as a Cortex-M4F's floating-point unit takes them, for ranking; memory: "
         "numbers kept between samples.",
         strong=_named(bench),

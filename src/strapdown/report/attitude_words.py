@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from strapdown.evaluation.reference_points import in_words
-from strapdown.results import AttitudeBench, Reading, Score
+from strapdown.results import AttitudeBench, Reading, Score, SecondLog
 from strapdown.systems.attitude_judgement import passed_pole
 
 CONVENTIONS = (
@@ -164,13 +164,19 @@ def facts(bench: AttitudeBench) -> list[tuple[str, str]]:
     ]
     if bench.truth is not None:
         found.append(("Truth", _truth_words(bench)))
+    if bench.second is not None:
+        found.append(("Second log", second_words(bench.second)))
     if bench.sampling_error_deg is not None:
         final, most = bench.sampling_error_deg
+        how = (
+            "what noise-free samples at this rate lose, with exact arithmetic"
+            if bench.specification["source"]["kind"] == "scenario"
+            else "an estimate: rates that run along chords between their stamps, against cubics"
+        )
         found.append(
             (
                 "Sampling error",
-                f"{degrees(final)} at the end, up to {degrees(most)} on the way: what noise-free "
-                "samples at this rate lose, with exact arithmetic",
+                f"{degrees(final)} at the end, up to {degrees(most)} on the way: {how}",
             )
         )
     if bench.rests:
@@ -210,3 +216,16 @@ def _rest_words(bench: AttitudeBench) -> list[str]:
     ]
     more = len(bench.rests) - len(shown)
     return shown + ([f"and {more} more"] if more > 0 else [])
+
+
+def second_words(second: SecondLog) -> str:
+    """Say how a second log lies to the first, with the standard deviations."""
+    roll, pitch, heading = second.mounting_deg
+    sd = max(second.mounting_sd_deg)
+    return (
+        f"its clock is {second.offset:.4f} s ahead (1σ {second.offset_sd:.2g} s) and runs "
+        f"{second.drift_ppm:+.3g} ppm (1σ {second.drift_sd_ppm:.2g}); mounted at roll {roll:.2f}°, "
+        f"pitch {pitch:.2f}°, heading {heading:.2f}° (1σ up to {sd:.2g}°); scale of this over that "
+        f"{second.scale:.5f} (1σ {second.scale_sd:.2g}); the two share "
+        f"{100 * second.correlation:.1f} % of their rates"
+    )

@@ -226,14 +226,14 @@ def _cell(
         total = None if grounds.truth is None else infinite
     own_deg = np.nan if own is None else own[2]
     final, rms, largest = (np.nan,) * 3 if total is None else total
-    known = [e for e in (largest, reference) if not np.isnan(e)]
     return {
         "own_deg": own_deg,
         "final_deg": final,
         "rms_deg": rms,
         "max_deg": largest,
         "reference_deg": reference,
-        "error_deg": max(known) if known else own_deg,
+        # A truth tells more than a reference point, and better.
+        "error_deg": next(e for e in (largest, reference, own_deg) if not np.isnan(e)),
     }
 
 

@@ -14,7 +14,7 @@ from strapdown.evaluation.differences import error_angles, largest_differences
 from strapdown.evaluation.reference_points import references_from_words, score_references
 from strapdown.increments import increments_from_imu
 from strapdown.results import Answer, AttitudeBench, Cost, PeerRun, Score, Share, Trials
-from strapdown.simulation import GyroErrors, find_scenario, simulate_gyro
+from strapdown.simulation import ImuErrors, TriadErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
 NINE = (
@@ -62,9 +62,9 @@ def _share(clean, noisy, truth):
 def _bench(algorithms, name="alexiev-fig2c", rate=100.0, truth_known=True, references=()):
     scenario = find_scenario(name)
     runs, clean_runs, sweep = {}, {}, []
-    errors = GyroErrors(noise_density=0.0003, bias=(0.002, -0.001, 0.001))
-    noisy, truth = simulate_gyro(scenario.motion, errors, rate=rate)
-    clean, _ = simulate_gyro(scenario.motion, GyroErrors(), rate=rate)
+    errors = ImuErrors(TriadErrors(noise_density=0.0003, bias=(0.002, -0.001, 0.001)))
+    noisy, truth = simulate_imu(scenario.motion, errors, rate=rate, accelerometer=False)
+    clean, _ = simulate_imu(scenario.motion, ImuErrors(), rate=rate, accelerometer=False)
     start = truth[QUATERNION].to_numpy()[0]
     tolerance = 2.0
     for label in algorithms:
@@ -147,7 +147,7 @@ def _bench(algorithms, name="alexiev-fig2c", rate=100.0, truth_known=True, refer
     return AttitudeBench(
         source=name,
         description=f"simulated: {scenario.title}; {len(noisy)} samples",
-        specification={},
+        specification={"source": {"kind": "scenario"}},
         imu=noisy,
         runs=run_list,
         truth=truth if truth_known else None,
