@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.attitude.algorithm import AttitudeAlgorithm
+from strapdown.attitude.algorithm import AttitudeAlgorithm, Steps, steps_of
 from strapdown.attitude.direction_cosine import DirectionCosine
 from strapdown.attitude.euler_krylov import EulerKrylov
 from strapdown.attitude.naive import Naive
@@ -118,15 +118,15 @@ def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64])
 
 
 def attitude_history(
-    algorithm: AttitudeAlgorithm, increments: pd.DataFrame, q_nb: ArrayLike
+    algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps, q_nb: ArrayLike
 ) -> NDArray[np.float64]:
     """Run an attitude algorithm for its quaternions alone.
 
     Parameters
     ----------
     algorithm : AttitudeAlgorithm
-    increments : DataFrame
-        An Increments table.
+    increments : DataFrame or Steps
+        An Increments table, or its arrays.
     q_nb : array_like, (4,)
         Attitude at the start, body to local level.
 
@@ -140,16 +140,17 @@ def attitude_history(
     DataError, DivergenceError
         As `run_attitude`.
     """
-    return _run(algorithm, increments, q_nb)[0]
+    steps = increments if isinstance(increments, Steps) else steps_of(increments)
+    return _run(algorithm, steps, q_nb)[0]
 
 
 def _run(
-    algorithm: AttitudeAlgorithm, increments: pd.DataFrame, q_nb: ArrayLike
+    algorithm: AttitudeAlgorithm, steps: Steps, q_nb: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Quaternions at the start and after each step, and the state at the end."""
     state = algorithm.begin(rotation.normalise(q_nb))
     first = state[None, : algorithm.width]
-    state, history = algorithm.advance(state, increments)
+    state, history = algorithm.advance_steps(state, steps)
     _refuse_overflow(algorithm, history)
     return algorithm.quaternions(np.vstack([first, history])), state
 
@@ -182,7 +183,7 @@ def run_attitude(
     DivergenceError
         The algorithm left the range of floating point.
     """
-    q, state = _run(algorithm, increments, q_nb)
+    q, state = _run(algorithm, steps_of(increments), q_nb)
     ends = increments.index.to_numpy(dtype=np.float64)
     time = np.concatenate([[ends[0] - increments["dt"].iloc[0]], ends])
     return AttitudeRun(

@@ -31,6 +31,24 @@ def unit_quaternions(history: Array) -> Array:
 
 
 @dataclass(frozen=True)
+class Steps:
+    """Increments as the kernels take them: (n,) s, (n, 3) rad, (n, 3) rad."""
+
+    dt: Array
+    theta: Array
+    dtheta: Array
+
+
+def steps_of(increments: pd.DataFrame) -> Steps:
+    """Take the arrays of an Increments table, without its stamps."""
+    return Steps(
+        np.ascontiguousarray(increments["dt"].to_numpy(dtype=np.float64)),
+        np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64)),
+        np.ascontiguousarray(increments[DTHETA].to_numpy(dtype=np.float64)),
+    )
+
+
+@dataclass(frozen=True)
 class Accuracy:
     """Powers of the step with which the attitude error of an algorithm falls; 0: it does not.
 
@@ -125,12 +143,21 @@ class AttitudeAlgorithm(ABC):
         history : ndarray, (n, width)
             The attitude part of the state after each step.
         """
-        dt = np.ascontiguousarray(increments["dt"].to_numpy(dtype=np.float64))
-        theta = np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64))
-        dtheta = np.ascontiguousarray(increments[DTHETA].to_numpy(dtype=np.float64))
-        history = np.empty((len(theta), self.width))
+        return self.advance_steps(state, steps_of(increments))
+
+    def advance_steps(self, state: Array, steps: Steps) -> tuple[Array, Array]:
+        """Advance over a segment of steps, as `advance`.
+
+        Parameters
+        ----------
+        state : ndarray
+        steps : Steps
+            From `steps_of`; made once where many algorithms run over the same.
+        """
+        history = np.empty((len(steps.dt), self.width))
         after = state.copy()
-        type(self).advance_kernel(after, dt, theta, dtheta, history, *self.kernel_options())
+        options = self.kernel_options()
+        type(self).advance_kernel(after, steps.dt, steps.theta, steps.dtheta, history, *options)
         return after, history
 
     @property

@@ -32,24 +32,27 @@ class Known:
     q_nb: Array
     counts: Mask
 
-    def errors(self, q_nb: Array, samples: NDArray[np.int64] | slice) -> Errors | None:
-        """Compare an attitude at some of the samples with what is known there.
+    def at(self, samples: NDArray[np.int64]) -> Known:
+        """Return what is known at some of the samples."""
+        return Known(self.q_nb[samples], self.counts[samples])
+
+    def errors(self, q_nb: Array) -> Errors | None:
+        """Compare an attitude at every sample with what is known there.
 
         Parameters
         ----------
-        q_nb : ndarray, (m, 4)
-        samples : ndarray of int, (m,), or slice
-            Which samples these are.
+        q_nb : ndarray, (n, 4)
 
         Returns
         -------
         tuple of float, or None
             Final, RMS and largest rotation angle in deg; None where nothing is known.
         """
-        counts = self.counts[samples]
-        if not counts.any():
+        if self.counts.all():
+            return angles_to_errors(rotation.unit_rotation_angle(q_nb, self.q_nb))
+        if not self.counts.any():
             return None
-        angles = rotation.unit_rotation_angle(q_nb[counts], self.q_nb[samples][counts])
+        angles = rotation.unit_rotation_angle(q_nb[self.counts], self.q_nb[self.counts])
         return angles_to_errors(angles)
 
 

@@ -116,7 +116,8 @@ def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop"
         cells = evidence.sweep[
             (evidence.sweep["algorithm"] == cost.algorithm) & (evidence.sweep["meaning"] == meaning)
         ].sort_values("factor")
-        passes = cells[column].to_numpy() <= limit
+        # One whose own error is larger than the whole is right by luck.
+        passes = cells[[column, "own_deg"]].max(axis=1).to_numpy() <= limit
         # A lower rate that passes where a higher one does not passes by luck.
         count = len(passes) if passes.all() else int(np.argmin(passes))
         if count:
@@ -255,7 +256,7 @@ def _why_not_lower(
     if cells.empty:
         return f"{chosen.rate_hz:.4g} Hz is the lowest rate that was tried."
     lower = cells.iloc[0]
-    error = float(lower[column])
+    error = max(float(lower[column]), float(lower["own_deg"]))
     if not np.isfinite(error):
         return f"At {float(lower['rate_hz']):.4g} Hz it runs away."
     return f"At {float(lower['rate_hz']):.4g} Hz it would be {_deg(error)}, beyond {_deg(limit)}."
@@ -267,9 +268,10 @@ def _why_not(evidence: Evidence, cost: Cost) -> str:
         & (evidence.sweep["meaning"] == "drop")
         & (evidence.sweep["factor"] == 1)
     ].iloc[0]
+    off = max(float(full["error_deg"]), float(full["own_deg"]))
     return (
-        f"{cost.algorithm} is simpler, and {_deg(float(full['error_deg']))} off at "
-        f"{float(full['rate_hz']):.4g} Hz already."
+        f"{cost.algorithm} is simpler, and {_deg(off)} off at {float(full['rate_hz']):.4g} Hz "
+        "already."
     )
 
 

@@ -138,17 +138,16 @@ def find_shares(
     """
     clean = None if own.clean is None else increments_from_imu(own.clean, interpolation)
     rounded = single_increments(imu, interpolation)
-    everywhere = slice(None)
     # On a log the sensor's share is what the most accurate algorithm is off by.
-    of_sensor = None if truth is None or own.exact else truth.errors(own.known.q_nb, everywhere)
+    of_sensor = None if truth is None or own.exact else truth.errors(own.known.q_nb)
     shares = []
     for algorithm, run in zip(algorithms, runs, strict=True):
         q = run.attitude[QUATERNION].to_numpy()
         if clean is None:
-            mine, sensor = own.known.errors(q, everywhere), of_sensor
+            mine, sensor = own.known.errors(q), of_sensor
         else:
             q_clean = attitude_history(algorithm, clean, q_nb)
-            mine = own.known.errors(q_clean, everywhere)
+            mine = own.known.errors(q_clean)
             sensor = angles_to_errors(rotation.unit_rotation_angle(q, q_clean))
         assert mine is not None
         apart = rotation.unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
@@ -174,7 +173,7 @@ def best_error(own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Arra
     if truth is None:
         return None
     if own.clean is None:
-        return truth.errors(own.known.q_nb, slice(None))
+        return truth.errors(own.known.q_nb)
     run = run_attitude(MOST_ACCURATE, increments_from_imu(imu), q_nb)
     clean = run_attitude(MOST_ACCURATE, increments_from_imu(own.clean), q_nb)
     angle = rotation.unit_rotation_angle(

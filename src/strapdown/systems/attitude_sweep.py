@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.attitude import AttitudeAlgorithm, attitude_history
+from strapdown.attitude.algorithm import Steps, steps_of
 from strapdown.evaluation.known import Errors, Known
 from strapdown.evaluation.reference_points import score_references
 from strapdown.exceptions import ConfigError, DivergenceError, Finding
@@ -139,26 +140,30 @@ def sweep_rates(
     for k, (meaning, factor) in enumerate(cells):
         progress(f"{meaning} 1:{factor}", k / len(cells))
         samples = chosen_samples(len(grounds.imu), factor)
-        steps = _increments(grounds.imu, samples, meaning, grounds.interpolation)
+        steps = _steps(grounds.imu, samples, meaning, grounds.interpolation)
         clean = grounds.own.clean
         error_free = (
-            None if clean is None else _increments(clean, samples, meaning, grounds.interpolation)
+            None if clean is None else _steps(clean, samples, meaning, grounds.interpolation)
         )
         used = grounds.imu.iloc[samples]
+        there = replace(
+            grounds,
+            own=replace(grounds.own, known=grounds.own.known.at(samples)),
+            truth=None if grounds.truth is None else grounds.truth.at(samples),
+        )
         for algorithm in algorithms:
             rows.append(
                 {"algorithm": algorithm.label, "meaning": meaning, "factor": factor}
                 | {"rate_hz": (len(samples) - 1) / float(used.index[-1] - used.index[0])}
-                | _cell(algorithm, grounds, samples, steps, error_free, used)
+                | _cell(algorithm, there, steps, error_free, used)
             )
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
 def error_at_full_rate(algorithm: AttitudeAlgorithm, grounds: Grounds) -> float:
     """Return the error in deg by which one algorithm is judged at the full rate."""
-    samples = np.arange(len(grounds.imu))
-    steps = increments_from_imu(grounds.imu, grounds.interpolation)
-    return _cell(algorithm, grounds, samples, steps, None, grounds.imu)["error_deg"]
+    steps = steps_of(increments_from_imu(grounds.imu, grounds.interpolation))
+    return _cell(algorithm, grounds, steps, None, grounds.imu)["error_deg"]
 
 
 def chosen_samples(count: int, factor: int) -> NDArray[np.int64]:
@@ -167,12 +172,12 @@ def chosen_samples(count: int, factor: int) -> NDArray[np.int64]:
     return samples if samples[-1] == count - 1 else np.append(samples, count - 1)
 
 
-def _increments(
+def _steps(
     imu: pd.DataFrame, samples: NDArray[np.int64], meaning: str, interpolation: str
-) -> pd.DataFrame:
+) -> Steps:
     if meaning == "drop":
-        return increments_from_imu(imu.iloc[samples], interpolation)
-    return sum_increments(increments_from_imu(imu, interpolation), samples)
+        return steps_of(increments_from_imu(imu.iloc[samples], interpolation))
+    return steps_of(sum_increments(increments_from_imu(imu, interpolation), samples))
 
 
 def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.DataFrame:
@@ -207,19 +212,17 @@ def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.D
 def _cell(
     algorithm: AttitudeAlgorithm,
     grounds: Grounds,
-    samples: NDArray[np.int64],
-    steps: pd.DataFrame,
-    error_free: pd.DataFrame | None,
+    steps: Steps,
+    error_free: Steps | None,
     used: pd.DataFrame,
 ) -> dict[str, float]:
     infinite: Errors = (np.inf, np.inf, np.inf)
     try:
         q = attitude_history(algorithm, steps, grounds.q_nb)
         own = grounds.own.known.errors(
-            q if error_free is None else attitude_history(algorithm, error_free, grounds.q_nb),
-            samples,
+            q if error_free is None else attitude_history(algorithm, error_free, grounds.q_nb)
         )
-        total = None if grounds.truth is None else grounds.truth.errors(q, samples)
+        total = None if grounds.truth is None else grounds.truth.errors(q)
         reference = _largest_reference(algorithm, q, grounds.references, used)
     except DivergenceError:
         own, reference = infinite, np.inf if len(grounds.references) else np.nan
