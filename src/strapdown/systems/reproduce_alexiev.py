@@ -1,0 +1,243 @@
+"""Alexiev (2021), re-made: every testable statement with a verdict from numbers of this run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from strapdown import rotation
+from strapdown.increments import increments_from_imu
+from strapdown.simulation import simulate_imu
+from strapdown.systems.alexiev import commutation, effort, fig4, fig5, fig6, formulas, growth
+from strapdown.systems.alexiev import signals
+from strapdown.systems.alexiev.sampling import (
+    NONE,
+    algorithm_history,
+    errors_over_time,
+    final_error,
+    scenario_motion,
+)
+from strapdown.systems.reproduction import (
+    CANNOT_BE_JUDGED,
+    DOES_NOT_HOLD,
+    HOLDS,
+    HOLDS_WHEN,
+    Figure,
+    Reproduction,
+    Statement,
+    Table,
+)
+from strapdown.tables import QUATERNION
+
+Progress = Callable[[str, float], None]
+Part = tuple[list[Statement], list[Table], list[Figure]]
+
+__all__ = ["PAPER", "reproduce_alexiev"]
+
+PAPER = (
+    "K. Alexiev, Algorithms for IMU Navigation – A Review, Information Technologies and Control, "
+    "January 2021"
+)
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
+    """Re-make Figs. 2, 4, 5 and 6 of Alexiev (2021) and judge its statements.
+
+    Parameters
+    ----------
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    Reproduction
+        Simulated throughout, the same numbers every time. The paper's figures did not survive
+        scanning: parameters that its text does not give are chosen here, and stand in each
+        figure. No curve of the paper is claimed to be matched; its statements are judged.
+    """
+    parts: tuple[tuple[str, Callable[[], Part]], ...] = (
+        ("formulas", _formulas),
+        ("Fig. 4", _fig4),
+        ("Fig. 5 and the naive sum", _naive),
+        ("Fig. 6", _fig6),
+        ("growth of errors", _growth),
+        ("Fig. 2 and all motions", _motions),
+        ("effort", _effort),
+    )
+    statements: list[Statement] = []
+    tables: list[Table] = []
+    figures: list[Figure] = []
+    for k, (stage, make) in enumerate(parts):
+        progress(stage, k / (len(parts) + 2))
+        for found, more in zip((statements, tables, figures), make(), strict=True):
+            found.extend(more)  # type: ignore[arg-type]
+    made = Reproduction("alexiev", PAPER, "", tuple(statements), tuple(tables), tuple(figures))
+    return Reproduction(
+        made.name, made.paper, headline(made), made.statements, made.tables, made.figures
+    )
+
+
+def headline(made: Reproduction) -> str:
+    """Say what came of it."""
+    bounds = made.count(HOLDS_WHEN)
+    return (
+        f"Of {len(made.statements)} statements {made.count(HOLDS)} hold as they stand, {bounds} "
+        f"within bounds that are named, {made.count(DOES_NOT_HOLD)} do not hold, and "
+        f"{made.count(CANNOT_BE_JUDGED)} cannot be judged without the paper's own data."
+    )
+
+
+def _formulas() -> Part:
+    residual = formulas.worst_kinematics(transposed=True)
+    return (
+        [
+            formulas.product_as_printed(
+                formulas.worst_attitude(transposed=False),
+                formulas.worst_attitude(transposed=True),
+                residual,
+            ),
+            formulas.kinematics_as_printed(residual),
+            formulas.sigma_as_printed(*formulas.increments_as_printed()),
+            formulas.exponential_at_zero(
+                formulas.exponential(0.0)[0],
+                formulas.coefficient_loss(1e-8),
+                formulas.coefficient_loss(0.01),
+            ),
+            formulas.quaternion_equations(formulas.poisson_difference()),
+            formulas.series(formulas.truncated()),
+        ],
+        [],
+        [],
+    )
+
+
+def _fig4() -> Part:
+    table = fig4.table()
+    columns = dict(
+        zip(table.columns[1:], np.array([row for _, row in table.rows]).T, strict=True)
+    )
+    at_100 = fig4.RATES.index(100.0)
+    approaches = tuple(fig4.approach(rate) for rate in fig4.APPROACH_RATES)
+    smooth = fig4.approach(100.0, "rk4")
+    pulses = scenario_motion("alexiev-fig4").rate([2.5])[0]
+    return (
+        [
+            fig4.unstable(fig4.RATES, columns["euler, °"], columns["dcm, °"]),
+            fig4.crosses(fig4.greatest_pitch(), float(np.degrees(pulses[1]))),
+            fig4.incorrect(columns["euler, °"][at_100], columns["dcm, °"][at_100]),
+            fig4.before_ninety(approaches, smooth),
+            fig4.reference(
+                columns["dcm, °"],
+                columns["dcm, pulse closed, °"][at_100],
+                float(np.degrees(np.hypot(pulses[0], pulses[1]) / 100.0)),
+            ),
+        ],
+        [table],
+        [fig4.time_figure(), fig4.approach_figure(approaches, smooth)],
+    )
+
+
+def _naive() -> Part:
+    small, large = (scenario_motion(n) for n in ("alexiev-fig5", "alexiev-fig5-large"))
+    high, high_large = (fig5.compare(m, fig5.HIGH) for m in (small, large))
+    low, low_large = (fig5.compare(m, fig5.LOW) for m in (small, large))
+    return (
+        [
+            commutation.good_at_high_rate(
+                high.naive,
+                final_error(small, "naive", 10_000.0),
+                high_large.naive,
+                final_error(large, "naive", 10_000.0),
+                commutation.angle_for(commutation.GOOD, "together"),
+                commutation.angle_for(commutation.GOOD, "x then y"),
+            ),
+            fig5.very_good_at_high_rate(high, high_large),
+            fig5.differs_at_low_rate(low, high, low_large),
+        ],
+        [fig5.table()],
+        [fig5.figure(), commutation.angle_figure(), commutation.rate_figure()],
+    )
+
+
+def _fig6() -> Part:
+    record = fig6.record()
+    found = tuple(fig6.decimate(record, factor) for factor in fig6.FACTORS)
+    fast, slow = found[0], found[fig6.FACTORS.index(fig6.PAPER_FACTOR)]
+    sensors = tuple(fig6.sensor_cost(name) for name in fig6.phone_gyros())
+    motion = scenario_motion("alexiev-fig6")
+    _, error = errors_over_time(motion, "dcm", slow.rate)
+    at_nine = round(fig6.UNTIL * slow.rate)
+    return (
+        [
+            fig6.stable_at_rest(sensors),
+            fig6.neither_sensor_nor_algorithm(slow, _apart(slow.rate), sensors),
+            fig6.rate_is_the_reason(slow, fast, sensors),
+            fig6.reference_points(
+                *fig6.scale_seen(), float(error[at_nine]), float(error[: at_nine + 1].max())
+            ),
+        ],
+        [fig6.rate_table(found), fig6.sensor_table(sensors)],
+        [
+            fig6.time_figure(),
+            fig6.rate_figure(found, float(np.median([c.calibrated for c in sensors]))),
+        ],
+    )
+
+
+def _growth() -> Part:
+    laws = growth.laws()
+    return (
+        [
+            growth.gyros_lead(growth.crossovers()),
+            growth.accel_growth(laws.accel, laws.accel_turning),
+            growth.attitude_growth(laws.tilt, laws.tilt_turning),
+            growth.gyro_growth(laws.gyro, laws.gyro_vertical),
+            growth.earth_rate_small(growth.gyro_biases()),
+        ],
+        [],
+        [growth.figure(laws)],
+    )
+
+
+def _motions() -> Part:
+    table = signals.table()
+    motion = scenario_motion("alexiev-fig6")
+    exact = max(
+        final_error(scenario_motion(name), algorithm, 100.0, sampling="mean")
+        for name in ("alexiev-fig2a", "alexiev-fig2b", "alexiev-fig2c", "alexiev-fig4")
+        for algorithm in ("dcm", "quaternion")
+    )
+    return (
+        [
+            signals.excellent(
+                exact,
+                _apart(20.0),
+                final_error(motion, "dcm", 20.0),
+                final_error(motion, "dcm", 1000.0),
+                20.0,
+                1000.0,
+            ),
+            signals.practical(table),
+        ],
+        [table],
+        [signals.figure()],
+    )
+
+
+def _effort() -> Part:
+    costs = effort.costs()
+    return [effort.compromise(costs), *effort.unpublished()], [effort.table(costs)], []
+
+
+def _apart(rate: float) -> float:
+    """Largest angle in deg between direction cosines and quaternion on the motion of Fig. 6."""
+    imu, truth = simulate_imu(scenario_motion("alexiev-fig6"), NONE, rate=rate, accelerometer=False)
+    steps = increments_from_imu(imu)
+    start = truth[QUATERNION].to_numpy()[0]
+    dcm, quaternion = (algorithm_history(a, steps, start) for a in ("dcm", "quaternion"))
+    return float(rotation.rotation_angle(dcm, quaternion).max())
