@@ -184,7 +184,7 @@ def _fig6() -> Part:
         [fig6.rate_table(found), fig6.sensor_table(sensors)],
         [
             fig6.time_figure(),
-            fig6.rate_figure(found, float(np.median([c.calibrated for c in sensors]))),
+            fig6.rate_figure(found, float(np.median([c.moving for c in sensors]))),
         ],
     )
 
