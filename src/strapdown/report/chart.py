@@ -73,6 +73,8 @@ class Chart:
     panels : tuple of Panel
     marks : tuple of Mark
     bands : tuple of Band
+    x_log : bool
+        Logarithmic horizontal axis.
     """
 
     slug: str
@@ -82,6 +84,7 @@ class Chart:
     panels: tuple[Panel, ...]
     marks: tuple[Mark, ...] = field(default=())
     bands: tuple[Band, ...] = field(default=())
+    x_log: bool = False
 
 
 def curve(

@@ -41,16 +41,18 @@ def figure(chart: Chart) -> dict[str, Any]:
             "gridcolor": _GRID,
             "zeroline": False,
             "anchor": "y" if count == 1 else f"y{count}",
+            "type": "log" if chart.x_log else "linear",
         },
         "shapes": [],
         "annotations": [],
     }
     traces: list[dict[str, Any]] = []
+    shown: set[str] = set()
     for number, panel in enumerate(chart.panels):
         top = 1.0 - number * (height + gap)
         suffix = "" if number == 0 else str(number + 1)
         layout[f"yaxis{suffix}"] = _axis(panel, (max(0.0, top - height), top))
-        traces += _traces(panel, f"y{suffix}", legend=number == 0)
+        traces += _traces(panel, f"y{suffix}", shown)
     for band in chart.bands:
         layout["shapes"].append(
             _shape("rect", band.start, band.end, fillcolor="#0072B2", opacity=0.07, line_width=0)
@@ -59,7 +61,8 @@ def figure(chart: Chart) -> dict[str, Any]:
         layout["shapes"].append(_shape("line", mark.x, mark.x, line_width=1.4))
         layout["annotations"].append(
             {
-                "x": mark.x,
+                # On a logarithmic axis shapes take the value and labels its logarithm.
+                "x": float(np.log10(mark.x)) if chart.x_log else mark.x,
                 "y": 1.0,
                 "yref": "paper",
                 "yanchor": "top",
@@ -80,7 +83,16 @@ def _axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
         "zeroline": False,
         "domain": list(domain),
         "type": "log" if panel.log else "linear",
-    } | ({"exponentformat": "power", "dtick": 1} if panel.log else {})
+    } | ({"exponentformat": "power", "dtick": _decades(panel)} if panel.log else {})
+
+
+def _decades(panel: Panel) -> int:
+    """Decades from one tick to the next, so that there are seven at most."""
+    values = np.concatenate([line.y for line in panel.lines])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    if not values.size:
+        return 1
+    return max(1, int(np.ceil(np.log10(values.max() / values.min()) / 7.0)))
 
 
 def _shape(kind: str, x0: float, x1: float, **style: Any) -> dict[str, Any]:
@@ -98,7 +110,8 @@ def _shape(kind: str, x0: float, x1: float, **style: Any) -> dict[str, Any]:
     } | style
 
 
-def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
+def _traces(panel: Panel, axis: str, shown: set[str]) -> list[dict[str, Any]]:
+    """Traces of a panel; a name stands in the legend once, and is added to `shown`."""
     out = []
     for line in panel.lines:
         out.append(
@@ -107,7 +120,7 @@ def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
                 "mode": "markers" if line.points else "lines",
                 "name": html.escape(line.name),
                 "legendgroup": html.escape(line.name),
-                "showlegend": legend,
+                "showlegend": line.name not in shown,
                 "x": _numbers(line.x, 9),
                 "y": _numbers(line.y, 6),
                 "xaxis": "x",
@@ -116,6 +129,7 @@ def _traces(panel: Panel, axis: str, *, legend: bool) -> list[dict[str, Any]]:
                 "marker": {"color": line.colour, "size": 9, "symbol": "diamond"},
             }
         )
+        shown.add(line.name)
     return out
 
 

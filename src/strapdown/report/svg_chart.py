@@ -72,7 +72,16 @@ def draw(chart: Chart, path: Path) -> None:
                 ha="right",
             )
         axes[-1].set_xlabel(chart.x_label)
+        if chart.x_log:
+            axes[-1].set_xscale("log")
+            axes[-1].xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axes[-1].xaxis.set_minor_formatter(FuncFormatter(lambda value, _: ""))
         figure.suptitle(chart.title, x=0.01, ha="left", fontweight="bold")
-        handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower left", ncols=6, frameon=False)
+        named: dict[str, Any] = {}
+        for axis in axes:
+            for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
+                named.setdefault(label, handle)
+        figure.legend(
+            list(named.values()), list(named), loc="outside lower left", ncols=6, frameon=False
+        )
         figure.savefig(path, format="svg", metadata={"Date": None, "Creator": "strapdown"})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,6 +42,17 @@ PAPER = (
 )
 
 
+# As they stand in the paper.
+ORDER = (
+    *("compromise", "gyros-lead", "growth-accel", "growth-attitude", "growth-gyro"),
+    *("modest-goals", "reference-points", "earth-rate", "eq3", "eq8-10", "eq11-sigma"),
+    *("eq12-15-17", "eq18-19", "eq20-22", "real-data", "naive-high-rate", "euler-unstable"),
+    *("dcm-quaternion-excellent", "fig4-crosses-90", "fig4-incorrect", "fig4-before-90"),
+    *("fig4-dcm-reference", "fig5-very-good", "fig5-low-rate", "fig6-stable"),
+    *("fig6-not-sensor-nor-algorithm", "fig6-rate-is-the-reason", "naive-in-practice"),
+)
+
+
 def _silent(stage: str, share: float) -> None:
     """Report progress to nobody."""
 
@@ -61,12 +73,12 @@ def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
         figure. No curve of the paper is claimed to be matched; its statements are judged.
     """
     parts: tuple[tuple[str, Callable[[], Part]], ...] = (
+        ("Fig. 2 and all motions", _motions),
         ("formulas", _formulas),
         ("Fig. 4", _fig4),
         ("Fig. 5 and the naive sum", _naive),
         ("Fig. 6", _fig6),
         ("growth of errors", _growth),
-        ("Fig. 2 and all motions", _motions),
         ("effort", _effort),
     )
     statements: list[Statement] = []
@@ -76,10 +88,9 @@ def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
         progress(stage, k / (len(parts) + 2))
         for found, more in zip((statements, tables, figures), make(), strict=True):
             found.extend(more)  # type: ignore[arg-type]
+    statements.sort(key=lambda s: ORDER.index(s.key))
     made = Reproduction("alexiev", PAPER, "", tuple(statements), tuple(tables), tuple(figures))
-    return Reproduction(
-        made.name, made.paper, headline(made), made.statements, made.tables, made.figures
-    )
+    return replace(made, headline=headline(made))
 
 
 def headline(made: Reproduction) -> str:
@@ -118,9 +129,7 @@ def _formulas() -> Part:
 
 def _fig4() -> Part:
     table = fig4.table()
-    columns = dict(
-        zip(table.columns[1:], np.array([row for _, row in table.rows]).T, strict=True)
-    )
+    columns = dict(zip(table.columns[1:], np.array([row for _, row in table.rows]).T, strict=True))
     at_100 = fig4.RATES.index(100.0)
     approaches = tuple(fig4.approach(rate) for rate in fig4.APPROACH_RATES)
     smooth = fig4.approach(100.0, "rk4")

@@ -111,7 +111,6 @@ def angle_figure() -> Figure:
         traces.append(
             Trace(f"closed form, {order}", ANGLES, closed_form(ANGLES, order), reference=True)
         )
-    traces.append(Trace("good: 1°", ANGLES, np.full(ANGLES.size, GOOD), reference=True))
     return Figure(
         "naive-angle",
         "What the naive sum costs: two turns about two axes",
@@ -129,13 +128,13 @@ def rate_figure() -> Figure:
     """Return the final error against the rate on the two motions of Fig. 5."""
     rates = np.array(RATES)
     panels = []
-    for name, label in (("alexiev-fig5", "5° to 8°"), ("alexiev-fig5-large", "46° to 84°")):
+    for name, label in (("alexiev-fig5", "small"), ("alexiev-fig5-large", "large")):
         motion = scenario_motion(name)
         traces = tuple(
             Trace(a, rates, np.maximum(sweep(motion, a, rates), _FLOOR))
             for a in ("naive", "euler", "dcm")
         )
-        panels.append(FigurePanel(f"error, deg; turns of {label}", traces, log=True))
+        panels.append(FigurePanel(f"error, deg; {label} turns", traces, log=True))
     return Figure(
         "naive-rate",
         "No rate removes it",
@@ -143,7 +142,7 @@ def rate_figure() -> Figure:
         "falls with the square of the step, Euler-Krylov with the step; the naive sum stays where it "
         "is. Below 50 Hz the edges of the pulses are off the grid of the samples.",
         "Pulses about x, y, z overlapping: 0.10 rad/s on [2.07, 3.53), −0.05 on [2.51, 4.13), 0.15 "
-        "on [2.93, 3.77) s; below, ten times that.",
+        "on [2.93, 3.77) s, turns of 5° to 8°; below, ten times that.",
         "rate, Hz",
         tuple(panels),
         x_log=True,

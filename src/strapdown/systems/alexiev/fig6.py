@@ -160,9 +160,7 @@ def _gathered(
     motion: Motion, gyro: TriadErrors, seed: int, *, bias_off: bool
 ) -> tuple[float, float]:
     """Angle in deg gathered up to 5 s, and from there to 9 s, by one unit."""
-    imu, _ = simulate_imu(
-        motion, ImuErrors(gyro), rate=SENSOR_RATE, seed=seed, accelerometer=False
-    )
+    imu, _ = simulate_imu(motion, ImuErrors(gyro), rate=SENSOR_RATE, seed=seed, accelerometer=False)
     if bias_off:
         imu[GYRO] = imu[GYRO] - imu.loc[imu.index < SINCE, GYRO].mean()
     q = algorithm_history("quaternion", increments_from_imu(imu), (1.0, 0.0, 0.0, 0.0))
@@ -280,9 +278,7 @@ def rate_figure(found: tuple[AtRate, ...], sensor_deg: float) -> Figure:
                     trace("dcm, summed", "averaged"),
                     trace("rk4 on cubic", "cubic"),
                     trace("rotvec, summed", "rotation_vector"),
-                    Trace(
-                        "median sensor", rates, np.full(rates.size, sensor_deg), reference=True
-                    ),
+                    Trace("median sensor", rates, np.full(rates.size, sensor_deg), reference=True),
                 ),
                 log=True,
             ),
@@ -345,9 +341,7 @@ def rate_is_the_reason(slow: AtRate, fast: AtRate, costs: tuple[SensorCost, ...]
         verdict, condition = HOLDS, ""
     elif removed and slow.dropped > LEADS * calibrated:
         verdict = HOLDS_WHEN
-        condition = (
-            "scale factor and alignment of the gyro are calibrated, and not its bias alone"
-        )
+        condition = "scale factor and alignment of the gyro are calibrated, and not its bias alone"
     else:
         verdict, condition = DOES_NOT_HOLD, ""
     return Statement(

@@ -81,7 +81,9 @@ def worst_attitude(transposed: bool) -> float:
     """Return the largest element by which (3) misses C_nb of the same angles."""
     return max(
         float(
-            np.abs(product(angles, transposed)[0] - rotation.dcm_from_euler(np.degrees(angles))).max()
+            np.abs(
+                product(angles, transposed)[0] - rotation.dcm_from_euler(np.degrees(angles))
+            ).max()
         )
         for angles in _GRID
     )
@@ -286,7 +288,5 @@ def series(errors: list[float]) -> Statement:
         "",
         "On Fig. 4 at 10 Hz, with steps of 11°, normalised after each"
         + (f": order {enough} leaves less than 0.01°." if enough else "."),
-        tuple(
-            Evidence(f"order {n}", e, "°") for n, e in zip(ORDERS, errors, strict=True)
-        ),
+        tuple(Evidence(f"order {n}", e, "°") for n, e in zip(ORDERS, errors, strict=True)),
     )

@@ -46,7 +46,7 @@ def figure() -> Figure:
         imu, _ = simulate_imu(scenario.motion, scenario.errors, rate=RATE, accelerometer=False)
         time = imu.index.to_numpy(dtype=np.float64)
         traces = tuple(
-            Trace(axis, time, np.degrees(imu[column].to_numpy()))
+            Trace(f"gyro {axis}", time, np.degrees(imu[column].to_numpy()))
             for axis, column in zip("xyz", GYRO, strict=True)
         )
         panels.append(FigurePanel(f"{name[-1]}: deg/s", traces))
@@ -72,9 +72,7 @@ def table() -> Table:
             (
                 name,
                 tuple(
-                    float(
-                        errors_over_time(scenario.motion, a, RATE, errors=scenario.errors)[1][-1]
-                    )
+                    float(errors_over_time(scenario.motion, a, RATE, errors=scenario.errors)[1][-1])
                     for a in FOUR
                 ),
             )
