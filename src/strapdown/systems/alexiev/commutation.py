@@ -17,7 +17,6 @@ from strapdown.systems.reproduction import (
     FigurePanel,
     Statement,
     Trace,
-    amount,
 )
 
 Array = NDArray[np.float64]
@@ -139,8 +138,8 @@ def rate_figure() -> Figure:
         "naive-rate",
         "No rate removes it",
         "Final error against the rate, on the motion of Fig. 5 and on ten times its rates. DCM "
-        "falls with the square of the step, Euler-Krylov with the step; the naive sum stays where it "
-        "is. Below 50 Hz the edges of the pulses are off the grid of the samples.",
+        "falls with the square of the step, Euler-Krylov with the step; the naive sum stays where "
+        "it is. Below 50 Hz the edges of the pulses are off the grid of the samples.",
         "Pulses about x, y, z overlapping: 0.10 rad/s on [2.07, 3.53), −0.05 on [2.51, 4.13), 0.15 "
         "on [2.93, 3.77) s, turns of 5° to 8°; below, ten times that.",
         "rate, Hz",

@@ -353,7 +353,7 @@ def rate_is_the_reason(slow: AtRate, fast: AtRate, costs: tuple[SensorCost, ...]
         condition,
         "On a motion of 920 °/s at most, error-free samples at 20 Hz cost by themselves what is "
         f"below, and a higher rate takes it away. Sums of the increments over each 50 ms cost "
-        f"{amount(slow.averaged / slow.dropped)} of it.",
+        f"{amount(100.0 * slow.averaged / slow.dropped, '%')} of it.",
         (
             Evidence("20 Hz, samples dropped", slow.dropped, "°"),
             Evidence("20 Hz, increments summed", slow.averaged, "°"),
@@ -389,7 +389,7 @@ def neither_sensor_nor_algorithm(
         verdict = HOLDS_WHEN
         condition = (
             "'algorithmic inaccuracies' means DCM against quaternion: an algorithm of higher order "
-            f"leaves {amount(best / slow.dropped)} of the error on the same rate"
+            f"leaves {amount(100.0 * best / slow.dropped, '%')} of the error on the same rate"
         )
     else:
         verdict, condition = HOLDS, ""
@@ -403,7 +403,7 @@ def neither_sensor_nor_algorithm(
         "Both can make such an error. Scale factor and misalignment of phones' gyros, bias taken "
         f"off, cost {amount(least, '°')} to {amount(most, '°')} on this motion at {SENSOR_RATE:g} "
         "Hz. And though DCM and quaternion agree to rounding, an algorithm of higher order leaves "
-        f"{amount(best / slow.dropped)} of the error of 20 Hz on samples of 20 Hz.",
+        f"{amount(100.0 * best / slow.dropped, '%')} of the error of 20 Hz on samples of 20 Hz.",
         (
             Evidence("DCM at 20 Hz", slow.dropped, "°"),
             Evidence("DCM and quaternion apart", apart, "°"),
