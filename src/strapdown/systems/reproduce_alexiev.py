@@ -117,8 +117,9 @@ def headline(made: Reproduction) -> str:
         f"within bounds that are named, {made.count(DOES_NOT_HOLD)} do not hold, and "
         f"{made.count(CANNOT_BE_JUDGED)} cannot be judged without the paper's own data. For an "
         f"application: the quaternion costs {amount(100.0 * share, '%')} of Euler-Krylov and is "
-        f"right wherever the rate keeps up with the motion; the naive sum is good to 1° for turns under {turn} about "
-        f"two axes, at any rate; 20 Hz is too slow for a hand in a hurry ({slow})."
+        "right wherever the rate keeps up with the motion; the naive sum is good to 1° for turns "
+        f"under {turn} about two axes, at any rate; 20 Hz is too slow for a hand in a hurry "
+        f"({slow})."
     )
 
 

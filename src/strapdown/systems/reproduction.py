@@ -210,9 +210,9 @@ def amount(value: float, unit: str = "") -> str:
         return "not a number"
     space = "" if unit in ("", "°", "°/s", "%") else " "
     size = abs(value)
-    if 0.0 < size < ROUNDING:
+    if size < ROUNDING:
         return f"< 1e-9{space}{unit}"
-    if size == 0.0 or 1e-3 <= size < 1e5:
+    if 1e-3 <= size < 1e5:
         digits = f"{value:.3g}" if size < 100 else f"{value:.4g}" if size < 1000 else f"{value:.0f}"
     else:
         digits = f"{value:.1e}"
