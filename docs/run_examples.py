@@ -6,8 +6,8 @@ that is ``…`` alone stands for any number of lines, and ``…`` in a line for 
 are looked for where STRAPDOWN_DATA points; a page that needs them is left out without it.
 
 The pages in ``notebooks`` are notebooks kept as text (jupytext's form "myst"). Their cells run in
-order in one Python process; what a cell prints, and the value of its last line, is compared with the
-``text`` block under it.
+order in one Python process; what a cell prints, and the value of its last line, is compared with
+the ``text`` block under it.
 """
 
 from __future__ import annotations
