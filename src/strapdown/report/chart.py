@@ -73,7 +73,7 @@ class Chart:
     panels : tuple of Panel
     marks : tuple of Mark
     bands : tuple of Band
-    x_log : bool
+    log_x : bool
         Logarithmic horizontal axis.
     """
 
@@ -84,7 +84,7 @@ class Chart:
     panels: tuple[Panel, ...]
     marks: tuple[Mark, ...] = field(default=())
     bands: tuple[Band, ...] = field(default=())
-    x_log: bool = False
+    log_x: bool = False
 
 
 def curve(

@@ -41,7 +41,7 @@ def figure(chart: Chart) -> dict[str, Any]:
             "gridcolor": _GRID,
             "zeroline": False,
             "anchor": "y" if count == 1 else f"y{count}",
-            "type": "log" if chart.x_log else "linear",
+            "type": "log" if chart.log_x else "linear",
         },
         "shapes": [],
         "annotations": [],
@@ -62,7 +62,7 @@ def figure(chart: Chart) -> dict[str, Any]:
         layout["annotations"].append(
             {
                 # On a logarithmic axis shapes take the value and labels its logarithm.
-                "x": float(np.log10(mark.x)) if chart.x_log else mark.x,
+                "x": float(np.log10(mark.x)) if chart.log_x else mark.x,
                 "y": 1.0,
                 "yref": "paper",
                 "yanchor": "top",

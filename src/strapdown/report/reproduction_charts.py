@@ -54,7 +54,7 @@ def chart(figure: Figure) -> Chart:
             for p in figure.panels
         ),
         tuple(Mark(x, label) for x, label in figure.marks),
-        x_log=figure.x_log,
+        log_x=figure.x_log,
     )
 
 

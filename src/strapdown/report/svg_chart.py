@@ -72,7 +72,7 @@ def draw(chart: Chart, path: Path) -> None:
                 ha="right",
             )
         axes[-1].set_xlabel(chart.x_label)
-        if chart.x_log:
+        if chart.log_x:
             axes[-1].set_xscale("log")
             axes[-1].xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
             axes[-1].xaxis.set_minor_formatter(FuncFormatter(lambda value, _: ""))

@@ -11,13 +11,17 @@ from strapdown import rotation
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import simulate_imu
 from strapdown.systems.alexiev import (
+    biases,
     commutation,
     effort,
     fig4,
+    fig4_approach,
     fig5,
     fig6,
     formulas,
     growth,
+    phone_sensors,
+    reference_points,
     signals,
 )
 from strapdown.systems.alexiev.sampling import (
@@ -151,15 +155,15 @@ def _fig4() -> Part:
     table = fig4.table()
     columns = dict(zip(table.columns[1:], np.array([row for _, row in table.rows]).T, strict=True))
     at_100 = fig4.RATES.index(100.0)
-    approaches = tuple(fig4.approach(rate) for rate in fig4.APPROACH_RATES)
-    smooth = fig4.approach(100.0, "rk4")
+    approaches = tuple(fig4_approach.approach(rate) for rate in fig4_approach.APPROACH_RATES)
+    smooth = fig4_approach.approach(100.0, "rk4")
     pulses = scenario_motion("alexiev-fig4").rate([2.5])[0]
     return (
         [
             fig4.unstable(fig4.RATES, columns["euler, °"], columns["dcm, °"]),
             fig4.crosses(fig4.greatest_pitch(), float(np.degrees(pulses[1]))),
             fig4.incorrect(columns["euler, °"][at_100], columns["dcm, °"][at_100]),
-            fig4.before_ninety(approaches, smooth),
+            fig4_approach.before_ninety(approaches, smooth),
             fig4.reference(
                 columns["dcm, °"],
                 columns["dcm, pulse closed, °"][at_100],
@@ -167,7 +171,7 @@ def _fig4() -> Part:
             ),
         ],
         [table],
-        [fig4.time_figure(), fig4.approach_figure(approaches, smooth)],
+        [fig4.time_figure(), fig4_approach.approach_figure(approaches, smooth)],
     )
 
 
@@ -197,20 +201,22 @@ def _fig6() -> Part:
     record = fig6.record()
     found = tuple(fig6.decimate(record, factor) for factor in fig6.FACTORS)
     fast, slow = found[0], found[fig6.FACTORS.index(fig6.PAPER_FACTOR)]
-    sensors = tuple(fig6.sensor_cost(name) for name in fig6.phone_gyros())
+    sensors = tuple(phone_sensors.sensor_cost(name) for name in phone_sensors.phone_gyros())
     motion = scenario_motion("alexiev-fig6")
     _, error = errors_over_time(motion, "dcm", slow.rate)
-    at_nine = round(fig6.UNTIL * slow.rate)
+    at_nine = round(phone_sensors.UNTIL * slow.rate)
     return (
         [
-            fig6.stable_at_rest(sensors),
+            phone_sensors.stable_at_rest(sensors),
             fig6.neither_sensor_nor_algorithm(slow, _apart(slow.rate), sensors),
             fig6.rate_is_the_reason(slow, fast, sensors),
-            fig6.reference_points(
-                *fig6.scale_seen(), float(error[at_nine]), float(error[: at_nine + 1].max())
+            reference_points.reference_points(
+                *reference_points.scale_seen(),
+                float(error[at_nine]),
+                float(error[: at_nine + 1].max()),
             ),
         ],
-        [fig6.rate_table(found), fig6.sensor_table(sensors)],
+        [fig6.rate_table(found), phone_sensors.sensor_table(sensors)],
         [
             fig6.time_figure(),
             fig6.rate_figure(found, float(np.median([c.moving for c in sensors]))),
@@ -222,11 +228,11 @@ def _growth() -> Part:
     laws = growth.laws()
     return (
         [
-            growth.gyros_lead(growth.crossovers()),
+            biases.gyros_lead(biases.crossovers()),
             growth.accel_growth(laws.accel, laws.accel_turning),
             growth.attitude_growth(laws.tilt, laws.tilt_turning),
             growth.gyro_growth(laws.gyro, laws.gyro_vertical),
-            growth.earth_rate_small(growth.gyro_biases()),
+            biases.earth_rate_small(biases.gyro_biases()),
         ],
         [],
         [growth.figure(laws)],

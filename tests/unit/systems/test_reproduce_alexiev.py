@@ -12,13 +12,17 @@ from strapdown.attitude import ALGORITHMS
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.systems import reproduce_alexiev as system
 from strapdown.systems.alexiev import (
+    biases,
     commutation,
     effort,
     fig4,
+    fig4_approach,
     fig5,
     fig6,
     formulas,
     growth,
+    phone_sensors,
+    reference_points,
     signals,
 )
 from strapdown.systems.reproduction import (
@@ -117,18 +121,21 @@ def test_the_greatest_pitch_of_fig4_is_the_angle_between_its_axis_and_x(made):
 
 
 def test_the_error_before_90_is_of_first_order_and_the_steps_own():
-    slow, fast = fig4.approach(1000.0), fig4.approach(2000.0)
+    slow, fast = fig4_approach.approach(1000.0), fig4_approach.approach(2000.0)
     # Half the step, half the error; the next term is of the order of the step.
     assert slow.at(45.0) / fast.at(45.0) == pytest.approx(2.0, rel=0.01)
-    assert fig4.approach(100.0, "rk4").at(45.0) < 1e-6 * fig4.approach(100.0).at(45.0) + 1e-7
+    assert (
+        fig4_approach.approach(100.0, "rk4").at(45.0)
+        < 1e-6 * fig4_approach.approach(100.0).at(45.0) + 1e-7
+    )
 
 
 def test_before_90_turns_with_its_numbers():
-    found = tuple(fig4.approach(r) for r in (20.0, 100.0))
-    smooth = fig4.approach(100.0, "rk4")
-    assert fig4.before_ninety(found, smooth).verdict == HOLDS
+    found = tuple(fig4_approach.approach(r) for r in (20.0, 100.0))
+    smooth = fig4_approach.approach(100.0, "rk4")
+    assert fig4_approach.before_ninety(found, smooth).verdict == HOLDS
     none = tuple(replace(a, roll=0.0 * a.roll, heading=1e-12 + 0.0 * a.heading) for a in found)
-    assert fig4.before_ninety(none, smooth).verdict == DOES_NOT_HOLD
+    assert fig4_approach.before_ninety(none, smooth).verdict == DOES_NOT_HOLD
 
 
 def test_instability_turns_where_the_error_falls_with_the_rate():
@@ -222,8 +229,8 @@ def test_fig6_costs_what_the_rate_costs(made):
 def test_the_reason_turns_with_its_numbers():
     slow = fig6.AtRate(20.0, 17.6, 8.9, 0.8, 1.0, 170.0)
     fast = replace(slow, rate=1000.0, dropped=0.007)
-    poor = fig6.SensorCost("poor", 8.0, 0.001, 20.0, 0.05)
-    fine = fig6.SensorCost("fine", 0.001, 0.001, 0.01, 0.01)
+    poor = phone_sensors.SensorCost("poor", 8.0, 0.001, 20.0, 0.05)
+    fine = phone_sensors.SensorCost("fine", 0.001, 0.001, 0.01, 0.01)
     assert fig6.rate_is_the_reason(slow, fast, (fine,)).verdict == HOLDS
     assert fig6.rate_is_the_reason(slow, fast, (poor,)).verdict == HOLDS_WHEN
     assert fig6.rate_is_the_reason(slow, slow, (fine,)).verdict == DOES_NOT_HOLD
@@ -232,19 +239,19 @@ def test_the_reason_turns_with_its_numbers():
     assert other(slow, 1e-12, (fine,)).verdict == HOLDS_WHEN
     assert other(replace(slow, cubic=17.0, rotation_vector=17.0), 0.0, (fine,)).verdict == HOLDS
     assert other(slow, 1.0, (fine,)).verdict == DOES_NOT_HOLD
-    assert fig6.stable_at_rest((fine,)).verdict == HOLDS
-    assert fig6.stable_at_rest((poor,)).verdict == HOLDS_WHEN
-    assert fig6.stable_at_rest((replace(poor, resting_free=3.0),)).verdict == DOES_NOT_HOLD
+    assert phone_sensors.stable_at_rest((fine,)).verdict == HOLDS
+    assert phone_sensors.stable_at_rest((poor,)).verdict == HOLDS_WHEN
+    assert phone_sensors.stable_at_rest((replace(poor, resting_free=3.0),)).verdict == DOES_NOT_HOLD
 
 
 def test_a_return_hides_a_scale_factor():
-    at_return, largest = fig6.scale_seen(0.03)
+    at_return, largest = reference_points.scale_seen(0.03)
     # Three per cent of 90° and half a step of the trapezoid at either edge: 0.45° at 100 Hz.
     assert largest == pytest.approx(2.7, abs=0.46)
     assert at_return < 1e-9
-    assert fig6.reference_points(at_return, largest, 17.0, 18.0).verdict == HOLDS_WHEN
-    assert fig6.reference_points(largest, largest, 17.0, 18.0).verdict == HOLDS
-    assert fig6.reference_points(0.0, largest, 0.1, 18.0).verdict == DOES_NOT_HOLD
+    assert reference_points.reference_points(at_return, largest, 17.0, 18.0).verdict == HOLDS_WHEN
+    assert reference_points.reference_points(largest, largest, 17.0, 18.0).verdict == HOLDS
+    assert reference_points.reference_points(0.0, largest, 0.1, 18.0).verdict == DOES_NOT_HOLD
 
 
 # --- growth ---------------------------------------------------------------------------------
@@ -273,11 +280,11 @@ def test_the_laws_are_measured_and_not_assumed():
 
 
 def test_who_leads_when():
-    assert growth.gyros_lead({"a": 3.0}).verdict == HOLDS_WHEN
-    assert growth.gyros_lead({"a": 0.0}).verdict == HOLDS
-    assert growth.gyros_lead({"a": np.inf}).verdict == DOES_NOT_HOLD
-    assert growth.earth_rate_small({"a": 1.0}).verdict == HOLDS_WHEN
-    assert growth.earth_rate_small({"a": 0.001}).verdict == DOES_NOT_HOLD
+    assert biases.gyros_lead({"a": 3.0}).verdict == HOLDS_WHEN
+    assert biases.gyros_lead({"a": 0.0}).verdict == HOLDS
+    assert biases.gyros_lead({"a": np.inf}).verdict == DOES_NOT_HOLD
+    assert biases.earth_rate_small({"a": 1.0}).verdict == HOLDS_WHEN
+    assert biases.earth_rate_small({"a": 0.001}).verdict == DOES_NOT_HOLD
 
 
 # --- formulas, effort, motions --------------------------------------------------------------
