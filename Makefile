@@ -7,7 +7,7 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds check format bench docs messages clean
+.PHONY: demo test test-slow test-bounds check format bench docs messages statements clean
 .DEFAULT_GOAL := help
 
 help:
@@ -60,6 +60,9 @@ bench: $(VENV)/.dev
 
 messages: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) tests/cli/test_messages.py
+
+statements: $(VENV)/.test
+	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

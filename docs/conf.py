@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from docutils import nodes
+from docutils.parsers.rst import Directive
 from docutils.utils.math.latex2mathml import tex2mathml
 
 from strapdown import __version__
@@ -40,15 +42,26 @@ html_math_renderer = "mathml"
 
 def _math(self: Any, node: Any) -> None:
     """Write a formula as MathML, which browsers set themselves: no script to load."""
-    from docutils import nodes
-
     block = isinstance(node, nodes.math_block)
     text = tex2mathml(node.astext(), as_block=block)
     self.body.append(f'<div class="math">{text}</div>' if block else text)
     raise nodes.SkipNode
 
 
+class CodeCell(Directive):
+    """A cell of a notebook kept as text, shown as the Python that it is."""
+
+    has_content = True
+    optional_arguments = 1
+
+    def run(self) -> list[Any]:
+        """Return the cell as a block of code."""
+        text = "\n".join(self.content)
+        return [nodes.literal_block(text, text, language="python")]
+
+
 def setup(app: Any) -> dict[str, bool]:
-    """Register the writer of formulas."""
+    """Register the writer of formulas, and cells of notebooks."""
+    app.add_directive("code-cell", CodeCell)
     app.add_html_math_renderer("mathml", (_math, None), (_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,13 +1,18 @@
-"""Run every shell example of the manual and compare what it prints with what is written.
+"""Run every example of the manual and compare what it prints with what is written.
 
 ``python docs/run_examples.py`` says where they differ; ``--write`` puts what was printed into the
 pages. Each page has a temporary folder of its own, in which its examples run in order. A line
 that is ``…`` alone stands for any number of lines, and ``…`` in a line for any text. Recordings
 are looked for where STRAPDOWN_DATA points; a page that needs them is left out without it.
+
+The pages in ``notebooks`` are notebooks kept as text (jupytext's form "myst"). Their cells run in
+order in one Python process; what a cell prints, and the value of its last line, is compared with
+the ``text`` block under it.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -17,6 +22,33 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.M | re.S)
+CELL = re.compile(
+    r"^```\{code-cell\} ipython3\n(?P<code>.*?)^```\n(?P<shown>\n```text\n(?P<out>.*?)^```\n)?",
+    re.M | re.S,
+)
+# Runs the cells that it is given as JSON; tells what each printed, and where one failed.
+RUNNER = """
+import ast, contextlib, io, json, sys, traceback
+space, printed = {"__name__": "__main__"}, []
+for code in json.load(sys.stdin):
+    out = io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
+        try:
+            body = ast.parse(code)
+            last = body.body[-1] if body.body else None
+            value = isinstance(last, ast.Expr)
+            if value:
+                body.body.pop()
+            exec(compile(body, "cell", "exec"), space)
+            if value:
+                shown = eval(compile(ast.Expression(last.value), "cell", "eval"), space)
+                if shown is not None:
+                    print(repr(shown))
+        except Exception:
+            traceback.print_exc()
+    printed.append(out.getvalue())
+json.dump(printed, sys.stdout)
+"""
 # Rounding noise, which another processor makes otherwise.
 NOISE = re.compile(r"\d\.\d+e-1\d")
 
@@ -76,9 +108,53 @@ def trimmed(expected: list[str], printed: list[str]) -> list[str]:
     return ["…"] * (first > 0) + printed[first:last] + ["…"] * (last < len(printed))
 
 
+def run_cells(cells: list[str], folder: Path) -> list[list[str]]:
+    """Return the lines that each cell prints, run in order in one process."""
+    done = subprocess.run(
+        [sys.executable, "-c", RUNNER],
+        cwd=folder,
+        env=os.environ | {"COLUMNS": "110"},
+        input=json.dumps(cells),
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = []
+    for out in json.loads(done.stdout):
+        lines = [line.rstrip() for line in out.replace(str(folder), "…").splitlines()]
+        found.append("\n".join(lines).strip("\n").splitlines())
+    return found
+
+
+def check_notebook(page: Path, write: bool) -> int:
+    """Run the cells of a notebook kept as text; return how many print something else."""
+    text = page.read_text(encoding="utf-8")
+    blocks = list(CELL.finditer(text))
+    with tempfile.TemporaryDirectory() as folder:
+        printed = run_cells([b["code"] for b in blocks], Path(folder))
+    differ, pieces, last = 0, [], 0
+    for block, lines in zip(blocks, printed, strict=True):
+        good = same((block["out"] or "").splitlines(), lines)
+        pieces.append(text[last : block.start()])
+        last = block.end()
+        if good:
+            pieces.append(block[0])
+            continue
+        differ += 1
+        print(f"{page.name}: {block['code']}" + "\n".join(f"  {line}" for line in lines))
+        cell = block[0][: len(block[0]) - len(block["shown"] or "")]
+        shown = "\n```text\n" + "".join(f"{line}\n" for line in lines) + "```\n"
+        pieces.append(cell + (shown if lines else ""))
+    if write and differ:
+        page.write_text("".join([*pieces, text[last:]]), encoding="utf-8")
+    return differ
+
+
 def check(page: Path, write: bool) -> int:
     """Run the examples of one page; return how many differ."""
     text = page.read_text(encoding="utf-8")
+    if CELL.search(text):
+        return check_notebook(page, write)
     blocks = list(BLOCK.finditer(text))
     if not blocks or ("$STRAPDOWN_DATA/" in text and not os.environ.get("STRAPDOWN_DATA")):
         return 0
@@ -101,5 +177,8 @@ def check(page: Path, write: bool) -> int:
 
 
 if __name__ == "__main__":
-    pages = [Path(a) for a in sys.argv[1:] if a != "--write"] or sorted(HERE.glob("*.md"))
+    pages = [Path(a) for a in sys.argv[1:] if a != "--write"] or [
+        *sorted(HERE.glob("*.md")),
+        *sorted(HERE.glob("notebooks/*.md")),
+    ]
     sys.exit(1 if sum(check(page, "--write" in sys.argv) for page in pages) else 0)

@@ -25,18 +25,28 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from strapdown.formats import read_log
     from strapdown.report.attitude import write_attitude
+    from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
     from strapdown.systems.attitude_bench import bench_attitude
 
 __version__ = "0.1.0"
 
-__all__ = ["__version__", "bench_attitude", "read_log", "simulate", "verify", "write_attitude"]
+__all__ = [
+    "__version__",
+    "bench_attitude",
+    "read_log",
+    "reproduce",
+    "simulate",
+    "verify",
+    "write_attitude",
+]
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
     "bench_attitude": "strapdown.systems.attitude_bench",
     "read_log": "strapdown.formats",
+    "reproduce": "strapdown.report.reproduction",
     "simulate": "strapdown.report.simulation",
     "verify": "strapdown.report.verify",
     "write_attitude": "strapdown.report.attitude",

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from strapdown.exceptions import ConfigError
 
-__all__ = ["AttitudeSpec", "LogSpec", "ScenarioSpec", "SimulateSpec", "specify"]
+__all__ = ["AttitudeSpec", "LogSpec", "ReproduceSpec", "ScenarioSpec", "SimulateSpec", "specify"]
 
 
 class Spec(BaseModel):
@@ -68,6 +68,12 @@ class SimulateSpec(Spec):
 
     scenario: ScenarioSpec
     formats: tuple[str, ...] = ("csv",)
+
+
+class ReproduceSpec(Spec):
+    """One paper re-made; everything else is fixed in the code."""
+
+    paper: str
 
 
 S = TypeVar("S", bound=Spec)

@@ -29,7 +29,9 @@ def test_dir_and_an_unknown_name_load_nothing_either():
     assert loaded_after(code) == set()
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["attitude", "--help"], ["--version"]])
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["attitude", "--help"], ["reproduce", "--help"], ["--version"]]
+)
 def test_help_loads_nothing_heavy(arguments):
     code = (
         f"import sys\nsys.argv = ['strapdown', *{arguments!r}]\n"

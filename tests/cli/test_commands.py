@@ -13,7 +13,7 @@ import pytest
 
 from strapdown.cli.main import EXIT_CODES
 
-COMMANDS = ["attitude", "simulate", "verify", "modules", "demo"]
+COMMANDS = ["attitude", "simulate", "reproduce", "verify", "modules", "demo"]
 
 
 @pytest.fixture

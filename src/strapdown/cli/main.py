@@ -12,7 +12,7 @@ from typing import NoReturn
 import typer
 
 from strapdown import __version__
-from strapdown.cli import attitude, demo, modules, simulate, verify
+from strapdown.cli import attitude, demo, modules, reproduce, simulate, verify
 from strapdown.exceptions import Finding, StrapdownError
 
 EXIT_CODES = """
@@ -50,6 +50,7 @@ def main(
 
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
 app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
+app.command("reproduce", epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
 app.command("modules", epilog=modules.EPILOG)(modules.modules)
 app.command("demo", epilog=demo.EPILOG)(demo.demo)

@@ -24,10 +24,11 @@ from strapdown.bundle import (
     unsealed_changes,
     versions,
 )
-from strapdown.config import AttitudeSpec, SimulateSpec
+from strapdown.config import AttitudeSpec, ReproduceSpec, SimulateSpec
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.attitude import write_attitude
+from strapdown.report.reproduction import make_reproduction, write_reproduction
 from strapdown.report.simulation import write_simulation
 from strapdown.systems.attitude_bench import run_bench
 
@@ -71,8 +72,13 @@ def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]
     return write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
+def _rerun_reproduction(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    return write_reproduction(make_reproduction(ReproduceSpec.model_validate(configuration)), out)
+
+
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "attitude": _rerun_attitude,
+    "reproduce": _rerun_reproduction,
     "simulate": _rerun_simulation,
 }
 
