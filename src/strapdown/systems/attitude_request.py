@@ -121,6 +121,29 @@ def source_spec(
     return [specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)]
 
 
+def one_of_each(
+    sources: Iterable[ScenarioSpec | LogSpec],
+) -> list[ScenarioSpec | LogSpec]:
+    """Refuse a source that is named twice: it would count as two trials.
+
+    Raises
+    ------
+    ConfigError
+    """
+    found: list[ScenarioSpec | LogSpec] = []
+    for source in sources:
+        if source in found:
+            name = source.name if isinstance(source, ScenarioSpec) else source.path
+            raise ConfigError(
+                "it is named twice, and one trial does not count as two",
+                file=name,
+                quantity="source",
+                remedy="name each log once; of a scenario use --trials for more seeds",
+            )
+        found.append(source)
+    return found
+
+
 def exists(text: str) -> bool:
     """Tell whether a text is the path of something; sentences and odd characters are not."""
     if text in ("", "none", "rest", "rests"):
