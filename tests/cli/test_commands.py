@@ -79,7 +79,8 @@ def test_json_alone_is_json(here, run_cli):
     found = run_cli("attitude", "alexiev-fig4", "--json")
     result = json.loads(found.out)
     assert result == json.loads((here / "alexiev-fig4-attitude" / "attitude.json").read_text())
-    assert [a["algorithm"] for a in result["algorithms"]] == ["naive", "euler", "dcm", "quaternion"]
+    names = ["naive", "euler", "dcm", "quaternion", "rk4", "rotvec"]
+    assert [a["algorithm"] for a in result["algorithms"]] == names
     assert json.loads(run_cli("simulate", "alexiev-fig2a", "--json").out)["rate_hz"] == 100.0
     verdict = json.loads(run_cli("verify", "alexiev-fig4-attitude", "--json").out)["verdict"]
     assert verdict == "identical"
