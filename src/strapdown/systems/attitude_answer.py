@@ -180,9 +180,7 @@ def _limited_by_sensor(
     of_truth = evidence.sensor is not None and sensor <= evidence.sensor[2]
     off_at_start = evidence.start > UNSEEN * sensor
     if off_at_start:
-        whose = (
-            f"sensor and start make {_deg(sensor)}, and the start is {_deg(evidence.start)} off"
-        )
+        whose = f"sensor and start make {_deg(sensor)}, and the start is {_deg(evidence.start)} off"
     elif of_truth and evidence.exact:
         whose = f"the sensor alone makes {_deg(sensor)}"
     elif of_truth:

@@ -105,7 +105,7 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
                 "algorithm": name,
                 "mean_deg": mean,
                 # An angle between attitudes is not negative, and neither is its mean.
-                "low_deg": max(0.0, mean - spread),
+                "low_deg": float(np.maximum(0.0, mean - spread)),
                 "high_deg": mean + spread,
                 "luck": luck,
             }
