@@ -48,6 +48,7 @@ from strapdown.systems.attitude_sweep import (
     Grounds,
     choose_factors,
     error_at_full_rate,
+    refuse_no_rate,
     sweep_rates,
 )
 from strapdown.systems.attitude_trials import gather, trial_names, worst_sweep
@@ -78,7 +79,7 @@ def bench_attitude(
     rate: float | None = None,
     sampling: str | None = None,
     seed: int | None = None,
-    sensor: str | None = None,
+    sensor: str | Path | None = None,
     columns: dict[str, str] | None = None,
     gyro_unit: str | None = None,
     accel_unit: str | None = None,
@@ -128,7 +129,7 @@ def bench_attitude(
         What a row holds: the rate at its stamp, or its mean over the interval ending there.
     seed : int, optional
         Of a scenario's noise; 0 if not given.
-    sensor : str, optional
+    sensor : str or Path, optional
         Of a scenario: a sensor of the catalogue, or a file like its entries.
     columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
@@ -158,6 +159,8 @@ def bench_attitude(
     sources = as_texts(source)
     if not sources:
         raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+    for one in rates:
+        refuse_no_rate(float(one))
     reading = {
         "columns": columns or None,
         "gyro_unit": gyro_unit,

@@ -47,7 +47,7 @@ def source_spec(
     sampling: str | None,
     trials: int = 1,
     rates: Sequence[float] = (),
-    sensor: str | None = None,
+    sensor: str | Path | None = None,
 ) -> list[ScenarioSpec] | list[LogSpec]:
     """Specify a scenario, as often as there are trials, or a log.
 
@@ -64,7 +64,7 @@ def source_spec(
         Seeds of a scenario.
     rates : sequence of float, Hz
         That will be tried; a scenario without a rate is sampled at the highest.
-    sensor : str or None
+    sensor : str, Path or None
         Of a scenario.
 
     Returns
@@ -97,7 +97,7 @@ def source_spec(
                 rate_hz=highest if rate is None else rate,
                 sampling=(sampling or "instantaneous").lower(),
                 seed=first + k,
-                sensor=sensor,
+                sensor=None if sensor is None else str(sensor),
             )
             for k in range(trials)
         ]
