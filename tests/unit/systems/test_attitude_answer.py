@@ -12,7 +12,7 @@ from strapdown import bench_attitude
 from strapdown.attitude import make_algorithm
 from strapdown.attitude.cost import count_cost
 from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+from strapdown.simulation import SCENARIOS, ImuErrors, find_scenario, simulate_imu
 from strapdown.systems.attitude_answer import Evidence, choices, find_answer
 from strapdown.tables import imu_table
 
@@ -338,3 +338,14 @@ def test_the_tolerance_moves_the_answer(turned):
         assert answer.tolerance_deg == tolerance
     assert rates == sorted(rates, reverse=True)
     assert len(set(rates)) > 2
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_scenario_has_an_answer(name):
+    bench = bench_attitude(name, algorithms=["naive", "quaternion"], rates=[100])
+    answer = bench.answer
+    assert answer.verdict in ("enough", "sensor", "rate")
+    error = bench.sweep.set_index("algorithm")["error_deg"]
+    assert (answer.verdict == "enough") == bool((error <= 1.0).any())
+    assert answer.sentence.endswith(".")
+    assert all(text.endswith((".", ").")) for text in (*answer.why, *answer.helps))
