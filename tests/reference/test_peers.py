@@ -13,8 +13,8 @@ import pytest
 from strapdown import read_log, rotation
 from strapdown.attitude import Quaternion, run_attitude
 from strapdown.increments import increments_from_imu
-from strapdown.peers import MAG, PEERS, available_peers, run_peers
-from strapdown.tables import QUATERNION
+from strapdown.peers import PEERS, available_peers, run_peers
+from strapdown.tables import MAG, QUATERNION
 
 ROTATION = ["02_undisturbed_slow_rotation_B", "07_undisturbed_fast_rotation_B"]
 TRANSLATION = "14_undisturbed_slow_translation_with_breaks_B"

@@ -11,8 +11,8 @@ import pytest
 
 from strapdown import rotation
 from strapdown.exceptions import StrapdownError
-from strapdown.peers import MAG, PEERS, align_heading
-from strapdown.tables import EULER, QUATERNION, imu_table
+from strapdown.peers import PEERS, align_heading
+from strapdown.tables import EULER, MAG, QUATERNION, imu_table
 
 START = rotation.quaternion_from_euler([20.0, -35.0, 130.0])
 RATE = 0.6  # rad/s

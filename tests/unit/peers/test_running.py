@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.peers import AIDINGS, MAG, PEERS, available_peers, run_peers
-from strapdown.tables import QUATERNION, imu_table
+from strapdown.peers import AIDINGS, PEERS, available_peers, run_peers
+from strapdown.tables import MAG, QUATERNION, imu_table
 
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
