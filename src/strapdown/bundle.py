@@ -214,11 +214,21 @@ def _manifest(
         for file, digest in zip(item.files, item.digests, strict=True):
             _refuse_changed(file, digest)
     copy = sum(f.stat().st_size for i in inputs for f in i.files) <= COPY_LIMIT
-    kept, moved = [], {}
+    kept: list[dict[str, Any]] = []
+    moved: dict[str, str] = {}
+    places: dict[Path, Path] = {}
     for item in inputs:
-        root = Path("inputs") / item.role
         # The name that was given; a link's target may have lost its ending.
-        place = root / (item.path.name or item.path.resolve().name)
+        own = item.path.name or item.path.resolve().name
+        place = Path("inputs") / item.role / own
+        # Several logs may have one name, and one file may have been read for each of them.
+        number = 2
+        while places.get(place, item.path) != item.path:
+            place = Path("inputs") / f"{item.role}-{number}" / own
+            number += 1
+        if place in places:
+            continue
+        places[place] = item.path
         for file, digest in zip(item.files, item.digests, strict=True):
             name = place / file.relative_to(item.path) if item.path.is_dir() else place
             if copy:
@@ -257,12 +267,27 @@ def _refuse_changed(file: Path, digest: str) -> None:
 def _replace_paths(value: Any, moved: dict[str, str]) -> Any:
     if isinstance(value, dict):
         return {
-            k: moved.get(v, v)
-            if k.endswith("path") and isinstance(v, str)
-            else _replace_paths(v, moved)
+            k: moved.get(v, v) if names_file(k, v) else _replace_paths(v, moved)
             for k, v in value.items()
         }
+    if isinstance(value, list):
+        return [_replace_paths(v, moved) for v in value]
     return value
+
+
+def names_file(key: str, value: Any) -> bool:
+    """Tell whether a value of a configuration is the path of an input.
+
+    Parameters
+    ----------
+    key : str
+        Name of the field.
+    value : object
+        A path; or of a sensor a file's path, which ends as such, or a name of the catalogue.
+    """
+    if not isinstance(value, str):
+        return False
+    return key.endswith("path") or (key == "sensor" and value.lower().endswith(".toml"))
 
 
 def _files(root: Path) -> list[str]:

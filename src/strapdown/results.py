@@ -329,7 +329,7 @@ class InputFiles:
     Attributes
     ----------
     role : str
-        ``log``, ``truth`` or ``gyro-bias``.
+        ``log``, ``truth``, ``gyro-bias``, ``reference-log`` or ``sensor``.
     path : Path
         As it was given: a file, or a folder.
     files : tuple of Path

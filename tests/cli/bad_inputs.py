@@ -350,6 +350,52 @@ CASES = [
         lambda f: text(f / "log.csv", rows()),
         ("--gyro-bias", "rest"),
     ),
+    Case("Rates that are none", lambda f: text(f / "log.csv", rows()), ("--rates", "fast")),
+    Case("A negative rate", lambda f: text(f / "log.csv", rows()), ("--rates", "-5")),
+    Case(
+        "A rate that leaves nothing to judge",
+        lambda f: text(f / "log.csv", rows()),
+        ("--rates", "1"),
+    ),
+    Case(
+        "Rates that are not a whole part of the log's",
+        lambda f: text(f / "log.csv", rows()),
+        ("--rates", "70,30"),
+        False,
+    ),
+    Case("A tolerance of nothing", lambda f: text(f / "log.csv", rows()), ("--tolerance-deg", "0")),
+    Case("No trials", lambda f: text(f / "log.csv", rows()), ("--trials", "0")),
+    Case("A log, to be drawn again", lambda f: text(f / "log.csv", rows()), ("--trials", "3")),
+    Case(
+        "A log, with the errors of a sensor",
+        lambda f: text(f / "log.csv", rows()),
+        ("--sensor", "mpu-6050"),
+    ),
+    Case(
+        "Reference points at rests that there are not",
+        lambda f: text(f / "log.csv", rows()),
+        ("--reference", "rests"),
+    ),
+    Case(
+        "A second log that is not there",
+        lambda f: text(f / "log.csv", rows()),
+        ("--reference-log", "second.csv"),
+    ),
+    Case(
+        "A library that is none",
+        lambda f: text(f / "log.csv", rows()),
+        ("--peers", "vqff"),
+    ),
+    Case(
+        "C code into a folder that is not there",
+        lambda f: text(f / "log.csv", rows()),
+        ("--export-c", "missing/attitude.c"),
+    ),
+    Case(
+        "C code over something else",
+        lambda f: text(f / "log.csv", rows()),
+        ("--export-c", "log.csv", "--force"),
+    ),
     Case(
         "An algorithm that is none",
         lambda f: text(f / "log.csv", rows()),

@@ -228,7 +228,7 @@ def attitude(
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.formats.columns import parse_column_option
     from strapdown.report.attitude import attitude_json, write_attitude
-    from strapdown.report.attitude_c import check_c, write_c
+    from strapdown.report.attitude_c import check_c, chosen_for_c, write_c
     from strapdown.systems.attitude_bench import bench_attitude
 
     folder = out or Path(f"{Path(sources[0]).resolve().stem}-attitude")
@@ -262,6 +262,8 @@ def attitude(
             to_s=to_s,
             progress=report,
         )
+        if export_c is not None:
+            chosen_for_c(bench)
         report("writing", 0.95)
         seal = write_attitude(bench, folder, force=force, png=png)
         if export_c is not None:

@@ -20,10 +20,18 @@ def check_c(path: Path | None, force: bool) -> None:
     Raises
     ------
     ConfigError
-        It exists and may not be replaced, or its folder does not.
+        It is no name of a C file, it exists and may not be replaced, or its folder does not.
     """
     if path is None:
         return
+    if path.suffix.lower() not in (".c", ".h"):
+        # What --force replaces might else be the log itself.
+        raise ConfigError(
+            "it is no name of a C file",
+            file=str(path),
+            quantity="--export-c",
+            remedy="let it end in .c",
+        )
     if path.is_dir() or (path.exists() and not force):
         raise ConfigError(
             "it is there already",
@@ -38,6 +46,25 @@ def check_c(path: Path | None, force: bool) -> None:
             quantity="--export-c",
             remedy="make it first, or give another name",
         )
+
+
+def chosen_for_c(bench: AttitudeBench) -> str:
+    """Return the algorithm to export: the one that the answer names, or else the only one.
+
+    Raises
+    ------
+    ConfigError
+        The answer names none and there are several.
+    """
+    labels = [run.algorithm for run in bench.runs]
+    chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm
+    if chosen is None:
+        raise ConfigError(
+            "no algorithm was accurate enough to be chosen",
+            quantity="--export-c",
+            remedy="name one with --algorithms, or allow more with --tolerance-deg",
+        )
+    return chosen
 
 
 def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
@@ -62,14 +89,7 @@ def write_c(bench: AttitudeBench, path: Path, *, force: bool = False) -> str:
         The answer names none and there are several, or the file may not be written.
     """
     check_c(path, force)
-    labels = [run.algorithm for run in bench.runs]
-    chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm
-    if chosen is None:
-        raise ConfigError(
-            "no algorithm was accurate enough to be chosen",
-            quantity="--export-c",
-            remedy="name one with --algorithms, or allow more with --tolerance-deg",
-        )
+    chosen = chosen_for_c(bench)
     first = bench.runs[0].attitude[QUATERNION].to_numpy()
     start = _liveliest(bench)
     text = export_c(

@@ -12,7 +12,7 @@ from strapdown.config import ScenarioSpec, SimulateSpec, specify
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
-from strapdown.systems.attitude_source import scenario_errors, simulate_scenario
+from strapdown.systems.attitude_source import scenario_errors, sensor_file, simulate_scenario
 
 __all__ = ["simulate", "write_simulation"]
 
@@ -95,6 +95,7 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
         out,
         command="simulate",
         configuration=spec.model_dump(mode="json"),
+        inputs=sensor_file(spec.scenario),
         force=force,
         seals=seals,
     ) as folder:
@@ -113,7 +114,7 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
             "duration_s": scenario.motion.duration,
             **_describe_motion(scenario.motion),
             "references": scenario.references,
-            "sensor": spec.scenario.sensor,
+            "sensor": spec.scenario.sensor and Path(spec.scenario.sensor).name,
             "gyro_errors": _stated(errors.gyro, "rad_per_s"),
             "accel_errors": _stated(errors.accel or TriadErrors(), "m_per_s2"),
             "final_attitude": {

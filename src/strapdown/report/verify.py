@@ -19,6 +19,7 @@ from strapdown.bundle import (
     MANIFEST,
     Seal,
     machine,
+    names_file,
     read_manifest,
     sha256,
     unsealed_changes,
@@ -133,9 +134,10 @@ def _resolved(value: Any, root: Path) -> Any:
     """Configuration with the paths of copied inputs made absolute."""
     if isinstance(value, dict):
         return {
-            k: str(root / v) if k.endswith("path") and isinstance(v, str) else _resolved(v, root)
-            for k, v in value.items()
+            k: str(root / v) if names_file(k, v) else _resolved(v, root) for k, v in value.items()
         }
+    if isinstance(value, list):
+        return [_resolved(v, root) for v in value]
     return value
 
 

@@ -15,7 +15,10 @@ from strapdown.results import Answer, Cost
 # Where the sensor's error is beyond the tolerance, an algorithm's own error of this share of it
 # changes nothing that could be seen.
 UNSEEN = 0.1
-_WAYS = {"drop": "by leaving samples out", "sum": "by summing increments"}
+# What is suggested leaves at most this share of the error.
+WORTH = 0.9
+# Further up than this an order of accuracy says little.
+MOST_EXTRAPOLATED = 10.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class Evidence:
     with_cubic : float or None
         Error in deg that would be left with rates as cubics between their stamps, where they
         were chords.
+    start : float
+        What the attitude at the start is off by, deg, where that is known.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -50,6 +55,7 @@ class Evidence:
     exact: bool
     without_bias: float | None
     with_cubic: float | None
+    start: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -91,9 +97,9 @@ def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
     # By their own errors: a wrong algorithm may end nearer to the truth by luck.
     best = full.iloc[int(full["own_deg"].to_numpy().argmin())]
     sensor = _sensor_error(evidence, best)
-    if evidence.known and sensor is not None and sensor > tolerance_deg:
+    if sensor > tolerance_deg:
         return _limited_by_sensor(evidence, best, sensor, tolerance_deg)
-    return _limited_by_rate(evidence, best, tolerance_deg)
+    return _limited_by_rate(evidence, best, sensor, tolerance_deg)
 
 
 def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop") -> list[Choice]:
@@ -172,9 +178,13 @@ def _limited_by_sensor(
 ) -> Answer:
     limit = UNSEEN * sensor
     good = choices(evidence, "own_deg", limit)
-    if evidence.exact:
+    of_truth = evidence.sensor is not None and sensor <= evidence.sensor[2]
+    off_at_start = evidence.start > UNSEEN * sensor
+    if off_at_start:
+        whose = f"sensor and start make {_deg(sensor)}, and the start is {_deg(evidence.start)} off"
+    elif of_truth and evidence.exact:
         whose = f"the sensor alone makes {_deg(sensor)}"
-    elif evidence.sensor is not None:
+    elif of_truth:
         whose = f"the sensor makes {_deg(sensor)}, by the most accurate algorithm"
     else:
         whose = (
@@ -197,7 +207,10 @@ def _limited_by_sensor(
         )
         why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
     helps = []
-    if evidence.without_bias is not None and evidence.without_bias < float(best["error_deg"]):
+    if off_at_start:
+        helps.append("Another attitude at the start: --initial says where it comes from.")
+    bias_helps = WORTH * float(best["error_deg"])
+    if evidence.without_bias is not None and evidence.without_bias < bias_helps:
         helps.append(
             "Remove the gyro's bias: with that of the first rest taken off (--gyro-bias rest) "
             f"{_deg(evidence.without_bias)} would be left."
@@ -211,7 +224,9 @@ def _limited_by_sensor(
     return Answer("sensor", sentence, tolerance, algorithm, meaning, rate, tuple(why), tuple(helps))
 
 
-def _limited_by_rate(evidence: Evidence, best: pd.Series, tolerance: float) -> Answer:
+def _limited_by_rate(
+    evidence: Evidence, best: pd.Series, sensor: float, tolerance: float
+) -> Answer:
     error, rate = float(best["error_deg"]), float(best["rate_hz"])
     sentence = (
         f"No algorithm stays within {tolerance:g}° at {rate:.4g} Hz: the best, "
@@ -224,10 +239,13 @@ def _limited_by_rate(evidence: Evidence, best: pd.Series, tolerance: float) -> A
             "Rates that run as cubics between their stamps (--interpolation cubic): "
             f"{_deg(evidence.with_cubic)} would be left."
         )
-    if order and np.isfinite(error):
+    own = float(best["own_deg"])
+    # What the sensor makes stays, whatever the rate.
+    left = tolerance - sensor
+    if order and np.isfinite(own) and own <= MOST_EXTRAPOLATED**order * left:
         # From rates by the trapezoid no algorithm is of more than second order.
         order = order if evidence.with_cubic is None else min(order, 2)
-        needed = rate * (error / tolerance) ** (1.0 / order)
+        needed = rate * max(1.0, own / left) ** (1.0 / order)
         helps.append(
             f"A higher rate: on smooth motion about {_two_digits(needed)} Hz, by its order of "
             "accuracy."
@@ -236,13 +254,16 @@ def _limited_by_rate(evidence: Evidence, best: pd.Series, tolerance: float) -> A
     return Answer("rate", sentence, tolerance, None, None, None, (), tuple(helps))
 
 
-def _sensor_error(evidence: Evidence, best: pd.Series) -> float | None:
-    """Error that the sensor makes: against the truth, else what the algorithm's own leaves."""
-    if evidence.sensor is not None:
-        return evidence.sensor[2]
+def _sensor_error(evidence: Evidence, best: pd.Series) -> float:
+    """Error that the sensor makes: against the truth, and what the algorithm's own leaves.
+
+    A reference point may be further off than the truth, where there are both.
+    """
     if not evidence.known:
-        return None
-    return max(0.0, float(best["error_deg"]) - float(best["own_deg"]))
+        return 0.0
+    of_truth = 0.0 if evidence.sensor is None else evidence.sensor[2]
+    judged = best["error_deg"] if evidence.sensor is None else best["reference_deg"]
+    return max(of_truth, float(np.nan_to_num(judged - best["own_deg"])))
 
 
 def _why_not_lower(

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.attitude import AttitudeAlgorithm, RotationVector, make_algorithm, run_attitude
 from strapdown.attitude.cost import count_cost
 from strapdown.config import AttitudeSpec, specify
@@ -30,6 +31,7 @@ from strapdown.systems.attitude_request import (
     as_text,
     as_texts,
     exists,
+    one_of_each,
     sort_references,
     source_spec,
 )
@@ -46,6 +48,7 @@ from strapdown.systems.attitude_sweep import (
     Grounds,
     choose_factors,
     error_at_full_rate,
+    refuse_no_rate,
     sweep_rates,
 )
 from strapdown.systems.attitude_trials import gather, trial_names, worst_sweep
@@ -76,7 +79,7 @@ def bench_attitude(
     rate: float | None = None,
     sampling: str | None = None,
     seed: int | None = None,
-    sensor: str | None = None,
+    sensor: str | Path | None = None,
     columns: dict[str, str] | None = None,
     gyro_unit: str | None = None,
     accel_unit: str | None = None,
@@ -126,7 +129,7 @@ def bench_attitude(
         What a row holds: the rate at its stamp, or its mean over the interval ending there.
     seed : int, optional
         Of a scenario's noise; 0 if not given.
-    sensor : str, optional
+    sensor : str or Path, optional
         Of a scenario: a sensor of the catalogue, or a file like its entries.
     columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
@@ -156,6 +159,8 @@ def bench_attitude(
     sources = as_texts(source)
     if not sources:
         raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+    for one in rates:
+        refuse_no_rate(float(one))
     reading = {
         "columns": columns or None,
         "gyro_unit": gyro_unit,
@@ -164,7 +169,7 @@ def bench_attitude(
         "axes": axes,
         "repair": repair or None,
     }
-    first, *others = (
+    first, *others = one_of_each(
         one
         for text in sources
         for one in source_spec(text, rate, seed, reading, sampling, trials, rates, sensor)
@@ -217,15 +222,13 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
     judged = []
     for k, one in enumerate(specs):
         judged.append(_bench(one, _part_of(progress, k, len(specs))))
-    bench, evidence = judged[0]
+    bench = judged[0][0]
     if len(judged) == 1:
         return bench
     benches = [b for b, _ in judged]
     names = trial_names([s.source for s in specs])
     sweep = worst_sweep([b.sweep for b in benches])
-    known = [e.sensor for _, e in judged if e.sensor is not None]
-    worst = max(known, key=lambda e: e[2]) if len(known) == len(judged) else None
-    together = replace(evidence, sweep=sweep, sensor=worst, without_bias=None, with_cubic=None)
+    together = _together([e for _, e in judged], sweep)
     return replace(
         bench,
         specification=spec.model_dump(mode="json"),
@@ -236,8 +239,47 @@ def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench
             replace(f, file=f.file or name)
             for b, name in zip(benches, names, strict=True)
             for f in b.findings
-        ),
+        )
+        + _not_judged(judged, names),
         inputs=tuple(item for b in benches for item in b.inputs),
+    )
+
+
+def _together(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidence:
+    """What an answer for several trials rests on: the worst of them."""
+    sensors = [e.sensor for e in evidence if e.sensor is not None]
+    return replace(
+        evidence[0],
+        sweep=sweep,
+        sensor=max(sensors, key=lambda e: e[2]) if sensors else None,
+        known=any(e.known for e in evidence),
+        exact=all(e.exact for e in evidence),
+        without_bias=_worst([e.without_bias for e in evidence]),
+        with_cubic=_worst([e.with_cubic for e in evidence]),
+        start=max(e.start for e in evidence),
+    )
+
+
+def _worst(errors: Sequence[float | None]) -> float | None:
+    """The largest, where all of them are known."""
+    known = [e for e in errors if e is not None]
+    return max(known) if len(known) == len(errors) else None
+
+
+def _not_judged(
+    judged: Sequence[tuple[AttitudeBench, Evidence]], names: Sequence[str]
+) -> tuple[Finding, ...]:
+    """Say which trials have nothing known, where others have."""
+    if not any(e.known for _, e in judged):
+        return ()
+    return tuple(
+        Finding(
+            "nothing is known of its attitude: there the algorithms' own errors are judged",
+            file=name,
+            quantity="reference",
+        )
+        for (_, e), name in zip(judged, names, strict=True)
+        if not e.known
     )
 
 
@@ -283,7 +325,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
             file=source.name,
             remedy="give another --initial",
         )
-    if second is not None:
+    if second is not None and source.truth is None:
         source = truth_of_second(source, second, imu, q_nb)
     findings = [*source.findings, *findings]
     increments = increments_from_imu(imu, spec.interpolation)
@@ -312,11 +354,12 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         algorithms=algorithms,
         costs=costs,
         sweep=sweep,
-        sensor=best_error(grounds.own, known, imu, q_nb),
+        sensor=best_error(grounds.own, known, imu, q_nb, spec.interpolation),
         known=known is not None or bool(len(references)),
         exact=grounds.own.exact,
         without_bias=_without_bias(grounds, bias, rests),
         with_cubic=_with_cubic(grounds),
+        start=_start_error(known, q_nb),
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     truth, scored = source.truth, source.scored
@@ -367,6 +410,13 @@ def _grounds(
     clean = None if source.clean is None else source.clean.loc[imu.index]
     own = own_truth(imu, clean, known, q_nb, spec.interpolation)
     return Grounds(imu, q_nb, own, known, references, spec.interpolation), known
+
+
+def _start_error(known: Known | None, q_nb: Array) -> float:
+    """What the run's first attitude is off by, in deg, where that is known."""
+    if known is None or not known.counts[0]:
+        return 0.0
+    return float(rotation.unit_rotation_angle(q_nb[None], known.q_nb[:1])[0])
 
 
 def _without_bias(

@@ -9,11 +9,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config import AttitudeSpec, ScenarioSpec
+from strapdown.evaluation.known import known_at
 from strapdown.evaluation.place_references import PlaceReference, is_place, parse_place
 from strapdown.evaluation.reference_points import parse_reference
 from strapdown.evaluation.rest_references import same_pose_candidates, tilt_references
 from strapdown.evaluation.second_log import align_second_log
-from strapdown.evaluation.second_log_truth import truth_from_second_log
+from strapdown.evaluation.second_log_truth import second_clock, truth_from_second_log
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.recording import Recording
@@ -112,7 +113,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     Returns
     -------
     source : Source
-        The part that both cover.
+        The part that both cover; with a truth, where the second log has one itself.
     second : Second or None
 
     Raises
@@ -135,18 +136,27 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     inside = (source.imu.index >= aligned.start) & (source.imu.index <= aligned.end)
     findings = tuple(replace(f, file=f.file or recording.name) for f in recording.findings)
     inputs = input_files("reference-log", spec.reference_log_path, recording.files)
+    imu = source.imu[inside]
+    truth = scored = None
+    if recording.truth is not None and recording.scored is not None:
+        # It tells the attitude from the start, which a gyro alone cannot.
+        truth = truth_from_second_log(aligned, imu, recording.imu, attitude=recording.truth)
+        there = second_clock(aligned, truth.index)
+        scored = known_at(recording.truth, recording.scored, there).counts
     return replace(
         source,
-        imu=source.imu[inside],
-        truth=None,
-        scored=None,
+        imu=imu,
+        truth=truth,
+        scored=scored,
+        # What a second sensor says is no exact truth.
+        clean=None,
         findings=source.findings + findings,
         inputs=(*source.inputs, inputs),
     ), Second(recording, aligned)
 
 
 def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Array) -> Source:
-    """Take the second log's attitude for the truth.
+    """Take the attitude by the second log's rates for the truth.
 
     Parameters
     ----------
@@ -165,7 +175,7 @@ def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Arr
     rests = find_rests(second.recording.imu)
     bias = rests[0].gyro_mean if rests else (0.0, 0.0, 0.0)
     findings = source.findings
-    if not rests and second.recording.truth is None:
+    if not rests:
         findings += (
             Finding(
                 "no rest was found in it, so that its bias is in the truth that it gives",
@@ -178,7 +188,6 @@ def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Arr
         second.aligned,
         imu,
         second.recording.imu,
-        attitude=second.recording.truth,
         gyro_bias=bias,
         q_start=q_nb,
     )

@@ -47,7 +47,7 @@ def source_spec(
     sampling: str | None,
     trials: int = 1,
     rates: Sequence[float] = (),
-    sensor: str | None = None,
+    sensor: str | Path | None = None,
 ) -> list[ScenarioSpec] | list[LogSpec]:
     """Specify a scenario, as often as there are trials, or a log.
 
@@ -64,7 +64,7 @@ def source_spec(
         Seeds of a scenario.
     rates : sequence of float, Hz
         That will be tried; a scenario without a rate is sampled at the highest.
-    sensor : str or None
+    sensor : str, Path or None
         Of a scenario.
 
     Returns
@@ -97,7 +97,7 @@ def source_spec(
                 rate_hz=highest if rate is None else rate,
                 sampling=(sampling or "instantaneous").lower(),
                 seed=first + k,
-                sensor=sensor,
+                sensor=None if sensor is None else str(sensor),
             )
             for k in range(trials)
         ]
@@ -119,6 +119,29 @@ def source_spec(
         find_scenario(name)  # says which names there are
     said = {key: value for key, value in reading.items() if value is not None}
     return [specify(LogSpec, path=str(Path(text)), sampling=sampling, rate_hz=rate, **said)]
+
+
+def one_of_each(
+    sources: Iterable[ScenarioSpec | LogSpec],
+) -> list[ScenarioSpec | LogSpec]:
+    """Refuse a source that is named twice: it would count as two trials.
+
+    Raises
+    ------
+    ConfigError
+    """
+    found: list[ScenarioSpec | LogSpec] = []
+    for source in sources:
+        if source in found:
+            name = source.name if isinstance(source, ScenarioSpec) else source.path
+            raise ConfigError(
+                "it is named twice, and one trial does not count as two",
+                file=name,
+                quantity="source",
+                remedy="name each log once; of a scenario use --trials for more seeds",
+            )
+        found.append(source)
+    return found
 
 
 def exists(text: str) -> bool:

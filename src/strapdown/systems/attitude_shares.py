@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,6 @@ from strapdown.attitude import (
     AttitudeAlgorithm,
     RotationVector,
     attitude_history,
-    run_attitude,
 )
 from strapdown.attitude.single import run_single, single_increments
 from strapdown.evaluation.known import Errors, Known, angles_to_errors
@@ -36,7 +35,8 @@ class OwnTruth:
     Attributes
     ----------
     known : Known
-        On a simulation the exact attitude; on a log that of the most accurate algorithm.
+        On a simulation the exact attitude, turned to begin where the run does; on a log that of
+        the most accurate algorithm.
     clean : DataFrame or None
         The Imu table without the sensor's errors, on a simulation.
     """
@@ -75,7 +75,10 @@ def own_truth(
     OwnTruth
     """
     if clean is not None and truth is not None:
-        return OwnTruth(truth, clean)
+        # An algorithm is not to blame for a start that was given otherwise: the truth is turned
+        # to begin there.
+        start = rotation.compose(q_nb, rotation.conjugate(truth.q_nb[0]))
+        return OwnTruth(replace(truth, q_nb=rotation.compose(start, truth.q_nb)), clean)
     increments = increments_from_imu(imu, interpolation)
     best = attitude_history(MOST_ACCURATE, increments, q_nb)
     return OwnTruth(Known(best, np.ones(len(best), dtype=bool)), None)
@@ -155,8 +158,10 @@ def find_shares(
     return tuple(shares)
 
 
-def best_error(own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Array) -> Errors | None:
-    """Error against the truth that no algorithm can do away with: that of the sensor.
+def best_error(
+    own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Array, interpolation: str
+) -> Errors | None:
+    """Error against the truth that no algorithm can do away with: that of sensor and start.
 
     Parameters
     ----------
@@ -164,6 +169,7 @@ def best_error(own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Arra
     truth : Known or None
     imu : DataFrame
     q_nb : ndarray, (4,)
+    interpolation : str
 
     Returns
     -------
@@ -174,9 +180,9 @@ def best_error(own: OwnTruth, truth: Known | None, imu: pd.DataFrame, q_nb: Arra
         return None
     if own.clean is None:
         return truth.errors(own.known.q_nb)
-    run = run_attitude(MOST_ACCURATE, increments_from_imu(imu), q_nb)
-    clean = run_attitude(MOST_ACCURATE, increments_from_imu(own.clean), q_nb)
-    angle = rotation.unit_rotation_angle(
-        run.attitude[QUATERNION].to_numpy(), clean.attitude[QUATERNION].to_numpy()
+    with_errors, without = (
+        attitude_history(MOST_ACCURATE, increments_from_imu(table, interpolation), q_nb)
+        for table in (imu, own.clean)
     )
-    return angles_to_errors(angle)
+    sensor = rotation.compose(rotation.conjugate(without), with_errors)
+    return truth.errors(rotation.compose(own.known.q_nb, sensor))

@@ -19,7 +19,7 @@ from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.increments import increments_from_imu
 from strapdown.results import InputFiles, Reading
-from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
 
@@ -130,6 +130,13 @@ def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
     return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
 
 
+def sensor_file(spec: ScenarioSpec) -> tuple[InputFiles, ...]:
+    """The file that the sensor of a scenario was read from, where the catalogue has none."""
+    if spec.sensor is None or spec.sensor.lower() in SENSORS:
+        return ()
+    return (input_files("sensor", spec.sensor, (Path(spec.sensor),)),)
+
+
 def _scenario(spec: ScenarioSpec) -> Source:
     scenario = find_scenario(spec.name)
     imu, truth = simulate_scenario(spec)
@@ -145,14 +152,14 @@ def _scenario(spec: ScenarioSpec) -> Source:
     return Source(
         spec.name,
         f"simulated: {scenario.title} ({scenario.source})"
-        + (f", sensor {spec.sensor}" if spec.sensor else ""),
+        + (f", sensor {Path(spec.sensor).name}" if spec.sensor else ""),
         Origin(0, "s"),
         imu,
         truth,
         np.ones(len(truth), dtype=bool),
         (),
         (),
-        (),
+        sensor_file(spec),
         (float(lost.iloc[-1]), float(lost.max())),
         clean,
     )
@@ -215,6 +222,8 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
         source,
         truth=truth[inside],
         scored=np.ones(int(inside.sum()), dtype=bool),
+        # It need not be the scenario's own, which alone is exact.
+        clean=None,
         inputs=(*source.inputs, input_files("truth", spec.truth_path, (path,))),
     )
 

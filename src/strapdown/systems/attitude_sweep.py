@@ -57,6 +57,14 @@ class Grounds:
     interpolation: str
 
 
+def refuse_no_rate(rate: float) -> None:
+    """Raise ConfigError unless a rate in Hz is positive and finite."""
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise ConfigError(
+            f"{rate:g} Hz is no rate", quantity="--rates", remedy="use positive numbers"
+        )
+
+
 def choose_factors(
     imu: pd.DataFrame, rates: Sequence[float], findings: list[Finding]
 ) -> tuple[int, ...]:
@@ -86,10 +94,7 @@ def choose_factors(
         return tuple(f for f in FACTORS if f == 1 or steps // f >= LEAST_STEPS)
     factors = {1}
     for rate in rates:
-        if not (np.isfinite(rate) and rate > 0.0):
-            raise ConfigError(
-                f"{rate:g} Hz is no rate", quantity="--rates", remedy="use positive numbers"
-            )
+        refuse_no_rate(rate)
         factor = max(1, round(full / rate))
         if steps // factor < 2:
             raise ConfigError(

@@ -16,7 +16,13 @@ from strapdown.results import AttitudeBench, Trials
 Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
-_CELL = ["algorithm", "meaning", "factor"]
+_KIND = ["algorithm", "meaning"]
+_NUMBERS = [
+    *("rate_hz", "own_deg", "final_deg", "rms_deg"),
+    *("max_deg", "reference_deg", "error_deg"),
+]
+# Rates halve from cell to cell: one that is nearer than the root of two is the same.
+NEAR = 2.0**0.5
 
 
 def trial_names(sources: Sequence[ScenarioSpec | LogSpec]) -> list[str]:
@@ -99,7 +105,7 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
                 "algorithm": name,
                 "mean_deg": mean,
                 # An angle between attitudes is not negative, and neither is its mean.
-                "low_deg": max(0.0, mean - spread),
+                "low_deg": float(np.maximum(0.0, mean - spread)),
                 "high_deg": mean + spread,
                 "luck": luck,
             }
@@ -120,7 +126,7 @@ def _luck(worse_by: Array) -> float:
 
 
 def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """Cell by cell the largest errors of several sweeps, and the mean rate.
+    """Cell by cell the largest errors of several sweeps.
 
     Parameters
     ----------
@@ -130,18 +136,32 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        Of the cells that all of them have.
+        The cells of the first for which each of the others has a rate that is no more than
+        `NEAR` times higher; its highest such is taken. The rate of a cell is the highest among
+        those taken: each trial is judged at that rate or below.
 
     Raises
     ------
     ConfigError
-        They have none in common.
+        There is none.
     """
-    together = pd.concat(sweeps, ignore_index=True)
-    groups = together.groupby(_CELL, sort=False)
-    worst = groups.max(numeric_only=True)
-    worst["rate_hz"] = groups["rate_hz"].mean()
-    worst = worst[groups.size() == len(sweeps)].reset_index()
-    if worst.empty:
-        raise ConfigError("no rate is common to all trials", quantity="--rates")
-    return worst[list(sweeps[0].columns)]
+    first, *others = sweeps
+    rows = []
+    by_kind = [dict(list(other.groupby(_KIND))) for other in others]
+    for cell in first.to_dict("records"):
+        taken = [cell]
+        for kinds in by_kind:
+            cells = kinds[cell["algorithm"], cell["meaning"]]
+            near = cells[cells["rate_hz"] <= NEAR * cell["rate_hz"]]
+            if len(near):
+                taken.append(near.loc[near["rate_hz"].idxmax()])
+        if len(taken) == len(sweeps):
+            numbers = pd.DataFrame([[float(row[name]) for name in _NUMBERS] for row in taken])
+            rows.append(cell | dict(zip(_NUMBERS, numbers.max(), strict=True)))
+    if not rows:
+        raise ConfigError(
+            "no rate is common to all trials",
+            quantity="--rates",
+            remedy="name rates that all of them can have",
+        )
+    return pd.DataFrame(rows)[list(first.columns)]

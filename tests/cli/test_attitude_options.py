@@ -1,0 +1,146 @@
+"""The options of `strapdown attitude` that say what to run and to write."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from strapdown import simulate
+from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.simulation import ImuErrors, simulate_imu
+from strapdown.simulation.handling import Handling
+
+FEW = ["--algorithms", "naive quaternion", "--rates", "50,25"]
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("logs")
+    for name, scenario, rate in (
+        ("a", "gestures", 50),
+        ("b", "gestures", 100),
+        ("c", "alexiev-fig2e", 50),
+    ):
+        simulate(scenario, folder / name, rate=rate, formats=["csv"])
+    return {name: folder / name / "log.csv" for name in "abc"}
+
+
+def configuration(folder):
+    return json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["configuration"]
+
+
+def test_what_was_asked_for_is_what_was_run(here, run_cli):
+    found = run_cli(
+        *("attitude", "alexiev-fig2d", *FEW, "--tolerance-deg", "2.5", "--trials", "2"),
+        *("--seed", "7", "--sensor", "stim300", "--interpolation", "cubic", "--out", "out"),
+        "--quiet",
+    )
+    assert (found.code, found.err) == (0, "")
+    told = configuration(here / "out")
+    assert told["algorithms"] == ["naive", "quaternion"]
+    assert told["rates_hz"] == [50.0, 25.0]
+    assert told["tolerance_deg"] == 2.5
+    assert told["interpolation"] == "cubic"
+    scenarios = [told["source"], *told["also"]]
+    assert [(s["seed"], s["sensor"], s["rate_hz"]) for s in scenarios] == [
+        (7, "stim300", 50.0),
+        (8, "stim300", 50.0),
+    ]
+
+
+def test_all_algorithms(here, run_cli):
+    run_cli("attitude", "alexiev-fig2a", "--algorithms", "all", "--rates", "50", "--out", "out")
+    told = configuration(here / "out")["algorithms"]
+    assert told[:5] == ["naive", "euler", "dcm", "quaternion", "rk4"]
+    assert [t.split("=")[1] for t in told[5:]] == ["1", "2", "3", "4"]
+
+
+def test_several_logs_are_named_one_after_the_other(here, run_cli, logs):
+    found = run_cli("attitude", logs["a"], logs["c"], *FEW, "--out", "out", "--quiet")
+    assert found.code == 0
+    told = configuration(here / "out")
+    assert len(told["also"]) == 1
+    assert run_cli("verify", "out").out.startswith("identical")
+
+
+def test_a_second_log_and_rests(here, run_cli, logs):
+    found = run_cli(
+        *("attitude", logs["a"], *FEW, "--reference-log", logs["b"], "--reference", "rests"),
+        *("--gyro-bias", "rests", "--out", "out", "--quiet"),
+    )
+    assert found.code == 0
+    assert configuration(here / "out")["reference_log_path"] == "inputs/reference-log/log.csv"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--rates", "abc"], "'abc' is no list of numbers"),
+        (["--rates=-5"], "-5 Hz is no rate"),
+        (["--rates", "nan"], "nan Hz is no rate"),
+        (["--rates", "50,0"], "0 Hz is no rate"),
+        (["--rate", "100", "--rates", "0.01"], "fewer than two steps"),
+        (["--tolerance-deg", "0"], "tolerance_deg"),
+        (["--tolerance-deg", "nan"], "tolerance_deg"),
+        (["--trials", "0"], "0 is no number of trials"),
+        (["--sensor", "nosuch"], "'nosuch' is no sensor"),
+        (["--sensor", "nosuch.toml"], "there is no such file"),
+        (["--interpolation", "spline"], "'linear' or 'cubic'"),
+        (["--peers", "nosuch"], "'nosuch' is no library"),
+        (["--peers", "vqf:nosuch"], "is no filter of vqf"),
+        (["--reference-log", "nosuch.csv"], "there is no such file"),
+        (["--export-c", "nosuch/x.c"], "there is no such folder"),
+        (["--export-c", "there.c"], "it is there already"),
+        (["--export-c", "folder.c", "--force"], "it is there already"),
+        (["--export-c", "log.csv", "--force"], "no name of a C file"),
+        (["--export-c", "x.c", "--tolerance-deg", "1e-9"], "no algorithm was accurate enough"),
+    ],
+)
+def test_what_cannot_be_had_is_told_and_leaves_nothing(here, run_cli, options, said):
+    (here / "there.c").write_text("int there;\n")
+    (here / "log.csv").write_text("a log\n")
+    (here / "folder.c").mkdir()
+    asked = ["attitude", "coning-slow", "--algorithms", "naive quaternion"]
+    found = run_cli(*asked, *([] if "--rates" in options[0] else ["--rates", "50"]), *options)
+    assert found.code == 4
+    assert found.err.startswith("error: ")
+    assert said in found.err
+    assert "Remedy: " in found.err
+    assert "Traceback" not in found.err
+    assert sorted(p.name for p in here.iterdir()) == ["folder.c", "log.csv", "there.c"]
+    assert (here / "there.c").read_text() == "int there;\n"
+    assert (here / "log.csv").read_text() == "a log\n"
+
+
+def test_a_log_is_not_drawn_again(here, run_cli, logs):
+    found = run_cli("attitude", logs["c"], "--trials", "3")
+    assert found.code == 4
+    assert "name several logs instead" in found.err
+    twice = run_cli("attitude", logs["c"], logs["c"])
+    assert twice.code == 4
+    assert "named twice" in twice.err
+
+
+def test_a_second_log_of_another_motion(here, run_cli, logs):
+    other, _ = simulate_imu(Handling(duration=30.0, seed=77), ImuErrors(), rate=100.0)
+    LOG_WRITERS["csv"](here / "other.csv", other, None)
+    found = run_cli("attitude", logs["a"], "--reference-log", "other.csv")
+    assert found.code == 3
+    assert "Traceback" not in found.err
+    assert not list(here.glob("*-attitude"))
+
+
+def test_the_chosen_algorithm_as_c(here, run_cli):
+    asked = ["attitude", "alexiev-fig4", *FEW, "--rate", "100", "--quiet"]
+    assert run_cli(*asked, "--out", "one", "--export-c", "one.c").code == 0
+    assert "quaternion" in (here / "one.c").read_text(encoding="utf-8")
+    again = run_cli(*asked, "--out", "two", "--export-c", "one.c", "--force")
+    assert again.code == 0
+    assert not list(here.glob("*.partial"))
