@@ -269,7 +269,7 @@ def _share(bench: AttitudeBench) -> Chart:
 
 def share_basis(bench: AttitudeBench) -> str:
     """Say whether the shares are exact or estimates."""
-    if bench.sampling_error_deg is not None:
+    if bench.specification["source"]["kind"] == "scenario":
         return (
             "Exact: simulated, so that each algorithm also ran on samples without the sensor's "
             "errors."
