@@ -467,7 +467,7 @@ class PeerRun:
     scores: tuple[Score, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class AttitudeBench:
     """What the attitude bench found.
 
@@ -550,6 +550,9 @@ class AttitudeBench:
     places: tuple[PositionScore, ...] = field(default=(), repr=False)
     offers: tuple[SamePose, ...] = field(default=(), repr=False)
     second: SecondLog | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        return f"<AttitudeBench {self.source}: {self.answer.sentence}>"
 
     @property
     def summary(self) -> pd.DataFrame:
