@@ -1,4 +1,4 @@
-"""Alexiev's four attitude algorithms: one step each, and its two loops.
+"""Alexiev's attitude algorithms and Runge-Kutta's: one step each, and its two loops.
 
 For every algorithm there is ``*_step`` (the formula), ``*_advance`` (over many steps,
 writing the state after each into `history`) and ``*_update`` (one sample; returns the

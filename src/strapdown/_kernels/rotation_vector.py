@@ -3,14 +3,15 @@
 The state is (the quaternion now, that at the start of the block, steps in the block, their
 increments as length and three angles each). Within a block the attitude is that of the
 block's start turned by the rotation vector of the increments so far, so that it is defined
-at every step and at a ragged end. A block ends when it is full, or before a step that is
-unlike its first: a polynomial through a burst and a gap would say nothing of either.
+at every step and at a ragged end. A block ends when it is full or has turned by 1 rad, or
+before a step that is unlike its first: a polynomial through a burst and a gap would say
+nothing of either.
 
 The rotation vector of a block is ``sum + 1/2 int(alpha x omega) + ...``, Bortz (1971). By
 `MILLER` it is the sum and products of pairs of increments with the coefficients that are
 best for pure coning (Miller 1983 for three; for four those of Ignagni 1990 by distance,
-54, 92 and 214 over 105, shared out so that quadratic and cubic rates are integrated exactly,
-too), which assume equal steps. By `FIT` the rate is the polynomial whose integrals over the steps
+54, 92 and 214 over 105, shared out so that quadratic rates are integrated exactly, too),
+which assume equal steps. By `FIT` the rate is the polynomial whose integrals over the steps
 are the increments, whatever their lengths, and the rotation vector is its Magnus expansion
 to sixth order (Blanes, Casas and Ros, BIT 40 (2000) 434, Eqs. (3.9), (3.11)).
 """
@@ -32,6 +33,9 @@ EQUAL = 1e-3
 
 # Ratio of two steps up to which they may share a block.
 ALIKE = 3.0
+# Cosine of half a turn of 1 rad: a block that has turned by more ends before the next step,
+# because the series in powers of its turn no longer converge fast.
+COS_HALF_LARGEST = 0.877582561890372727
 
 COUNT = 8
 FIRST = 9  # of the increments; each has four numbers
@@ -183,7 +187,10 @@ def rotvec_step(state, dt, tx, ty, tz, dx, dy, dz, samples, coefficients):
         x, y, z = linear_rate_vector(tx, ty, tz, dx, dy, dz)
     else:
         first = state[FIRST]
-        if state[COUNT] > 0.0 and (dt > ALIKE * first or first > ALIKE * dt):
+        w = state[0] * state[4] + state[1] * state[5] + state[2] * state[6] + state[3] * state[7]
+        if state[COUNT] > 0.0 and (
+            dt > ALIKE * first or first > ALIKE * dt or abs(w) < COS_HALF_LARGEST
+        ):
             state[4], state[5], state[6], state[7] = state[0], state[1], state[2], state[3]
             state[COUNT] = 0.0
         done = int(state[COUNT])

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels import arithmetic
@@ -29,7 +33,9 @@ class _State(list[Any]):
         super().__setitem__(index, value)
 
 
-def _counted_run(algorithm: AttitudeAlgorithm) -> tuple[Counter[str], _State]:
+def _counted_run(
+    algorithm: AttitudeAlgorithm, lengths: Sequence[float] = (0.01,) * STEPS
+) -> tuple[Counter[str], _State]:
     count: Counter[str] = Counter()
 
     def number(value: float) -> arithmetic.Counted:
@@ -39,11 +45,11 @@ def _counted_run(algorithm: AttitudeAlgorithm) -> tuple[Counter[str], _State]:
     step = getattr(arithmetic.counted_kernels()[home], name)
     start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
     state = _State(number(float(v)) for v in start)
-    for k in range(STEPS):
+    for k, dt in enumerate(lengths):
         # The axis turns a little from step to step, as it does in every motion.
         theta = (0.6 * TURN, (0.64 - 0.01 * k) * TURN, (0.48 + 0.01 * k) * TURN)
         dtheta = (0.0, -0.01 * TURN, 0.01 * TURN)
-        numbers = [number(v) for v in (0.01, *theta, *dtheta)]
+        numbers = [number(v) for v in (dt, *theta, *dtheta)]
         step(state, *numbers, *algorithm.kernel_options())
     return count, state
 
@@ -79,12 +85,15 @@ def memory(algorithm: AttitudeAlgorithm) -> int:
     return _counted_run(algorithm)[1].used
 
 
-def count_cost(algorithm: AttitudeAlgorithm) -> Cost:
+def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
     """Count what one sample costs an algorithm.
 
     Parameters
     ----------
     algorithm : AttitudeAlgorithm
+    dt : array_like, (n,), s, optional
+        Steps of the log that it is for: where they are unequal an algorithm may take another
+        path. Those in its middle are counted with; equal ones, where none are given.
 
     Returns
     -------
@@ -92,7 +101,10 @@ def count_cost(algorithm: AttitudeAlgorithm) -> Cost:
         Operations of `operation_count`, weighed as `constants.CORTEX_M4F_CYCLES` does, and the
         `memory`.
     """
-    count, state = _counted_run(algorithm)
+    lengths = np.full(STEPS, 0.01) if dt is None else np.asarray(dt, dtype=np.float64)
+    first = max(0, (len(lengths) - STEPS) // 2)
+    middle = np.resize(lengths[first : first + STEPS], STEPS)
+    count, state = _counted_run(algorithm, middle.tolist())
     operations = {kind: count[kind] / STEPS for kind in CORTEX_M4F_CYCLES}
     return Cost(
         algorithm=algorithm.label,

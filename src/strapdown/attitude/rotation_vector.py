@@ -20,9 +20,9 @@ class RotationVector(AttitudeAlgorithm):
 
     Increments of one block are compared with each other: what their axis turned is put into
     the rotation vector (Bortz 1971). Within a block, and at a ragged end, the attitude is
-    that of the increments so far. A block ends when it is full, or before a step that is more
-    than three times longer or shorter than its first, as beside a gap or in a burst: there
-    the increments tell nothing of each other.
+    that of the increments so far. A block ends when it is full or has turned by 1 rad, or
+    before a step that is more than three times longer or shorter than its first, as beside a
+    gap or in a burst: there the increments tell nothing of each other.
 
     Parameters
     ----------

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from strapdown.results import AttitudeBench
 
 
+MOST_LINES = 8
+
+
 def print_bench(bench: AttitudeBench) -> None:
     """Print what the run stood on, its tables, and the answer last, where it is seen.
 
@@ -25,6 +28,9 @@ def print_bench(bench: AttitudeBench) -> None:
     from strapdown.report.attitude_places import offer_lines, place_table
 
     page = console()
+    if bench.trials is not None:
+        count = len(bench.trials.names)
+        page.print(f"First of {count} trials; the answer and the errors by rate hold for all:")
     page.print(bench.source, style="bold")
     if bench.readings:
         page.print("Read as:")
@@ -44,8 +50,11 @@ def print_bench(bench: AttitudeBench) -> None:
     for table in shown:
         if table is not None:
             _print(table, page)
-    for line in words.reference_lines(bench):
-        page.print(line)
+    points = words.reference_lines(bench)
+    for point in points[:MOST_LINES]:
+        page.print(point)
+    if len(points) > MOST_LINES:
+        page.print(f"and {len(points) - MOST_LINES} more reference points, in the report")
     page.print(bench.answer.sentence, style="bold")
     page.print(words.standing(bench))
     for title, lines in (("Why", bench.answer.why), ("What would help", bench.answer.helps)):

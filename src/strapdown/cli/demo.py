@@ -26,8 +26,7 @@ def demo(
 
     page = console()
     page.print(
-        "A turn through a pitch near 90°, where one of the four algorithms fails and another was "
-        "never right.\n",
+        "A turn through a pitch near 90°, where one algorithm fails and another was never right.\n",
         style="italic",
     )
     attitude(["alexiev-fig4"], rate=100.0, out=out / "alexiev-fig4", force=force)

@@ -23,7 +23,7 @@ def modules() -> None:
         [
             [
                 name,
-                f"Eq. {cls.equations}",
+                f"Eq. {cls.equations}" if cls.equations else cls.source,
                 ", ".join(f"{f.name}={f.default}".lower() for f in fields(cls)) or "–",
                 cls.summary,
             ]

@@ -195,7 +195,9 @@ def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
         f"trapezoid at most 2), drift on pure coning {accuracy.coning}"
     )
     lines = [
-        f"Attitude by {algorithm.title.lower()}, {algorithm.source}, {algorithm.equations}.",
+        f"Attitude by {algorithm.title.lower()}, "
+        + ", ".join(filter(None, (algorithm.source, algorithm.equations)))
+        + ".",
         f"{algorithm.label}, written by strapdown {version} from the kernels that it runs itself.",
         f"{around.words}.",
         "Axes: body forward-right-down; local level north-east-down. q_nb turns body into local "

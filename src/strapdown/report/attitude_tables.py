@@ -31,6 +31,8 @@ __all__ = [
 
 # More comparisons than these leave no room in a terminal for the parts of an error.
 _MOST_BESIDE = 4
+# Reference points with a column of their own; of more the worst is shown.
+_MOST_POINTS = 7
 _NONE = "–"
 
 
@@ -85,9 +87,11 @@ def result_tables(bench: AttitudeBench) -> list[TextTable]:
     list of TextTable
     """
     truth = any(s.against == "truth" for s in bench.scores)
-    columns = (["final", "RMS", "largest"] if truth else []) + [
-        f"at R{k}" for k in range(1, len(bench.references) + 1)
-    ]
+    points = len(bench.references)
+    at = [f"at R{k}" for k in range(1, points + 1)]
+    if points > _MOST_POINTS:
+        at = [f"worst of R1 to R{points}"]
+    columns = (["final", "RMS", "largest"] if truth else []) + at
     parts, cells = _parts(bench)
     compared, made = [], []
     for run in bench.runs:
@@ -120,9 +124,10 @@ def _table(
 def _compared(scores: list[Score], count: int) -> list[str]:
     cells = []
     for s in scores:
-        cells.append(degrees(s.error_deg))
         if s.against == "truth":
-            cells += [degrees(s.rms_deg), degrees(s.max_deg)]
+            cells += [degrees(s.error_deg), degrees(s.rms_deg), degrees(s.max_deg)]
+    points = [s.error_deg for s in scores if s.reference is not None]
+    cells += [degrees(max(points))] if len(points) > _MOST_POINTS else map(degrees, points)
     return cells + [_NONE] * (count - len(cells))
 
 
@@ -136,11 +141,24 @@ def _parts(bench: AttitudeBench) -> tuple[list[str], dict[str, dict[str, str]]]:
                 s.algorithm: degrees(None if s.sensor_deg is None else s.sensor_deg[2])
                 for s in bench.shares
             }
+        if len(bench.sweep):
+            cells[f"own ≤ {bench.answer.tolerance_deg:g}° to"] = {
+                s.algorithm: _lowest_rate(bench, s.algorithm) for s in bench.shares
+            }
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
     if bench.costs:
         cells["cycles"] = {c.algorithm: number(c.cycles) for c in bench.costs}
         cells["memory"] = {c.algorithm: str(c.memory) for c in bench.costs}
     return list(cells), cells
+
+
+def _lowest_rate(bench: AttitudeBench, algorithm: str) -> str:
+    """Lowest rate, samples left out, down to which its own error is within the tolerance."""
+    cells = bench.sweep[
+        (bench.sweep["algorithm"] == algorithm) & (bench.sweep["meaning"] == "drop")
+    ].sort_values("factor")
+    within = (cells["own_deg"] <= bench.answer.tolerance_deg).cummin()
+    return f"{float(cells.loc[within, 'rate_hz'].min()):.3g} Hz" if within.any() else _NONE
 
 
 def _part_note(bench: AttitudeBench) -> str:
@@ -225,7 +243,9 @@ def sweep_tables(bench: AttitudeBench) -> list[TextTable]:
                 f"Error by rate, {words}",
                 ("algorithm", *(f"{number(float(rate))} Hz" for rate in grid.columns)),
                 rows,
-                note=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}.",
+                note=f"✓: within the tolerance of {degrees(answer.tolerance_deg)}."
+                if passed
+                else f"None is within the tolerance of {degrees(answer.tolerance_deg)}.",
                 passed=frozenset(passed),
                 strong=_named(bench),
             )
@@ -315,7 +335,8 @@ def peer_table(bench: AttitudeBench) -> TextTable | None:
         tuple(rows),
         text=(0, 3),
         note="Largest error against what is known. An aided filter corrects what gyros alone "
-        "cannot: its column is not to be compared with the other.",
+        "cannot: its column is not to be compared with the other. These libraries take each "
+        "row for the mean of its step; ours for the rate at its stamp, unless --sampling mean.",
         strong=_named(bench),
     )
 

@@ -21,6 +21,10 @@ WORTH = 0.9
 MOST_EXTRAPOLATED = 10.0
 
 
+# An attitude this far off tells no more how far: angles end at half a turn.
+LOST = 90.0
+
+
 @dataclass(frozen=True)
 class Evidence:
     """What the answer is drawn from.
@@ -45,6 +49,11 @@ class Evidence:
         were chords.
     start : float
         What the attitude at the start is off by, deg, where that is known.
+    sampling : float
+        How far the course of the rate between its stamps may matter, deg, on a log.
+    reference_sd : float
+        What the best reference point is known to, 1σ in deg; 0 where there is a truth, or
+        nothing was said.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -56,6 +65,8 @@ class Evidence:
     without_bias: float | None
     with_cubic: float | None
     start: float = 0.0
+    sampling: float = 0.0
+    reference_sd: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -161,6 +172,11 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
             "rate, and not the sensor."
         )
         helps = ("Name a reference point, as in --reference 'end same as start'.",)
+    if evidence.sampling > UNSEEN * tolerance:
+        why.append(
+            "How the rate runs between its stamps is not known; it may matter by up to "
+            f"{_deg(evidence.sampling)}, which is in no figure here."
+        )
     return Answer(
         "enough" if evidence.known else "own",
         sentence,
@@ -176,7 +192,7 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
 def _limited_by_sensor(
     evidence: Evidence, best: pd.Series, sensor: float, tolerance: float
 ) -> Answer:
-    limit = UNSEEN * sensor
+    limit = min(tolerance, UNSEEN * sensor)
     good = choices(evidence, "own_deg", limit)
     of_truth = evidence.sensor is not None and sensor <= evidence.sensor[2]
     off_at_start = evidence.start > UNSEEN * sensor
@@ -186,6 +202,11 @@ def _limited_by_sensor(
         whose = f"the sensor alone makes {_deg(sensor)}"
     elif of_truth:
         whose = f"the sensor makes {_deg(sensor)}, by the most accurate algorithm"
+    elif evidence.reference_sd > tolerance:
+        whose = (
+            f"the reference points are themselves known to {_deg(evidence.reference_sd)} (1σ) "
+            f"only, and the most accurate algorithm is {_deg(sensor)} from them"
+        )
     else:
         whose = (
             f"by the most accurate algorithm, too, sensor and reference points are {_deg(sensor)} "
@@ -203,7 +224,7 @@ def _limited_by_sensor(
         algorithm, meaning, rate = chosen.cost.algorithm, chosen.meaning, chosen.rate_hz
         sentence += (
             f" {_title(evidence, chosen)} at {_rate(chosen)} is all that is needed: its own "
-            f"error, {_deg(chosen.error_deg)}, is under a tenth of that."
+            f"error, {_deg(chosen.error_deg)}, is small beside that."
         )
         why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
     helps = []
@@ -215,9 +236,19 @@ def _limited_by_sensor(
             "Remove the gyro's bias: with that of the first rest taken off (--gyro-bias rest) "
             f"{_deg(evidence.without_bias)} would be left."
         )
+    if evidence.reference_sd > tolerance:
+        helps.append("Better reference points: a truth, or a pose that is known to be the same.")
+    elif sensor > LOST:
+        helps.append(
+            "A gyro with far smaller errors, or far less time between reference points: the "
+            "attitude is lost."
+        )
+    else:
+        helps.append(
+            f"A gyro whose errors are {_two_digits(sensor / tolerance)} times smaller, or that "
+            "much less time between reference points."
+        )
     helps += [
-        f"A gyro whose errors are {sensor / tolerance:.2g} times smaller, or that much less time "
-        "between reference points.",
         "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading (--peers shows "
         "what such filters reach on this log).",
     ]

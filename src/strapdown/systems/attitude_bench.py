@@ -257,7 +257,16 @@ def _together(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidence:
         without_bias=_worst([e.without_bias for e in evidence]),
         with_cubic=_worst([e.with_cubic for e in evidence]),
         start=max(e.start for e in evidence),
+        sampling=max(e.sampling for e in evidence),
+        reference_sd=max(e.reference_sd for e in evidence),
     )
+
+
+def _reference_sd(known: Known | None, references: pd.DataFrame) -> float:
+    """What the best reference point is known to, where there is no truth."""
+    if known is not None or references.empty:
+        return 0.0
+    return float(np.nan_to_num(references["sd"].to_numpy(dtype=np.float64)).min())
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:
@@ -349,7 +358,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
     sweep = sweep_rates(
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
-    costs = tuple(count_cost(algorithm) for algorithm in algorithms)
+    costs = tuple(count_cost(algorithm, increments["dt"]) for algorithm in algorithms)
+    between = source.sampling_error_deg or between_samples(imu, q_nb)
     evidence = Evidence(
         algorithms=algorithms,
         costs=costs,
@@ -360,6 +370,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         without_bias=_without_bias(grounds, bias, rests),
         with_cubic=_with_cubic(grounds),
         start=_start_error(known, q_nb),
+        sampling=0.0 if grounds.own.exact or between is None else between[1],
+        reference_sd=_reference_sd(known, references),
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     truth, scored = source.truth, source.scored
@@ -375,7 +387,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         truth=truth,
         scored=scored,
         scores=tuple(scores),
-        sampling_error_deg=source.sampling_error_deg or between_samples(imu, q_nb),
+        sampling_error_deg=between,
         differences_deg=largest_differences(tuple(runs)),
         rests=rests,
         initial=initial,

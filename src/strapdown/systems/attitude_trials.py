@@ -104,9 +104,9 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
             {
                 "algorithm": name,
                 "mean_deg": mean,
-                # An angle between attitudes is not negative, and neither is its mean.
+                # An angle between attitudes lies between 0 and 180 deg, and so does its mean.
                 "low_deg": float(np.maximum(0.0, mean - spread)),
-                "high_deg": mean + spread,
+                "high_deg": min(180.0, mean + spread),
                 "luck": luck,
             }
         )

@@ -340,7 +340,7 @@ def test_it_is_short_alone_and_in_the_open(variant):
     # Between functions there are only those, the structure and macros: no variable is global.
     outside = re.sub(r"/\*.*?\*/|^#.*?$|\{.*?^\}", "", code, flags=re.S | re.M)
     assert not re.findall(r"=", outside)
-    assert len(code.splitlines()) < 480
+    assert len(code.splitlines()) < 500
     assert make_algorithm(variant).label in text
     assert state_size(text) == memory(make_algorithm(variant))
 

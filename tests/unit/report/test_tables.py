@@ -58,6 +58,7 @@ def test_the_results_say_whose_error_it_is_and_what_it_costs(make_bench):
         "at R1",
         "own",
         "sensor",
+        "own ≤ 2° to",
         "float32",
         "cycles",
         "memory",
@@ -72,13 +73,13 @@ def test_the_results_say_whose_error_it_is_and_what_it_costs(make_bench):
 
 def test_many_references_leave_the_parts_to_a_second_table(make_bench):
     two = tables.result_tables(make_bench(references=("end same as start",) * 4))
-    assert [len(t.columns) for t in two] == [8, 6]
-    assert two[1].columns[1:] == ("own", "sensor", "float32", "cycles", "memory")
+    assert [len(t.columns) for t in two] == [8, 7]
+    assert two[1].columns[1:] == ("own", "sensor", "own ≤ 2° to", "float32", "cycles", "memory")
 
 
 def test_without_a_truth_no_sensor_is_blamed(make_bench):
     (table,) = tables.result_tables(make_bench(truth=False))
-    assert table.columns == ("algorithm", "own", "float32", "cycles", "memory")
+    assert table.columns == ("algorithm", "own", "own ≤ 2° to", "float32", "cycles", "memory")
     assert "sensor and" not in table.note
 
 
@@ -299,3 +300,23 @@ def test_to_pandas_has_comparisons_shares_and_costs(make_bench):
     assert alone["algorithm"].tolist() == ["naive", "dcm", "quaternion"]
     assert alone["sensor_max_deg"].isna().all()
     assert alone["own_max_deg"].notna().all()
+
+
+def test_of_many_references_the_worst_is_shown(make_bench):
+    table = tables.result_tables(make_bench(references=("end same as start",) * 9))[0]
+    assert table.columns[-1] == "worst of R1 to R9" or "worst of R1 to R9" in table.columns
+
+
+def test_the_rate_down_to_which_it_is_good(full_bench):
+    table = next(t for t in tables.result_tables(full_bench) if "own ≤ 2° to" in t.columns)
+    column = table.columns.index("own ≤ 2° to")
+    for row in table.rows:
+        cells = full_bench.sweep[
+            (full_bench.sweep["algorithm"] == row[0]) & (full_bench.sweep["meaning"] == "drop")
+        ].sort_values("factor")
+        rate = None
+        for own, hz in zip(cells["own_deg"], cells["rate_hz"], strict=True):
+            if own > 2.0:
+                break
+            rate = hz
+        assert row[column] == ("–" if rate is None else f"{rate:.3g} Hz")

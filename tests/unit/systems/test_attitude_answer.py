@@ -134,11 +134,14 @@ def test_the_sensor_is_the_limit():
         without_bias=0.4,
     )
     found = find_answer(table, 1)
-    # A tenth of 20 deg: naive at 100 Hz is within, and simplest.
-    assert (found.verdict, found.algorithm, found.rate_hz) == ("sensor", "naive", 100.0)
+    # naive is within a tenth of 20 deg, and not within the tolerance itself.
+    assert (found.verdict, found.algorithm, found.rate_hz) == ("sensor", "quaternion", 50.0)
     assert "none could: the sensor alone makes 20°" in found.sentence
-    assert "its own error, 1.9°, is under a tenth" in found.sentence
-    assert "At 50 Hz it would be 2.2°, beyond 2°." in found.why
+    assert "its own error, 0.2°, is small beside that" in found.sentence
+    assert "At 25 Hz it would be 5°, beyond 1°." in found.why
+    # A tenth of 3 deg is less than the tolerance: what is seen of it counts.
+    near = evidence({"quaternion": [3.0, 3.5]}, own={"quaternion": [0.1, 0.6]}, sensor=(3, 3, 3))
+    assert find_answer(near, 1).rate_hz == 100.0
     assert "quaternion at 100 Hz, is 20.1° off; its own part is 0.1°" in found.why[0]
     assert "--gyro-bias rest) 0.4° would be left" in found.helps[0]
     assert "20 times smaller" in found.helps[1]
@@ -359,3 +362,27 @@ def test_one_that_is_right_by_luck_is_not_chosen():
     found = find_answer(evidence(errors, own), 1)
     assert (found.algorithm, found.rate_hz) == ("quaternion", 50.0)
     assert "naive is simpler, and 5° off at 100 Hz already." in found.why
+
+
+def test_reference_points_that_are_hardly_known_are_the_limit():
+    table = evidence(
+        {"quaternion": [4.0]}, own={"quaternion": [0.1]}, sensor=None, reference_sd=2.5
+    )
+    found = find_answer(table, 1)
+    assert "the reference points are themselves known to 2.5° (1σ) only" in found.sentence
+    assert found.helps[0].startswith("Better reference points")
+    assert not any("times smaller" in line for line in found.helps)
+
+
+def test_what_the_rate_does_between_its_stamps_is_said():
+    quiet = find_answer(evidence({"quaternion": [0.01]}, known=False, sampling=0.05), 1)
+    told = find_answer(evidence({"quaternion": [0.01]}, known=False, sampling=0.36), 1)
+    assert not any("between its stamps" in line for line in quiet.why)
+    assert any("by up to 0.36°" in line for line in told.why)
+
+
+def test_an_attitude_that_is_lost_has_no_ratio():
+    found = find_answer(
+        evidence({"quaternion": [170.0]}, own={"quaternion": [0.1]}, sensor=(1, 2, 170.0)), 1
+    )
+    assert any("the attitude is lost" in line for line in found.helps)
