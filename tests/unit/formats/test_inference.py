@@ -51,6 +51,29 @@ def test_no_wrong_answer_in_a_hundred_logs():
     assert silent["time_unit"] < 0.05 * asked["time_unit"]
 
 
+# Swings whose force has the size of gravity by chance, or turns as it would with a gyro reversed.
+ARMS = (40290, 40842, 41858, 50147, 50327, 50508, 51846, 52162, 52367)
+
+
+@pytest.mark.parametrize("seed", ARMS)
+def test_an_arm_that_swings_is_not_taken_for_gravity_that_turns(seed):
+    signals, truth = make(seed)
+    assert truth.motion == "swing"
+    assert not [str(i) for i in infer_signals(signals) if truth.is_wrong(i)]
+
+
+def test_each_flag_is_an_option_of_attitude():
+    import typer.main
+
+    from strapdown.cli.main import app
+
+    command = typer.main.get_command(app).commands["attitude"]
+    options = {o for p in command.params for o in p.opts}
+    flags = {i.flag for s in range(20) for i in infer_signals(make(s)[0])} - {""}
+    assert "--gyro-unit" in flags
+    assert flags <= options
+
+
 def turning(seconds=40.0, rate=100.0, seed=3):
     """A slow tumble about all axes without noise: rates in rad/s, reaction in m/s²."""
     from scipy.spatial.transform import Rotation
@@ -267,5 +290,5 @@ def test_it_is_fast():
     infer_signals(signals)
     begin = clock.perf_counter()
     infer_signals(signals)
-    # 0.1 s on an idle core; the bound leaves room for a busy one.
+    # A bound that a busy core keeps, too; a quadratic algorithm would not.
     assert clock.perf_counter() - begin < 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError
 from strapdown.formats.columns import parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns
+from strapdown.formats.inference.arm import Arm, fit_arm
 from strapdown.formats.inference.clock import (
     infer_rate,
     infer_time_faults,
@@ -120,7 +121,11 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     heard: list[Inference] = []
     if accel is not None:
         unit, form, gravity, usual = infer_accel(accel, step)
+        arm = _arm(signals, step)
         heard = [unit, form, gravity]
+        if arm is not None and arm.hides_gravity:
+            heard = [_doubted(i, arm) for i in heard]
+            gravity = heard[2]
         if gravity.value == "present" and gravity.confidence > 0.9:
             heard.append(infer_up(accel, step))
             heard.append(_sign())
@@ -130,6 +135,8 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
             # Gravity in a unit that is not known still turns as gravity does.
             assert signals.accel is not None
             force = signals.accel / usual
+        if arm is not None and arm.locks_turn:
+            force = None
     turned: list[Inference] = []
     if signals.gyro is not None and len(signals.gyro) > 1:
         ticks, gyro, force = _increasing(signals, force)
@@ -174,6 +181,19 @@ def _step(signals: Signals, stamps: NDArray[Any] | None, times: dict[str, float]
         step = mean_step(stamps) * TIME_UNITS[best]
         return step if step > 0 and (times[best] > 0.9) else None
     return 1.0 / signals.rate if signals.rate else None
+
+
+def _arm(signals: Signals, step: float | None) -> Arm | None:
+    if step is None or signals.gyro is None or signals.accel is None:
+        return None
+    kept = np.isfinite(signals.gyro).all(axis=1) & np.isfinite(signals.accel).all(axis=1)
+    return fit_arm(step, signals.gyro[kept], signals.accel[kept])
+
+
+def _doubted(one: Inference, arm: Arm) -> Inference:
+    """The same as a question: the norm of the force is an arm's, and need not be gravity's."""
+    told = f"a swinging arm without gravity explains {100 * arm.alone:.3g} % of the force"
+    return replace(one, confidence=min(one.confidence, 0.5), evidence=(*one.evidence, told))
 
 
 def _steady(accel: Array) -> bool:

@@ -27,9 +27,9 @@ def infer_mag_unit(mag: Array) -> Inference:
         Finite, as it stands in the log.
     """
     usual = float(np.median(np.linalg.norm(mag, axis=1)))
-    flag = "--mag-unit"
+    remedy = "no option states it: name it in the column, as in mx_uT"
     if not usual > 0:
-        return Inference("mag_unit", None, 1.0, ("every value is zero",), (), flag)
+        return Inference("mag_unit", None, 1.0, ("every value is zero", remedy))
     low, high = np.log10(_FIELD)
     height = 1.0 / (high - low + 2.5 * _IRON)
     weights: dict[str | None, float] = {}
@@ -43,4 +43,4 @@ def infer_mag_unit(mag: Array) -> Inference:
     told = f"the median norm is {usual:.4g}"
     if best is not None:
         told += f", {usual * MAG_UNITS[best]:.3g} µT in {best}; the Earth's field is 22 to 67 µT"
-    return conclude("mag_unit", found, (told,), flag)
+    return conclude("mag_unit", found, (told, remedy))
