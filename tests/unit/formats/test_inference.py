@@ -290,5 +290,5 @@ def test_it_is_fast():
     infer_signals(signals)
     begin = clock.perf_counter()
     infer_signals(signals)
-    # A bound that a busy core keeps, too; a quadratic algorithm would not.
+    # A bound that a busy core keeps, too.
     assert clock.perf_counter() - begin < 1.0
