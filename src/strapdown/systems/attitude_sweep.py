@@ -141,8 +141,13 @@ def sweep_rates(
         of floating point has an infinite error.
     """
     cells = [(meaning, factor) for meaning in MEANINGS for factor in factors]
-    rows = []
+    rows: list[dict[str, object]] = []
     for k, (meaning, factor) in enumerate(cells):
+        if meaning == "sum" and factor == 1:
+            # Nothing is left out and nothing summed: what has been found already.
+            full = [row for row in rows if row["factor"] == 1]
+            rows += [row | {"meaning": "sum"} for row in full]
+            continue
         progress(f"{meaning} 1:{factor}", k / len(cells))
         samples = chosen_samples(len(grounds.imu), factor)
         steps = _steps(grounds.imu, samples, meaning, grounds.interpolation)
