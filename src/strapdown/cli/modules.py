@@ -19,11 +19,11 @@ def modules() -> None:
     out = console()
     out.print("Attitude algorithms", style="bold")
     print_table(
-        ["name", "Alexiev (2021)", "options", "what it does"],
+        ["name", "source", "options", "what it does"],
         [
             [
                 name,
-                f"Eq. {cls.equations}" if cls.equations else cls.source,
+                f"{cls.source} {cls.equations}".strip(),
                 ", ".join(f"{f.name}={f.default}".lower() for f in fields(cls)) or "–",
                 cls.summary,
             ]
