@@ -31,6 +31,7 @@ from strapdown.tables import EULER, THETA, references_table
 __all__ = [
     "in_words",
     "parse_reference",
+    "reference_errors",
     "references_from_words",
     "score_references",
     "with_tilt",
@@ -224,29 +225,11 @@ def score_references(
     DataError
         A reference lies before the run begins.
     """
-    begin = float(run.attitude.index[0])
     scores = []
     for number, (_, row) in enumerate(references.iterrows(), start=1):
-        alone = row["kind"] in ("known", "tilt")
-        instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
-        if min(instants) < begin:
-            raise DataError(
-                f"{in_words(row)}, and the computed attitude begins at {begin:.9g} s",
-                row=number,
-                quantity="reference",
-                remedy="name a later instant, or another --initial",
-            )
-        q_at = attitude_at(run.attitude, instants)
+        instants, error = _compare(run.attitude, row, number)
         turned = expected = None
-        if row["kind"] == "known":
-            known = rotation.quaternion_from_euler([float(row[e]) for e in EULER])
-        elif row["kind"] == "tilt":
-            known = with_tilt(q_at[0], float(row["roll"]), float(row["pitch"]))
-        elif row["kind"] == "same":
-            known = q_at[1]
-        else:
-            about = np.eye(3)["xyz".index(row["axis"])] * 2.0 * np.pi * float(row["turns"])
-            known = rotation.compose(q_at[1], rotation.quaternion_from_rotation_vector(about))
+        if row["kind"] == "turns":
             expected = 360.0 * float(row["turns"])
             turned = _turned(imu, "xyz".index(row["axis"]), instants[1], instants[0])
         sd = float(row["sd"])
@@ -255,7 +238,7 @@ def score_references(
                 algorithm=run.algorithm,
                 against=in_words(row),
                 time=instants[0],
-                error_deg=float(rotation.rotation_angle(q_at[0], known)),
+                error_deg=error,
                 turned_deg=turned,
                 expected_deg=expected,
                 sd_deg=sd if np.isfinite(sd) else None,
@@ -263,6 +246,54 @@ def score_references(
             )
         )
     return tuple(scores)
+
+
+def reference_errors(attitude: pd.DataFrame, references: pd.DataFrame) -> list[float]:
+    """Compare an attitude with reference points, as `score_references` does, in deg alone.
+
+    Parameters
+    ----------
+    attitude : DataFrame
+        The quaternions of an Attitude table.
+    references : DataFrame
+        A References table.
+
+    Returns
+    -------
+    list of float
+
+    Raises
+    ------
+    DataError
+        A reference lies before the attitude begins.
+    """
+    rows = enumerate(references.iterrows(), start=1)
+    return [_compare(attitude, row, number)[1] for number, (_, row) in rows]
+
+
+def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[float], float]:
+    """The instants that a reference point speaks of, and the error there in deg."""
+    begin = float(attitude.index[0])
+    alone = row["kind"] in ("known", "tilt")
+    instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
+    if min(instants) < begin:
+        raise DataError(
+            f"{in_words(row)}, and the computed attitude begins at {begin:.9g} s",
+            row=number,
+            quantity="reference",
+            remedy="name a later instant, or another --initial",
+        )
+    q_at = attitude_at(attitude, instants)
+    if row["kind"] == "known":
+        known = rotation.quaternion_from_euler([float(row[e]) for e in EULER])
+    elif row["kind"] == "tilt":
+        known = with_tilt(q_at[0], float(row["roll"]), float(row["pitch"]))
+    elif row["kind"] == "same":
+        known = q_at[1]
+    else:
+        about = np.eye(3)["xyz".index(row["axis"])] * 2.0 * np.pi * float(row["turns"])
+        known = rotation.compose(q_at[1], rotation.quaternion_from_rotation_vector(about))
+    return instants, float(rotation.rotation_angle(q_at[0], known))
 
 
 def with_tilt(q_nb: ArrayLike, roll: float, pitch: float) -> NDArray[np.float64]:

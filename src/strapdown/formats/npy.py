@@ -10,16 +10,6 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
 
-MAGIC = b"\x93NUMPY"
-
-
-def is_npy(path: Path) -> bool:
-    """Tell by its first bytes whether a file is a NumPy array."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC
-
 
 def load(path: Path, label: str) -> NDArray[Any]:
     """Load the array of a file.

@@ -70,7 +70,7 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         for a, b in _runs(still, time[starts[1:]] - time[ends[:-1] - 1] < LEAST_LENGTH)
         if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
     ]
-    return _of_one_bias(rests)
+    return of_one_bias(rests)
 
 
 def _windows(time: Array) -> tuple[Indices, Indices]:
@@ -199,7 +199,8 @@ def _triple(values: Array) -> tuple[float, float, float]:
     return float(values[0]), float(values[1]), float(values[2])
 
 
-def _of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
+def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
+    """Rests whose bias is like the least of them: a steady slow turn is no rest."""
     if not rests:
         return ()
     least = min(rests, key=lambda r: float(np.linalg.norm(r.gyro_mean)))

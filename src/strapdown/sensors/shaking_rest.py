@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.results import RestStretch
-from strapdown.sensors.rest import MAX_MEAN_RATE, SAME_BIAS, find_rests, rest_between
+from strapdown.sensors.rest import MAX_MEAN_RATE, find_rests, of_one_bias, rest_between
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -65,7 +65,7 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
             spans[-1] = (spans[-1][0], float(start) + WINDOW)
         else:
             spans.append((float(start), float(start) + WINDOW))
-    return _of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
+    return of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
 
 
 def _shakes_in_place(time: Array, values: Array, start: float) -> bool:
@@ -86,15 +86,6 @@ def _shakes_in_place(time: Array, values: Array, start: float) -> bool:
     return bool(
         np.sqrt(scatter[:3].sum()) <= MAX_GYRO_SCATTER
         and np.sqrt(scatter[3:].sum()) <= MAX_ACCEL_SCATTER
-    )
-
-
-def _of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
-    if not rests:
-        return ()
-    least = min(rests, key=lambda r: float(np.linalg.norm(r.gyro_mean)))
-    return tuple(
-        r for r in rests if np.linalg.norm(np.subtract(r.gyro_mean, least.gyro_mean)) <= SAME_BIAS
     )
 
 

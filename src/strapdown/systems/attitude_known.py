@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.config import AttitudeSpec, ScenarioSpec
 from strapdown.evaluation.known import known_at
 from strapdown.evaluation.place_references import PlaceReference, is_place, parse_place
-from strapdown.evaluation.reference_points import parse_reference
+from strapdown.evaluation.reference_points import references_from_words
 from strapdown.evaluation.rest_references import same_pose_candidates, tilt_references
 from strapdown.evaluation.second_log import align_second_log
 from strapdown.evaluation.second_log_truth import second_clock, truth_from_second_log
@@ -22,7 +22,6 @@ from strapdown.results import RestStretch, SamePose, SecondLog
 from strapdown.sensors.rest import find_rests
 from strapdown.simulation import find_scenario
 from strapdown.systems.attitude_source import Source, input_files
-from strapdown.tables import references_table
 
 Array = NDArray[np.float64]
 
@@ -73,8 +72,7 @@ def gather_references(
         words = list(find_scenario(spec.source.name).references)
     asked = [w for w in words if w.strip().lower() == RESTS]
     words = [w for w in words if w.strip().lower() != RESTS]
-    rows = [parse_reference(w, *span) for w in words if not is_place(w)]
-    points = references_table(rows)
+    points = references_from_words([w for w in words if not is_place(w)], *span)
     usable = [r for r in rests if r.accel_mean is not None and r.start >= span[0]]
     if asked:
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled and usable else None)

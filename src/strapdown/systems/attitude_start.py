@@ -13,7 +13,7 @@ from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.config import AttitudeSpec, LogSpec
 from strapdown.constants import GYRO_UNITS
-from strapdown.evaluation.differences import attitude_at
+from strapdown.evaluation.known import known_at
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.columns import parse_unit
@@ -189,13 +189,9 @@ def _first_truth(source: Source, start: float) -> tuple[Array, float]:
             remedy="give --reference TRUTH.csv, or use level, zero or 'roll,pitch,heading'",
         )
     stamps = source.imu.index.to_numpy(dtype=np.float64)
-    known = source.truth.index.to_numpy(dtype=np.float64)
-    before = np.searchsorted(known, stamps, side="right") - 1
-    after = np.minimum(np.searchsorted(known, stamps), known.size - 1)
-    apart = np.where(before >= 0, known[after] - known[before], np.inf)
-    # Across a hole in the truth nothing is known; a sample needs it at hand on both sides.
-    usual = 3.0 * float(np.median(np.diff(known))) if known.size > 1 else 0.0
-    good = np.flatnonzero((apart >= 0.0) & (apart <= usual))
+    # Scored or not, an attitude that is known is one to start from.
+    known = known_at(source.truth, np.ones(len(source.truth), dtype=bool), stamps)
+    good = np.flatnonzero(known.counts)
     if not good.size:
         raise ConfigError(
             f"the truth is nowhere known at a sample between {stamps[0]:.9g} and "
@@ -205,7 +201,7 @@ def _first_truth(source: Source, start: float) -> tuple[Array, float]:
             remedy="use level, zero or 'roll,pitch,heading', or another window",
         )
     begin = float(stamps[good[0]])
-    return attitude_at(source.truth, [begin])[0], begin
+    return known.q_nb[good[0]], begin
 
 
 def _levelled(

@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from strapdown.attitude import AttitudeAlgorithm, attitude_history
 from strapdown.attitude.algorithm import Steps, steps_of
 from strapdown.evaluation.known import Errors, Known
-from strapdown.evaluation.reference_points import score_references
+from strapdown.evaluation.reference_points import reference_errors
 from strapdown.exceptions import ConfigError, DivergenceError, Finding
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeRun
 from strapdown.systems.attitude_shares import OwnTruth
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 
@@ -141,6 +140,9 @@ def sweep_rates(
         of floating point has an infinite error.
     """
     cells = [(meaning, factor) for meaning in MEANINGS for factor in factors]
+    clean = grounds.own.clean
+    whole = increments_from_imu(grounds.imu, grounds.interpolation)
+    whole_clean = None if clean is None else increments_from_imu(clean, grounds.interpolation)
     rows: list[dict[str, object]] = []
     for k, (meaning, factor) in enumerate(cells):
         if meaning == "sum" and factor == 1:
@@ -150,11 +152,10 @@ def sweep_rates(
             continue
         progress(f"{meaning} 1:{factor}", k / len(cells))
         samples = chosen_samples(len(grounds.imu), factor)
-        steps = _steps(grounds.imu, samples, meaning, grounds.interpolation)
-        clean = grounds.own.clean
-        error_free = (
-            None if clean is None else _steps(clean, samples, meaning, grounds.interpolation)
-        )
+        steps = _steps(grounds.imu, whole, samples, meaning, grounds.interpolation)
+        error_free = None
+        if clean is not None and whole_clean is not None:
+            error_free = _steps(clean, whole_clean, samples, meaning, grounds.interpolation)
         used = grounds.imu.iloc[samples]
         there = replace(
             grounds,
@@ -183,11 +184,16 @@ def chosen_samples(count: int, factor: int) -> NDArray[np.int64]:
 
 
 def _steps(
-    imu: pd.DataFrame, samples: NDArray[np.int64], meaning: str, interpolation: str
+    imu: pd.DataFrame,
+    whole: pd.DataFrame,
+    samples: NDArray[np.int64],
+    meaning: str,
+    interpolation: str,
 ) -> Steps:
+    """Steps of a lower rate; `whole` are the increments of the full one."""
     if meaning == "drop":
         return steps_of(increments_from_imu(imu.iloc[samples], interpolation))
-    return steps_of(sum_increments(increments_from_imu(imu, interpolation), samples))
+    return steps_of(sum_increments(whole, samples))
 
 
 def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.DataFrame:
@@ -233,7 +239,7 @@ def _cell(
             q if error_free is None else attitude_history(algorithm, error_free, grounds.q_nb)
         )
         total = None if grounds.truth is None else grounds.truth.errors(q)
-        reference = _largest_reference(algorithm, q, grounds.references, used)
+        reference = _largest_reference(q, grounds.references, used)
     except DivergenceError:
         own, reference = infinite, np.inf if len(grounds.references) else np.nan
         total = None if grounds.truth is None else infinite
@@ -250,16 +256,8 @@ def _cell(
     }
 
 
-def _largest_reference(
-    algorithm: AttitudeAlgorithm, q: Array, references: pd.DataFrame, used: pd.DataFrame
-) -> float:
+def _largest_reference(q: Array, references: pd.DataFrame, used: pd.DataFrame) -> float:
     if references.empty:
         return np.nan
-    run = AttitudeRun(
-        algorithm.label,
-        algorithm.title,
-        algorithm.equations,
-        pd.DataFrame(q, index=used.index, columns=QUATERNION),
-        {},
-    )
-    return max(score.error_deg for score in score_references(run, references, used))
+    attitude = pd.DataFrame(q, index=used.index, columns=QUATERNION)
+    return max(reference_errors(attitude, references))
