@@ -1,0 +1,1 @@
+"""Geodetic, Earth-centred and local coordinates."""

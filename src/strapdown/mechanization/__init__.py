@@ -1,0 +1,1 @@
+"""Strapdown mechanizations: one file each."""

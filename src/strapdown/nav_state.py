@@ -1,0 +1,187 @@
+"""Where a vehicle is, how it moves and how it stands, at one instant."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import DataError
+from strapdown.tables import trajectory_table
+
+__all__ = ["NavState"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class NavState:
+    """Place, velocity and attitude relative to local north-east-down.
+
+    In radians, as the kernels have it; `from_degrees` takes what a person writes.
+
+    Attributes
+    ----------
+    time : float, s
+    lat, lon : float, rad
+        Geodetic.
+    alt : float, m
+        Over the ellipsoid.
+    v_n : ndarray, (3,), m/s
+        Velocity relative to the Earth: north, east, down.
+    q_nb : ndarray, (4,)
+        Body forward-right-down to north-east-down, scalar first, unit norm.
+
+    Raises
+    ------
+    DataError
+        A number is not finite, the latitude is beyond a right angle, or `q_nb` is no rotation.
+    """
+
+    time: float
+    lat: float
+    lon: float
+    alt: float
+    v_n: Array
+    q_nb: Array
+
+    def __post_init__(self) -> None:
+        v_n = np.array(self.v_n, dtype=np.float64)
+        if v_n.shape != (3,):
+            raise DataError(
+                f"its shape is {v_n.shape}",
+                quantity="v_n",
+                remedy="give velocity as north, east, down in m/s",
+            )
+        numbers = {"time": self.time, "lat": self.lat, "lon": self.lon, "alt": self.alt}
+        numbers |= dict(zip(("v_n north", "v_n east", "v_n down"), v_n.tolist(), strict=True))
+        for name, value in numbers.items():
+            if not math.isfinite(value):
+                raise DataError(
+                    f"not a finite number ({value})",
+                    quantity=name,
+                    remedy="a navigation state needs a number for each of its parts",
+                )
+        if abs(self.lat) > 0.5 * math.pi:
+            raise DataError(
+                f"a latitude of {self.lat:.9g} rad is beyond the pole",
+                quantity="lat",
+                remedy=_beyond_in_radians(self.lat, self.lon),
+            )
+        if abs(self.lon) > 2.0 * math.pi:
+            raise DataError(
+                f"a longitude of {self.lon:.9g} rad is more than a full turn",
+                quantity="lon",
+                remedy="this looks like degrees: use NavState.from_degrees",
+            )
+        v_n.flags.writeable = False
+        q_nb = rotation.normalise(self.q_nb)
+        q_nb.flags.writeable = False
+        object.__setattr__(self, "v_n", v_n)
+        object.__setattr__(self, "q_nb", q_nb)
+
+    @classmethod
+    def from_degrees(
+        cls,
+        lat_deg: float,
+        lon_deg: float,
+        alt: float = 0.0,
+        *,
+        v_n: ArrayLike = (0.0, 0.0, 0.0),
+        roll_deg: float = 0.0,
+        pitch_deg: float = 0.0,
+        heading_deg: float = 0.0,
+        time: float = 0.0,
+    ) -> NavState:
+        """Make a state from angles in degrees.
+
+        Parameters
+        ----------
+        lat_deg, lon_deg : float, deg
+            Geodetic, north and east positive.
+        alt : float, m
+            Over the ellipsoid.
+        v_n : array_like, (3,), m/s
+            North, east, down.
+        roll_deg, pitch_deg, heading_deg : float, deg
+        time : float, s
+
+        Returns
+        -------
+        NavState
+
+        Raises
+        ------
+        DataError
+            As the class; a latitude over 90 deg says so.
+        """
+        if abs(lat_deg) > 90.0:
+            raise DataError(
+                f"a latitude of {lat_deg:.9g} deg is beyond the pole",
+                quantity="lat_deg",
+                remedy="latitude and longitude seem to be swapped: latitude comes first"
+                if abs(lon_deg) <= 90.0
+                else "give geodetic latitude within -90 to 90 deg, north positive",
+            )
+        if abs(lon_deg) > 360.0:
+            raise DataError(
+                f"a longitude of {lon_deg:.9g} deg is more than a full turn",
+                quantity="lon_deg",
+                remedy="give longitude within -180 to 360 deg, east positive",
+            )
+        return cls(
+            time=time,
+            lat=math.radians(lat_deg),
+            lon=math.radians(lon_deg),
+            alt=alt,
+            v_n=np.asarray(v_n, dtype=np.float64),
+            q_nb=rotation.quaternion_from_euler([roll_deg, pitch_deg, heading_deg]),
+        )
+
+    @classmethod
+    def from_trajectory(cls, trajectory: pd.DataFrame, row: int = 0) -> NavState:
+        """Take a row of a Trajectory table.
+
+        Parameters
+        ----------
+        trajectory : DataFrame
+        row : int
+            Position of the row; negative from the end.
+
+        Returns
+        -------
+        NavState
+        """
+        at = trajectory.iloc[row]
+        return cls.from_degrees(
+            float(at["lat"]),
+            float(at["lon"]),
+            float(at["alt"]),
+            v_n=at[["VN", "VE", "VD"]].to_numpy(dtype=np.float64),
+            roll_deg=float(at["roll"]),
+            pitch_deg=float(at["pitch"]),
+            heading_deg=float(at["heading"]),
+            time=float(trajectory.index[row]),
+        )
+
+    @property
+    def roll_pitch_heading(self) -> Array:
+        """Attitude as 3-2-1 angles, (3,), deg."""
+        return rotation.euler_from_quaternion(self.q_nb)
+
+    def to_trajectory(self) -> pd.DataFrame:
+        """Return the state as a Trajectory table of one row."""
+        place = [math.degrees(self.lat), math.degrees(self.lon), self.alt]
+        return trajectory_table(
+            [self.time], [place], [self.v_n], [self.roll_pitch_heading], source=None
+        )
+
+
+def _beyond_in_radians(lat: float, lon: float) -> str:
+    if abs(lat) <= math.pi and abs(lon) <= 0.5 * math.pi:
+        return "latitude and longitude seem to be swapped: latitude comes first"
+    return "this looks like degrees: use NavState.from_degrees"

@@ -1,0 +1,94 @@
+"""The tables that flow between stages: their columns, their units, and who checks them.
+
+Each is a pandas DataFrame with fixed columns. A table that was made by the functions here is
+valid; a table from elsewhere is checked by ``check_*`` before it is used. Inputs are never
+changed in place.
+
+======================  =====================  ===================================================
+table                   index                  columns
+======================  =====================  ===================================================
+Imu                     ``time`` s             ``gyro_x..z`` rad/s, and where there is an
+                                               accelerometer ``accel_x..z`` m/s² (specific force),
+                                               where there is a magnetometer ``mag_x..z`` µT;
+                                               body axes forward-right-down;
+                                               ``attrs["sampling"]``: ``instantaneous`` at the
+                                               stamp, or ``mean`` over the interval that ends there
+Increments              ``time`` s, its end    ``dt`` s, ``theta_x..z`` rad, ``dtheta_x..z`` rad
+                                               (change of the rate over the step times `dt`)
+MotionIncrements        ``time`` s, its end    ``dt`` s, ``phi_x..z`` rad (rotation vector),
+                                               ``dv_x..z`` m/s, ``dr_x..z`` m (what specific force
+                                               gave, in the body axes at the start of the step)
+Trajectory              ``time`` s             ``lat lon`` deg, ``alt`` m (ellipsoidal), ``VN VE
+                                               VD`` m/s, ``roll pitch heading`` deg
+Attitude                ``time`` s             ``q_w q_x q_y q_z`` (body to local level) and
+                                               ``roll pitch heading`` deg
+References              none                   ``time`` s, ``kind`` (``known``, ``tilt``,
+                                               ``same``, ``turns``), ``since`` s, ``roll pitch
+                                               heading`` deg, ``turns``, ``axis``, ``sd`` deg
+======================  =====================  ===================================================
+"""
+
+from __future__ import annotations
+
+from strapdown.tables.attitude import attitude_table, check_attitude
+from strapdown.tables.columns import (
+    ACCEL,
+    DR,
+    DTHETA,
+    DV,
+    EULER,
+    GEODETIC,
+    GYRO,
+    MAG,
+    NED,
+    PHI,
+    QUATERNION,
+    REFERENCE,
+    THETA,
+    VELOCITY,
+)
+from strapdown.tables.gaps import Gap, find_gaps
+from strapdown.tables.imu import SAMPLINGS, check_imu, imu_table
+from strapdown.tables.increments import check_increments, increments_table
+from strapdown.tables.motion_increments import (
+    MOTION,
+    check_motion_increments,
+    motion_increments_table,
+)
+from strapdown.tables.references import REFERENCE_KINDS, check_references, references_table
+from strapdown.tables.trajectory import TRAJECTORY, check_trajectory, trajectory_table
+
+__all__ = [
+    "ACCEL",
+    "DR",
+    "DTHETA",
+    "DV",
+    "EULER",
+    "GEODETIC",
+    "GYRO",
+    "MAG",
+    "MOTION",
+    "NED",
+    "PHI",
+    "QUATERNION",
+    "REFERENCE",
+    "REFERENCE_KINDS",
+    "SAMPLINGS",
+    "THETA",
+    "TRAJECTORY",
+    "VELOCITY",
+    "Gap",
+    "attitude_table",
+    "check_attitude",
+    "check_imu",
+    "check_increments",
+    "check_motion_increments",
+    "check_references",
+    "check_trajectory",
+    "find_gaps",
+    "imu_table",
+    "increments_table",
+    "motion_increments_table",
+    "references_table",
+    "trajectory_table",
+]

@@ -1,0 +1,109 @@
+"""What every table is checked for: shapes, columns, finite numbers, advancing time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import DataError
+
+Array = NDArray[np.float64]
+
+
+def as_array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
+    """Numbers of shape (n,), or (n, columns)."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0, 0))
+    wanted = 1 if columns is None else 2
+    if array.ndim != wanted or (columns is not None and array.shape[1] != columns):
+        raise DataError(
+            f"it is no array of numbers of shape ({'n,' if columns is None else f'n, {columns}'})",
+            file=source,
+            quantity=name,
+            remedy="pass one row a sample",
+        )
+    return array
+
+
+def check_same_length(source: str | None, **arrays: Array) -> None:
+    """One row a sample in each."""
+    if len({len(a) for a in arrays.values()}) > 1:
+        lengths = ", ".join(f"{name} {len(a)}" for name, a in arrays.items())
+        raise DataError(
+            f"the arrays have different lengths: {lengths}",
+            file=source,
+            remedy="pass one row a sample in each",
+        )
+
+
+def check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
+    """Every value is finite; else the first that is not is named."""
+    bad = ~np.isfinite(values)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise DataError(
+            f"not a finite number ({values[row, column]})",
+            file=source,
+            row=row + 1,
+            quantity=columns[column],
+            remedy="drop the row, or fill it before the table is made",
+        )
+
+
+def check_time(time: Array, source: str | None) -> None:
+    """Stamps are finite and advance."""
+    check_rows(time[:, None], ["time"], source)
+    steps = np.diff(time)
+    if (steps <= 0.0).any():
+        row = int(np.argmax(steps <= 0.0)) + 1
+        raise DataError(
+            f"time does not advance: {time[row - 1]:.9g} s is followed by {time[row]:.9g} s",
+            file=source,
+            row=row + 1,
+            quantity="time",
+            remedy="sort the rows and drop repeated stamps",
+        )
+
+
+def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | None) -> None:
+    """Every column is there."""
+    missing = [c for c in columns if c not in table.columns]
+    if missing:
+        raise DataError(
+            f"missing columns: {', '.join(missing)}; it has {', '.join(map(str, table.columns))}",
+            file=source,
+            remedy=f"a table of this kind needs {', '.join(columns)}",
+        )
+
+
+def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
+    """Columns as one contiguous array of floats."""
+    return np.ascontiguousarray(table[list(columns)].to_numpy(dtype=np.float64))
+
+
+def index_of(table: pd.DataFrame) -> Array:
+    """Stamps as floats."""
+    return np.asarray(table.index.to_numpy(), dtype=np.float64)
+
+
+def check_steps(table: pd.DataFrame, source: str | None) -> None:
+    """Steps are positive, and none begins before the one before it has ended."""
+    time, dt = index_of(table), values_of(table, ["dt"])[:, 0]
+    # Stamps of epoch size carry no more than this.
+    slack = 8.0 * float(np.spacing(np.abs(time).max(initial=1.0)))
+    overlap = np.flatnonzero((dt <= 0.0) | np.r_[False, time[1:] - dt[1:] < time[:-1] - slack])
+    if overlap.size:
+        row = int(overlap[0])
+        raise DataError(
+            f"a step of {dt[row]:.9g} s ending at {time[row]:.9g} s is not positive, or begins "
+            "before the last one ended",
+            file=source,
+            row=row + 1,
+            quantity="dt",
+            remedy="the index is the end of each step, and dt its length in seconds",
+        )

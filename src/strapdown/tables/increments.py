@@ -1,0 +1,78 @@
+"""Increments tables: the rate alone, step by step, before any algorithm."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.tables.checks import (
+    as_array,
+    check_columns,
+    check_rows,
+    check_same_length,
+    check_steps,
+    check_time,
+    index_of,
+    values_of,
+)
+from strapdown.tables.columns import DTHETA, THETA
+
+
+def increments_table(
+    time: ArrayLike, dt: ArrayLike, theta: ArrayLike, dtheta: ArrayLike | None = None
+) -> pd.DataFrame:
+    """Make an Increments table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        End of each step.
+    dt : array_like, (n,), s
+        Length of each step.
+    theta : array_like, (n, 3), rad
+        Integral of the body rate over the step.
+    dtheta : array_like, (n, 3), rad, optional
+        Change of the body rate over the step times `dt`; zero, where it is not known.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, a value is not finite, or a step has no positive length.
+    """
+    ends, lengths = as_array(time, None, "time"), as_array(dt, None, "dt")
+    angles = as_array(theta, 3, "theta")
+    change = np.zeros_like(angles) if dtheta is None else as_array(dtheta, 3, "dtheta")
+    check_same_length(None, time=ends, dt=lengths, theta=angles, dtheta=change)
+    table = pd.DataFrame(
+        np.column_stack([lengths, angles, change]),
+        index=pd.Index(ends, name="time"),
+        columns=["dt", *THETA, *DTHETA],
+    )
+    check_increments(table)
+    return table
+
+
+def check_increments(table: pd.DataFrame) -> None:
+    """Check an Increments table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a step is not
+        positive, or a step begins before the one before it has ended.
+    """
+    source = table.attrs.get("source")
+    columns = ["dt", *THETA, *DTHETA]
+    check_columns(table, columns, source)
+    check_time(index_of(table), source)
+    check_rows(values_of(table, columns), columns, source)
+    check_steps(table, source)

@@ -1,0 +1,98 @@
+"""Trajectory tables: place, velocity and attitude."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.exceptions import DataError
+from strapdown.tables.checks import (
+    as_array,
+    check_columns,
+    check_rows,
+    check_same_length,
+    check_time,
+    index_of,
+    values_of,
+)
+from strapdown.tables.columns import EULER, GEODETIC, VELOCITY
+
+TRAJECTORY = [*GEODETIC, *VELOCITY, *EULER]
+
+
+def trajectory_table(
+    time: ArrayLike,
+    place: ArrayLike,
+    velocity: ArrayLike,
+    euler: ArrayLike,
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Make a Trajectory table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    place : array_like, (n, 3)
+        Geodetic latitude and longitude in deg, height over the ellipsoid in m.
+    velocity : array_like, (n, 3), m/s
+        Relative to the Earth: north, east, down.
+    euler : array_like, (n, 3), deg
+        Roll, pitch, heading; body forward-right-down to north-east-down.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_trajectory`.
+    """
+    stamps = as_array(time, None, "time", source)
+    places, speeds = as_array(place, 3, "place", source), as_array(velocity, 3, "velocity", source)
+    angles = as_array(euler, 3, "euler", source)
+    check_same_length(source, time=stamps, place=places, velocity=speeds, euler=angles)
+    table = pd.DataFrame(
+        np.hstack([places, speeds, angles]),
+        index=pd.Index(stamps, name="time"),
+        columns=TRAJECTORY,
+    )
+    table.attrs["source"] = source
+    check_trajectory(table)
+    return table
+
+
+def check_trajectory(table: pd.DataFrame) -> None:
+    """Check a Trajectory table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, or a latitude is
+        beyond 90 deg.
+    """
+    source = table.attrs.get("source")
+    check_columns(table, TRAJECTORY, source)
+    check_time(index_of(table), source)
+    check_rows(values_of(table, TRAJECTORY), TRAJECTORY, source)
+    lat, lon = values_of(table, ["lat", "lon"]).T
+    beyond = np.flatnonzero(np.abs(lat) > 90.0)
+    if beyond.size:
+        row = int(beyond[0])
+        swapped = bool(np.all(np.abs(lon) <= 90.0))
+        raise DataError(
+            f"a latitude of {lat[row]:.9g} deg is beyond the pole",
+            file=source,
+            row=row + 1,
+            quantity="lat",
+            remedy="latitude and longitude seem to be swapped: exchange the columns"
+            if swapped
+            else "give geodetic latitude in degrees, north positive, within -90 to 90",
+        )
