@@ -17,17 +17,20 @@ A, E2, GAMMA, K, RATE, F, M = 0, 1, 2, 3, 4, 5, 6
 SIZE = 7
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def radii(s, a, e2):
     """Radii of curvature of the surface: of the meridian, and of the prime vertical, m."""
-    w2 = 1.0 - e2 * s * s
-    transverse = a / math.sqrt(w2)
-    return transverse * (1.0 - e2) / w2, transverse
+    w = 1.0 / math.sqrt(1.0 - e2 * s * s)
+    return a * (1.0 - e2) * w * w * w, a * w
 
 
-@njit(cache=True)
-def gravity(s, c, alt, a, e2, gamma, k, f, m):
-    """North and down components of normal gravity, m/s²; the east one is zero.
+@njit(cache=True, error_model="numpy", inline="always")
+def gravity_around(s, c, alt, meridian, transverse, a, e2, gamma, k, f, m):
+    """Normal gravity at a place and how it changes around it; radii of the surface.
+
+    Returns the north and down components in m/s², the change of each with latitude and with
+    height, and the square term of the down component in the height: by it the down component is
+    exact in the height, and the rest is of the second order of a displacement.
 
     Down: Somigliana's formula, continued upward by the second order of the height (Heiskanen and
     Moritz 1967, Eq. (2-124)). North: that the field has no curl makes of it
@@ -35,15 +38,35 @@ def gravity(s, c, alt, a, e2, gamma, k, f, m):
     surface.
     """
     s2 = s * s
-    w2 = 1.0 - e2 * s2
-    w = math.sqrt(w2)
+    # a / transverse is the root of 1 - e2 s2.
+    inverse_a = 1.0 / a
+    w = transverse * inverse_a
     numerator = 1.0 + k * s2
-    surface = gamma * numerator / w
-    x = alt / a
-    down = surface * (1.0 - x * (2.0 * (1.0 + f + m - 2.0 * f * s2) - 3.0 * x))
-    slope = gamma * s * c * (2.0 * k + e2 * numerator / w2) / w
-    meridian = a * (1.0 - e2) / (w2 * w)
-    return -slope * alt / (meridian + alt), down
+    surface = gamma * w * numerator
+    steep = gamma * w * (2.0 * k + e2 * numerator * w * w)
+    slope = steep * s * c
+    x = alt * inverse_a
+    linear = 2.0 * (1.0 + f + m - 2.0 * f * s2)
+    shrink = -1.0 / (meridian + alt)
+    return (
+        slope * alt * shrink,
+        surface * (1.0 - x * (linear - 3.0 * x)),
+        steep * (c * c - s2) * alt * shrink,
+        slope * shrink,
+        slope * (1.0 - x * linear) + 8.0 * f * s * c * x * surface,
+        -surface * inverse_a * (linear - 6.0 * x),
+        3.0 * surface * inverse_a * inverse_a,
+    )
+
+
+@njit(cache=True)
+def gravity(s, c, alt, a, e2, gamma, k, f, m):
+    """North and down components of normal gravity, m/s²; the east one is zero."""
+    meridian, transverse = radii(s, a, e2)
+    north, down, _, _, _, _, _ = gravity_around(
+        s, c, alt, meridian, transverse, a, e2, gamma, k, f, m
+    )
+    return north, down
 
 
 @njit(cache=True)

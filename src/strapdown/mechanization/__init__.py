@@ -1,1 +1,23 @@
-"""Strapdown mechanizations: one file each."""
+"""Strapdown mechanizations: one file each, and the one table of them."""
+
+from __future__ import annotations
+
+from strapdown.mechanization.mechanization import HEIGHTS, Mechanization
+from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.run import NavigationRun, navigate_segments, run_mechanization
+from strapdown.mechanization.tadic import Tadic
+from strapdown.mechanization.tracker import NavTracker
+
+__all__ = [
+    "HEIGHTS",
+    "MECHANIZATIONS",
+    "Mechanization",
+    "NavTracker",
+    "NavigationRun",
+    "NorthEastDown",
+    "Tadic",
+    "navigate_segments",
+    "run_mechanization",
+]
+
+MECHANIZATIONS: dict[str, type[Mechanization]] = {"ned": NorthEastDown, "tadic": Tadic}

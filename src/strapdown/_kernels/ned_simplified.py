@@ -1,0 +1,91 @@
+"""Navigation in local north-east-down as Tadic and Vukajlovic (2016) describe it, term by term.
+
+Every step takes velocity, place and their rates as they are at its start, and the position by the
+trapezoid: the first order of the step in what is slow. What the paper leaves out, or says may be
+left out, is a switch.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from strapdown._kernels.earth import earth_rate, gravity_around, radii, transport_rate
+from strapdown._kernels.ned import DONE, FREE, ROW, guide_height, verdict
+from strapdown._kernels.rotation import (
+    dcm_from_quat,
+    quat_from_rotvec,
+    quat_multiply,
+    quat_normalise,
+)
+
+# Places of the state after the ten that are kept: the sum of the vertical loop.
+SUM = 10
+STATE = 11
+
+
+@njit(cache=True, error_model="numpy")
+def simplified_advance(
+    state, increments, reference, earth, options, coriolis, turning, transport, history
+):
+    """As `ned.ned_advance`; three switches are 1 or 0.
+
+    `coriolis` is the second term of (1); `turning` and `transport` are the Earth's rate (7) and
+    the transport rate (8), in the attitude and in that term.
+    """
+    a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
+    rate, f, m = earth[4], earth[5], earth[6]
+    mode = options[0]
+    steps = increments.shape[0]
+    for i in range(steps):
+        lat, lon, alt, vn, ve, vd = state[0], state[1], state[2], state[3], state[4], state[5]
+        qw, qx, qy, qz = state[6], state[7], state[8], state[9]
+        dt = increments[i, 0]
+        s, c = math.sin(lat), math.cos(lat)
+        meridian, transverse = radii(s, a, e2)
+        _, g, _, _, _, _, _ = gravity_around(
+            s, c, alt, meridian, transverse, a, e2, gamma, k, f, m
+        )
+        rm, rp = meridian + alt, transverse + alt
+        on, od = earth_rate(s, c, turning * rate)
+        tn, te, td = transport_rate(s, c, vn, ve, rm, rp)
+        tn, te, td = transport * tn, transport * te, transport * td
+        # (3)-(6), the specific force of (1) integrated over the step.
+        c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(qw, qx, qy, qz)
+        ux, uy, uz = increments[i, 4], increments[i, 5], increments[i, 6]
+        wn, we, wd = coriolis * (2.0 * on + tn), coriolis * te, coriolis * (2.0 * od + td)
+        n1 = vn + c11 * ux + c12 * uy + c13 * uz - dt * (we * vd - wd * ve)
+        e1 = ve + c21 * ux + c22 * uy + c23 * uz - dt * (wd * vn - wn * vd)
+        d1 = vd + c31 * ux + c32 * uy + c33 * uz - dt * (wn * ve - we * vn) + dt * g
+        # (9), by the trapezoid.
+        mean_n, mean_e, mean_d = 0.5 * (vn + n1), 0.5 * (ve + e1), 0.5 * (vd + d1)
+        turn = dt * mean_e / (rp * c)
+        lat1 = lat + dt * mean_n / rm
+        # (11)-(13): the body; (14)-(17): the level, conjugated, from the left.
+        bw, bx, by, bz = quat_from_rotvec(increments[i, 1], increments[i, 2], increments[i, 3])
+        bw, bx, by, bz = quat_multiply(qw, qx, qy, qz, bw, bx, by, bz)
+        mw, mx, my, mz = quat_from_rotvec(-dt * (on + tn), -dt * te, -dt * (od + td))
+        bw, bx, by, bz = quat_multiply(mw, mx, my, mz, bw, bx, by, bz)
+        bw, bx, by, bz = quat_normalise(bw, bx, by, bz)
+        height, d1, total = alt - dt * mean_d, d1, state[SUM]
+        if mode != FREE:
+            wanted = math.nan
+            if reference.shape[0] > 0:
+                wanted = reference[i]
+            height, d1, total = guide_height(
+                height, d1, total, alt, wanted, dt, mode, options[1], options[2], options[3]
+            )
+        cosine = math.cos(lat1)
+        why = verdict(
+            height, n1, e1, d1, bw, cosine, turn, options[4], options[5], options[6], options[7]
+        )
+        if why != DONE:
+            return i, why
+        state[0], state[1], state[2] = lat1, lon + turn, height
+        state[3], state[4], state[5] = n1, e1, d1
+        state[6], state[7], state[8], state[9] = bw, bx, by, bz
+        state[SUM] = total
+        for j in range(ROW):
+            history[i, j] = state[j]
+    return steps, DONE

@@ -1,0 +1,274 @@
+"""What every mechanization is: a state, a way to advance it, a trajectory read from it."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown._kernels.earth import RATE
+from strapdown._kernels.ned import POLE, ROW, V, reverse_increments
+from strapdown._kernels.trajectory import trajectory_rows
+from strapdown.ellipsoids import ELLIPSOIDS, find_ellipsoid
+from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
+from strapdown.nav_state import NavState
+from strapdown.tables import MOTION, trajectory_table
+from strapdown.tables.trajectory import TRAJECTORY
+
+Array = NDArray[np.float64]
+
+#: What may become of the height: it follows from the sensors; it is kept; a reference damps it.
+HEIGHTS = ("free", "held", "damped")
+
+
+@dataclass(frozen=True)
+class Mechanization(ABC):
+    """A way to navigate by motion increments, with its options; it holds no state of its own.
+
+    Attributes
+    ----------
+    ellipsoid : str
+        One of `ellipsoids.ELLIPSOIDS`; also of the places that go in and come out.
+    height : {'free', 'held', 'damped'}
+        The height follows from the sensors, whose errors it multiplies by e every 570 s; or is
+        kept where it is, and the vertical velocity at zero; or a loop of the third order draws
+        it to the reference heights that `advance` is given.
+    height_time_constant : float, s
+        Of each of the three poles of that loop, 1 to 1000.
+    latitude_limit_deg : float, deg
+        Where north is no longer used: beyond it a run stops.
+    largest_speed : float, m/s
+        Above it the state is taken to have diverged.
+    height_limits : tuple of float, m
+        Outside of them, too.
+
+    Raises
+    ------
+    ConfigError
+        An option is unknown or outside its range.
+    """
+
+    ellipsoid: str = "wgs84"
+    height: str = "free"
+    height_time_constant: float = 50.0
+    latitude_limit_deg: float = 89.9
+    largest_speed: float = 10_000.0
+    height_limits: tuple[float, float] = (-15_000.0, 1_000_000.0)
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    source: ClassVar[str]
+
+    def __post_init__(self) -> None:
+        find_ellipsoid(self.ellipsoid)
+        if self.height not in HEIGHTS:
+            raise ConfigError(
+                f"'{self.height}' is nothing that the height can be",
+                quantity="height",
+                remedy=nearest(self.height, HEIGHTS),
+            )
+        for name, low, high in (
+            ("height_time_constant", 1.0, 1000.0),
+            ("latitude_limit_deg", 0.0, 89.999),
+            ("largest_speed", 1.0, 30_000.0),
+        ):
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ConfigError(
+                    f"{value:g} is outside {low:g} to {high:g}",
+                    quantity=name,
+                    remedy="choose a value in that range",
+                )
+
+    @abstractmethod
+    def begin(self, start: NavState) -> Array:
+        """Return the state of the kernel at a start."""
+
+    @abstractmethod
+    def advance_rows(
+        self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
+    ) -> tuple[int, int]:
+        """Advance `state` over rows of increments; return the steps made, and why no more."""
+
+    def nav_state(self, state: Array, time: float) -> NavState:
+        """Return the place, velocity and attitude of a state.
+
+        Parameters
+        ----------
+        state : ndarray
+        time : float, s
+
+        Returns
+        -------
+        NavState
+        """
+        return NavState(
+            time=time,
+            lat=float(state[0]),
+            lon=math.remainder(float(state[1]), 2.0 * math.pi),
+            alt=float(state[2]),
+            v_n=state[3:6],
+            q_nb=state[6:10],
+        )
+
+    def kernel_options(self) -> Array:
+        """Options and limits as the kernels take them."""
+        tau = self.height_time_constant
+        earth = ELLIPSOIDS[self.ellipsoid.lower()]
+        # Three poles at -1/tau; the second gain also holds what gravity gives away with height.
+        spring = 2.0 * earth.gravity_at_equator / earth.semi_major_axis
+        return np.array(
+            [
+                float(HEIGHTS.index(self.height)),
+                3.0 / tau,
+                3.0 / tau**2 + spring,
+                1.0 / tau**3,
+                np.cos(np.radians(self.latitude_limit_deg)),
+                self.largest_speed,
+                *self.height_limits,
+            ]
+        )
+
+    def advance(
+        self,
+        state: Array,
+        increments: pd.DataFrame,
+        heights: ArrayLike | None = None,
+        *,
+        backward: bool = False,
+    ) -> tuple[Array, Array]:
+        """Advance over a segment of motion increments.
+
+        Parameters
+        ----------
+        state : ndarray
+            From `begin`, or from an earlier segment; it is not changed.
+        increments : DataFrame
+            A MotionIncrements table of any length, one row included.
+        heights : array_like, (n,), m, optional
+            Reference heights at the ends of the steps (backward: at their starts), for a damped
+            height; NaN where there is none.
+        backward : bool
+            Go from the end of the increments to their start.
+
+        Returns
+        -------
+        state : ndarray
+            After the last step.
+        history : ndarray, (n, 10)
+            Latitude and longitude in rad, height in m, velocity north, east, down in m/s, and
+            ``q_nb`` after each step; backward the first row is the start of the first step.
+
+        Raises
+        ------
+        DivergenceError
+            The state has left the range in which this mechanization means anything, or is too
+            near a pole; the first step for which this is so is named.
+        DataError
+            `heights` is missing where the height is damped, or has another length.
+        """
+        rows = motion_rows(increments)
+        reference = self._heights(heights, len(rows))
+        earth = find_ellipsoid(self.ellipsoid).parameters()
+        after = state.copy()
+        history = np.empty((len(rows), ROW))
+        if backward:
+            # The same motion met backward is a motion with opposite velocity on an Earth that
+            # turns the other way.
+            forward, rows = rows, np.empty_like(rows)
+            reverse_increments(forward, rows)
+            reference = reference[::-1].copy()
+            earth[RATE] *= -1.0
+            after[V : V + 3] *= -1.0
+        made, why = self.advance_rows(after, rows, reference, earth, history)
+        if why:
+            at = len(rows) - 1 - made if backward else made
+            self._refuse(why, at, increments, history[made - 1] if made else None)
+        if backward:
+            after[V : V + 3] *= -1.0
+            history = history[::-1].copy()
+            history[:, V : V + 3] *= -1.0
+        return after, history
+
+    def trajectory(self, time: ArrayLike, history: Array, source: str | None = None) -> pd.DataFrame:
+        """Return a history as a Trajectory table.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+        history : ndarray, (n, 10)
+        source : str, optional
+            Name for messages.
+
+        Returns
+        -------
+        DataFrame
+        """
+        table = np.empty((len(history), len(TRAJECTORY)))
+        trajectory_rows(history, table)
+        return trajectory_table(
+            time, table[:, :3], table[:, 3:6], table[:, 6:], source
+        )
+
+    def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
+        if self.height != "damped":
+            return np.empty(0)
+        if heights is None:
+            raise DataError(
+                "the height is to be damped, and there is no reference for it",
+                quantity="heights",
+                remedy="give a height for every step, or use height='held' or 'free'",
+            )
+        reference = np.ascontiguousarray(heights, dtype=np.float64)
+        if reference.shape != (steps,):
+            raise DataError(
+                f"its shape is {reference.shape}, and there are {steps} steps",
+                quantity="heights",
+                remedy="give one height in m for every step, NaN where there is none",
+            )
+        return reference
+
+    def _refuse(
+        self, why: int, step: int, increments: pd.DataFrame, last: Array | None
+    ) -> None:
+        time = float(increments.index[step])
+        row = increments.iloc[step]
+        before = ""
+        if last is not None:
+            before = (
+                f"; before it {np.degrees(last[0]):.6f} deg of latitude, {last[2]:.6g} m of height, "
+                f"{np.linalg.norm(last[3:6]):.6g} m/s"
+            )
+        source = increments.attrs.get("source")
+        if why == POLE:
+            raise DivergenceError(
+                f"the step ending at {time:.9g} s comes nearer to a pole than "
+                f"{self.latitude_limit_deg:g} deg of latitude{before}: north, and every angle from "
+                "it, changes too fast there",
+                file=source,
+                row=step + 1,
+                quantity="lat",
+                remedy="end the run before it; north-east-down has no meaning at a pole",
+            )
+        given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
+        raise DivergenceError(
+            f"the state has diverged in the step ending at {time:.9g} s ({given}){before}",
+            file=source,
+            row=step + 1,
+            quantity="state",
+            remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+            "gravity (-9.8 on z at level rest), a burst; and at the start: an attitude in rad, "
+            "an over-long run with a free height",
+        )
+
+
+def motion_rows(increments: pd.DataFrame) -> Array:
+    """Take the rows of a MotionIncrements table as the kernels have them, (n, 10)."""
+    if list(increments.columns) == MOTION:
+        return np.ascontiguousarray(increments.to_numpy(dtype=np.float64))
+    return np.ascontiguousarray(increments[MOTION].to_numpy(dtype=np.float64))

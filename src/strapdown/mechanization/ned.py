@@ -1,0 +1,71 @@
+"""North-east-down, with every term."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from strapdown._kernels import ned as kernel
+from strapdown.mechanization.mechanization import Array, Mechanization
+from strapdown.nav_state import NavState
+
+
+@dataclass(frozen=True)
+class NorthEastDown(Mechanization):
+    """Navigation in local north-east-down on the ellipsoid.
+
+    Velocity and position by Tadic and Vukajlovic (2016), Eqs. (1)-(9), with Earth and transport
+    rate and normal gravity with height; attitude by their two-step quaternion, Eqs. (11)-(19).
+    The equations are integrated in axes that are fixed in inertial space over a step, so that its
+    own error is of the fifth order of the step, or too small to matter (`_kernels.ned`); what
+    remains is that of the increments.
+
+    Valid up to `latitude_limit_deg`, where it stops.
+
+    Attributes
+    ----------
+    ellipsoid, height, height_time_constant, latitude_limit_deg, largest_speed, height_limits
+        As `Mechanization`.
+    """
+
+    name: ClassVar[str] = "ned"
+    title: ClassVar[str] = "north-east-down, every term"
+    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+
+    def begin(self, start: NavState) -> Array:
+        """Return the state of the kernel at a start.
+
+        Parameters
+        ----------
+        start : NavState
+
+        Returns
+        -------
+        ndarray, (13,)
+        """
+        down = 0.0 if self.height == "held" else start.v_n[2]
+        return np.array(
+            [
+                start.lat,
+                start.lon,
+                start.alt,
+                start.v_n[0],
+                start.v_n[1],
+                down,
+                *start.q_nb,
+                math.sin(start.lat),
+                math.cos(start.lat),
+                0.0,
+            ]
+        )
+
+    def advance_rows(
+        self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
+    ) -> tuple[int, int]:
+        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        options = self.kernel_options()
+        made, why = kernel.ned_advance(state, increments, heights, earth, options, history)
+        return made, why

@@ -1,0 +1,206 @@
+"""A whole run, or one in pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.increments import motion_increments
+from strapdown.mechanization.mechanization import Mechanization
+from strapdown.nav_state import NavState
+from strapdown.tables import check_motion_increments
+
+# The longest step, in s, over which two samples say what happened between them. Longer holes
+# are for the user to judge.
+LONGEST_STEP = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationRun:
+    """What a mechanization made of a log.
+
+    Attributes
+    ----------
+    trajectory : DataFrame
+        Trajectory table, the start included.
+    start, end : NavState
+        The state that was given, and that at the other end: the last, or of a backward run the
+        first.
+    findings : tuple of Finding
+        What a person should know of the increments.
+    """
+
+    trajectory: pd.DataFrame
+    start: NavState
+    end: NavState
+    findings: tuple[Finding, ...] = field(default=())
+
+
+def run_mechanization(
+    mechanization: Mechanization,
+    start: NavState,
+    increments: pd.DataFrame,
+    *,
+    heights: ArrayLike | None = None,
+    backward: bool = False,
+    longest_step: float = LONGEST_STEP,
+) -> NavigationRun:
+    """Navigate over a log.
+
+    Parameters
+    ----------
+    mechanization : Mechanization
+    start : NavState
+        At the start of the first step; of a backward run at the end of the last.
+    increments : DataFrame
+        A MotionIncrements table.
+    heights : array_like, (n,), m, optional
+        As `Mechanization.advance`.
+    backward : bool
+        From the end of the log to its start.
+    longest_step : float, s
+        A step longer than this is a hole over which nothing is known, and refused.
+
+    Returns
+    -------
+    NavigationRun
+
+    Raises
+    ------
+    DataError
+        The table is not valid, a step is too long, or `start` is not at the time where the
+        increments begin.
+    DivergenceError
+        As `Mechanization.advance`.
+    """
+    check_motion_increments(increments)
+    if increments.empty:
+        raise DataError(
+            "there is no increment",
+            file=increments.attrs.get("source"),
+            quantity="increments",
+            remedy="a log of at least two samples is needed",
+        )
+    findings = _check_steps(increments, longest_step)
+    ends = increments.index.to_numpy(dtype=np.float64)
+    begin = float(ends[0] - increments["dt"].iloc[0])
+    _check_start(start, float(ends[-1]) if backward else begin, increments)
+    state, history = mechanization.advance(
+        mechanization.begin(start), increments, heights, backward=backward
+    )
+    first = mechanization.begin(start)[None, : history.shape[1]]
+    rows = np.concatenate([history, first] if backward else [first, history])
+    time = np.concatenate([[begin], ends])
+    source = increments.attrs.get("source")
+    return NavigationRun(
+        trajectory=mechanization.trajectory(time, rows, source),
+        start=start,
+        end=mechanization.nav_state(state, begin if backward else float(ends[-1])),
+        findings=findings,
+    )
+
+
+def navigate_segments(
+    mechanization: Mechanization,
+    start: NavState,
+    segments: Iterable[pd.DataFrame],
+    *,
+    longest_step: float = LONGEST_STEP,
+) -> Iterator[pd.DataFrame]:
+    """Navigate over a log that comes in pieces, in constant memory.
+
+    The numbers are those of a run over the whole log, to the last bit.
+
+    Parameters
+    ----------
+    mechanization : Mechanization
+        Its height free or held.
+    start : NavState
+        At the first sample.
+    segments : iterable of DataFrame
+        Imu tables, one after the other, of any lengths.
+    longest_step : float, s
+        As `run_mechanization`.
+
+    Yields
+    ------
+    DataFrame
+        Trajectory table of each segment, at its samples; of the first from its second sample on.
+
+    Raises
+    ------
+    DataError, DivergenceError
+        As `run_mechanization`.
+    """
+    state = mechanization.begin(start)
+    kept: pd.DataFrame | None = None
+    for segment in segments:
+        # Two samples back: the step before tells how a mean rate changes over the next.
+        joined = segment
+        if kept is not None:
+            joined = pd.concat([kept, segment])
+            joined.attrs = dict(segment.attrs)
+        if len(joined) < 2:
+            kept = joined
+            continue
+        increments = motion_increments(joined)
+        if kept is None:
+            begin = float(increments.index[0] - increments["dt"].iloc[0])
+            _check_start(start, begin, increments)
+        elif len(kept) == 2:
+            increments = increments.iloc[1:]
+        _check_steps(increments, longest_step)
+        state, history = mechanization.advance(state, increments)
+        time = increments.index.to_numpy(dtype=np.float64)
+        yield mechanization.trajectory(time, history, segment.attrs.get("source"))
+        kept = joined.iloc[-2:]
+
+
+def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> None:
+    slack = 0.5 * float(increments["dt"].iloc[0])
+    if abs(start.time - begin) > slack:
+        raise DataError(
+            f"the state is at {start.time:.9g} s, and the increments begin at {begin:.9g} s",
+            file=increments.attrs.get("source"),
+            quantity="time",
+            remedy="give the state of that instant, or cut the log where the state is known",
+        )
+
+
+def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...]:
+    dt = increments["dt"].to_numpy(dtype=np.float64)
+    long = np.flatnonzero(dt > longest)
+    source = increments.attrs.get("source")
+    if long.size:
+        row = int(long[0])
+        end = float(increments.index[row])
+        raise DataError(
+            f"a gap of {dt[row]:.6g} s, from {end - dt[row]:.9g} s to {end:.9g} s: what the body "
+            f"did in it is not known ({long.size} such)",
+            file=source,
+            row=row + 1,
+            quantity="dt",
+            remedy=f"cut the log there, or pass longest_step={float(dt.max()):.3g} or more to join "
+            "its sides by a line",
+        )
+    usual = float(np.median(dt))
+    wide = np.flatnonzero(dt > 3.0 * usual)
+    if not wide.size:
+        return ()
+    row = int(wide[np.argmax(dt[wide])])
+    return (
+        Finding(
+            f"{wide.size} steps are more than three times as long as the usual {usual:.6g} s; the "
+            f"longest, {dt[row]:.6g} s, ends at {float(increments.index[row]):.9g} s: rate and "
+            "force are taken as linear over it",
+            file=source,
+            row=row + 1,
+            quantity="dt",
+            remedy="errors after it are larger than the sensors alone would make them",
+        ),
+    )

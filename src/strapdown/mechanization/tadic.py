@@ -1,0 +1,57 @@
+"""North-east-down with the simplifications of a paper, to see what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from strapdown._kernels import ned_simplified as kernel
+from strapdown.mechanization.mechanization import Array, Mechanization
+from strapdown.nav_state import NavState
+
+
+@dataclass(frozen=True)
+class Tadic(Mechanization):
+    """The equations of Tadic and Vukajlovic (2016) with the terms that they leave out.
+
+    Everything slow is taken at the start of a step: of the first order in it. Use `NorthEastDown`
+    to navigate; this one shows what a simplification costs.
+
+    Attributes
+    ----------
+    coriolis : bool
+        The second term of Eq. (1), which the paper leaves out.
+    earth_rate : bool
+        Eq. (7), which "can be neglected for short navigation".
+    transport_rate : bool
+        Eq. (8), the turn of the local level with the place.
+    ellipsoid, height, height_time_constant, latitude_limit_deg, largest_speed, height_limits
+        As `Mechanization`.
+    """
+
+    coriolis: bool = False
+    earth_rate: bool = True
+    transport_rate: bool = True
+
+    name: ClassVar[str] = "tadic"
+    title: ClassVar[str] = "north-east-down, with a paper's simplifications"
+    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+
+    def begin(self, start: NavState) -> Array:
+        """Return the state of the kernel at a start, (11,)."""
+        down = 0.0 if self.height == "held" else start.v_n[2]
+        return np.array(
+            [start.lat, start.lon, start.alt, start.v_n[0], start.v_n[1], down, *start.q_nb, 0.0]
+        )
+
+    def advance_rows(
+        self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
+    ) -> tuple[int, int]:
+        """Advance `state` over rows of increments; return the steps made, and why no more."""
+        switches = (float(self.coriolis), float(self.earth_rate), float(self.transport_rate))
+        made, why = kernel.simplified_advance(
+            state, increments, heights, earth, self.kernel_options(), *switches, history
+        )
+        return made, why

@@ -1,0 +1,151 @@
+"""Navigation sample by sample, as it runs on a device or live."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NoReturn
+
+import numpy as np
+from numba.core.errors import NumbaError
+from numpy.typing import ArrayLike
+
+from strapdown._kernels import ned_sample as kernel
+from strapdown._kernels.ned import POLE
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.exceptions import ConfigError, DataError, DivergenceError
+from strapdown.mechanization.mechanization import Array
+from strapdown.mechanization.ned import NorthEastDown
+from strapdown.nav_state import NavState
+from strapdown.tables import SAMPLINGS
+
+# Looked up once: at a microsecond a call, finding a name is a part of it.
+_ndarray = np.ndarray
+
+
+class NavTracker:
+    """Navigate from samples, one call a sample.
+
+    It gives the same numbers, to the last bit, as a run over the same samples with
+    `increments.motion_increments` at its defaults.
+
+    Parameters
+    ----------
+    start : NavState
+        At the first sample.
+    mechanization : NorthEastDown, optional
+    sampling : {'instantaneous', 'mean'}
+        What a sample is: the value at its stamp, or its mean over the interval that ends there.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is unknown.
+    """
+
+    __slots__ = ("_mechanization", "_record", "_update")
+
+    def __init__(
+        self,
+        start: NavState,
+        mechanization: NorthEastDown | None = None,
+        sampling: str = "instantaneous",
+    ) -> None:
+        if sampling not in SAMPLINGS:
+            raise ConfigError(
+                f"'{sampling}' is no kind of sampling",
+                quantity="sampling",
+                remedy=f"use {' or '.join(SAMPLINGS)}",
+            )
+        used = mechanization or NorthEastDown()
+        record = np.zeros(kernel.SIZE)
+        record[kernel.TIME] = start.time
+        record[kernel.MEAN] = float(sampling == "mean")
+        record[kernel.EARTH : kernel.OPTIONS] = find_ellipsoid(used.ellipsoid).parameters()
+        record[kernel.OPTIONS : kernel.STATE] = used.kernel_options()
+        record[kernel.STATE :] = used.begin(start)
+        self._mechanization = used
+        self._record = record
+        self._update = kernel.ned_update
+
+    def update(
+        self,
+        time: float,
+        gyro: Array | Sequence[float],
+        accel: Array | Sequence[float],
+        height: float = float("nan"),
+    ) -> None:
+        """Take one sample.
+
+        Parameters
+        ----------
+        time : float, s
+            Later than that of the sample before.
+        gyro : ndarray or sequence of float, (3,), rad/s
+            Body rate relative to inertial space, forward-right-down.
+        accel : ndarray or sequence of float, (3,), m/s²
+            Specific force in the same axes.
+        height : float, m
+            Reference height now, for a damped height; NaN where there is none.
+
+        Raises
+        ------
+        DataError
+            Time does not advance, or rate and force are not three finite numbers each.
+        DivergenceError
+            The state would diverge, or come too near to a pole.
+
+        Notes
+        -----
+        A sample that raises is not taken; the state is as before it.
+        """
+        try:
+            if gyro.__class__ is not _ndarray:
+                gyro = np.asarray(gyro, dtype=np.float64)
+            if accel.__class__ is not _ndarray:
+                accel = np.asarray(accel, dtype=np.float64)
+            why = self._update(self._record, time, gyro, accel, height)
+        except (NumbaError, TypeError, ValueError):
+            # Of a kind that cannot be compiled for, or no numbers at all.
+            why = kernel.BAD_SAMPLE
+        if why:
+            self._refuse(why, time, gyro, accel)
+
+    def _refuse(self, why: int, time: float, gyro: ArrayLike, accel: ArrayLike) -> NoReturn:
+        row = int(self._record[kernel.SAMPLES]) + 1
+        if why == kernel.BAD_TIME:
+            raise DataError(
+                f"time does not advance: {self._record[kernel.TIME]:.9g} s is followed by "
+                f"{time:.9g} s",
+                row=row,
+                quantity="time",
+                remedy="leave the sample out; the state is as before it",
+            )
+        given = f"time {time}, rate {np.asarray(gyro).tolist()}, force {np.asarray(accel).tolist()}"
+        if why == kernel.BAD_SAMPLE:
+            raise DataError(
+                f"{given}: a time, three finite rates and three finite forces are needed",
+                row=row,
+                quantity="gyro, accel",
+                remedy="leave the sample out; the state is as before it",
+            )
+        if why == POLE:
+            raise DivergenceError(
+                f"the step to {time:.9g} s comes nearer to a pole than "
+                f"{self._mechanization.latitude_limit_deg:g} deg of latitude",
+                row=row,
+                quantity="lat",
+                remedy="end here; north-east-down has no meaning at a pole",
+            )
+        raise DivergenceError(
+            f"the state would diverge: {given}",
+            row=row,
+            quantity="state",
+            remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+            "gravity (-9.8 on z at level rest), a burst; the state is as before it",
+        )
+
+    @property
+    def state(self) -> NavState:
+        """Place, velocity and attitude at the last sample."""
+        record = self._record
+        return self._mechanization.nav_state(record[kernel.STATE :], float(record[kernel.TIME]))
