@@ -33,11 +33,9 @@ _before = _config.CACHE_DIR
 try:
     if not _before:
         _config.CACHE_DIR = cache_folder()
-    for _name in (
-        *("rotation", "earth", "increments", "attitude", "rotation_vector", "recursion"),
-        *("motion_increments", "ned", "ned_sample", "ned_simplified", "trajectory"),
-    ):
-        import_module(f"strapdown._kernels.{_name}")
+    for _source in sorted(Path(__file__).parent.glob("[a-z]*.py")):
+        if _source.stem != "arithmetic":
+            import_module(f"strapdown._kernels.{_source.stem}")
 except RuntimeError:
     # Path.home() without a home; numba then chooses a place of its own.
     pass

@@ -114,9 +114,7 @@ def ned_update(r, time, gyro, accel, reference):
             alt, vd, total = guide_height(
                 alt, vd, total, r[q + 2], reference, dt, r[o], r[o + 1], r[o + 2], r[o + 3]
             )
-        why = verdict(
-            alt, vn, ve, vd, qw, c, turn, r[o + 4], r[o + 5], r[o + 6], r[o + 7]
-        )
+        why = verdict(alt, vn, ve, vd, qw, c, turn, r[o + 4], r[o + 5], r[o + 6], r[o + 7])
         if why != DONE:
             return why
         r[q], r[q + 1], r[q + 2], r[q + 3], r[q + 4], r[q + 5] = lat, lon, alt, vn, ve, vd

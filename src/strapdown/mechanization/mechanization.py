@@ -195,7 +195,9 @@ class Mechanization(ABC):
             history[:, V : V + 3] *= -1.0
         return after, history
 
-    def trajectory(self, time: ArrayLike, history: Array, source: str | None = None) -> pd.DataFrame:
+    def trajectory(
+        self, time: ArrayLike, history: Array, source: str | None = None
+    ) -> pd.DataFrame:
         """Return a history as a Trajectory table.
 
         Parameters
@@ -211,9 +213,7 @@ class Mechanization(ABC):
         """
         table = np.empty((len(history), len(TRAJECTORY)))
         trajectory_rows(history, table)
-        return trajectory_table(
-            time, table[:, :3], table[:, 3:6], table[:, 6:], source
-        )
+        return trajectory_table(time, table[:, :3], table[:, 3:6], table[:, 6:], source)
 
     def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
         if self.height != "damped":
@@ -233,9 +233,7 @@ class Mechanization(ABC):
             )
         return reference
 
-    def _refuse(
-        self, why: int, step: int, increments: pd.DataFrame, last: Array | None
-    ) -> None:
+    def _refuse(self, why: int, step: int, increments: pd.DataFrame, last: Array | None) -> None:
         time = float(increments.index[step])
         row = increments.iloc[step]
         before = ""

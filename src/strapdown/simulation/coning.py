@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import ConfigError
+from strapdown.simulation.flat_motion import FlatMotion
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Coning:
+class Coning(FlatMotion):
     """Classical coning: tilted by a constant angle about an axis that itself turns.
 
     ``q(t) = q_nb exp(β e(t))`` with ``e(t) = u cos Ωt + v sin Ωt``; u, v and the cone axis n are

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import ConfigError
 from strapdown.simulation.euler_motion import Quaternion, euler_attitude, euler_body_rate
+from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.minimum_jerk import STILL, Track
 from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
@@ -18,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Gesture:
+class Gesture(FlatMotion):
     """Six coordinates, each moving from value to value with least jerk.
 
     Where all tracks hold, the rate, the velocity and the acceleration are exactly zero, and

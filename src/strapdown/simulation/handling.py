@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import ConfigError
+from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.gesture import Gesture, gesture
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Handling:
+class Handling(FlatMotion):
     """Random gestures, each from a place on the table back to that very pose.
 
     Between two gestures it lies for 1.5 to 5 s. A gesture has three to seven moves of 0.6 to 1.6 s

@@ -6,8 +6,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
-from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.error_chain import apply, jitter
 from strapdown.sensors.error_draws import child
@@ -59,8 +57,7 @@ def simulate_imu(
     Returns
     -------
     imu : DataFrame
-        Imu table, body axes: rad/s and, with an accelerometer, the specific force
-        ``C_nb^T (a_n - g_n)`` in m/s² with the standard gravity straight down.
+        Imu table, body axes: rad/s and, with an accelerometer, the specific force in m/s².
     truth : DataFrame
         Attitude table at the same stamps, exact.
 
@@ -73,11 +70,8 @@ def simulate_imu(
     time = _stamps(motion, rate, sampling)
     step = 1.0 / rate
 
-    def force(t: Array) -> Array:
-        return specific_force(motion, t)
-
     wants_force = accelerometer or bool(np.any(np.asarray(errors.gyro.g_sensitivity)))
-    plain = _force(motion, force, TriadErrors(), time, step, sampling, 0) if wants_force else None
+    plain = _force(motion, TriadErrors(), time, step, sampling, 0) if wants_force else None
     gyro_seed, accel_seed = child(seed, GYRO_SEED), child(seed, ACCEL_SEED)
     gyro = apply(
         errors.gyro,
@@ -92,7 +86,7 @@ def simulate_imu(
     if accel is not None and errors.accel is not None:
         own = errors.accel
         if own.jitter > 0.0 or np.isfinite(own.bandwidth):
-            accel = _force(motion, force, own, time, step, sampling, accel_seed)
+            accel = _force(motion, own, time, step, sampling, accel_seed)
         accel = apply(
             own,
             time,
@@ -106,12 +100,6 @@ def simulate_imu(
         imu_table(time, gyro, accel, sampling=sampling, source=source),
         attitude_table(time, motion.attitude(time), source=source),
     )
-
-
-def specific_force(motion: Motion, time: Array) -> Array:
-    """What an ideal accelerometer reads in body axes, ``C_nb^T (a_n - g_n)``, (n, 3), m/s²."""
-    upward = motion.acceleration(time) - np.array([0.0, 0.0, STANDARD_GRAVITY])
-    return rotation.rotate(rotation.conjugate(motion.attitude(time)), upward)
 
 
 def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
@@ -166,14 +154,13 @@ def _rate(
 
 def _force(
     motion: Motion,
-    force: Quantity,
     errors: TriadErrors,
     time: Array,
     step: float,
     sampling: str,
     seed: int | np.random.SeedSequence,
 ) -> Array:
-    at = _instants(motion, errors, time, seed)
+    at, force = _instants(motion, errors, time, seed), motion.specific_force
     if sampling == "instantaneous":
         return low_passed(force, at, errors.bandwidth)
     mean = np.vstack([force(at[:1]), mean_over(force, at[:-1], at[1:])])

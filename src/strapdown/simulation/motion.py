@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown.simulation.flat_motion import FlatMotion
 
 Array = NDArray[np.float64]
 
@@ -16,8 +17,9 @@ Array = NDArray[np.float64]
 class Motion(Protocol):
     """What a simulation asks of a motion: the exact truth at any instant from 0 to `duration`.
 
-    Each method takes instants, (n,) in s, and returns one row for each. Linear quantities are in
-    north-east-down, of the sensor's place, relative to an Earth that is flat and at rest.
+    Each method takes instants, (n,) in s, and returns one row for each. Whether the Earth is flat
+    and at rest (`flat_motion.FlatMotion`) or turns (`earth_motion.EarthMotion`) is the motion's
+    own affair: sensors see their rate and their specific force.
     """
 
     @property
@@ -37,16 +39,8 @@ class Motion(Protocol):
         """Attitude ``q_nb``, (n, 4)."""
         ...
 
-    def acceleration(self, time: ArrayLike) -> Array:
-        """Second derivative of the position, (n, 3), m/s²."""
-        ...
-
-    def velocity(self, time: ArrayLike) -> Array:
-        """First derivative of the position, (n, 3), m/s."""
-        ...
-
-    def position(self, time: ArrayLike) -> Array:
-        """Position, (n, 3), m."""
+    def specific_force(self, time: ArrayLike) -> Array:
+        """What an ideal accelerometer reads in body axes, (n, 3), m/s²."""
         ...
 
 
@@ -75,7 +69,7 @@ class Pulse:
 
 
 @dataclass(frozen=True)
-class PulseMotion:
+class PulseMotion(FlatMotion):
     """Any number of pulses, overlapping or not, from an initial attitude.
 
     Between two edges the rate vector is constant in body axes, so that the attitude is an

@@ -22,8 +22,6 @@ _TO_COEFFICIENTS = (np.arange(_NODES) + 0.5)[:, None] * (
 _TOLERANCE = 1e-14
 # Below this length rounding decides and not the series, s.
 _SHORTEST = 1e-5
-# Instants at once, so that what is gathered for them stays in the cache.
-_CHUNK = 16384
 
 
 @dataclass(frozen=True)
@@ -54,19 +52,11 @@ class RateIntegral:
         -------
         ndarray, (n, 3), rad
         """
+        from strapdown._kernels.piecewise import legendre_sums
+
         t = np.clip(np.asarray(time, dtype=np.float64), self.edges[0], self.edges[-1])
         out = np.empty((t.size, 3))
-        for start in range(0, t.size, _CHUNK):
-            part = t[start : start + _CHUNK]
-            k = np.searchsorted(self.edges, part, side="right") - 1
-            k = np.minimum(k, len(self.before) - 1)
-            left, right = self.edges[k], self.edges[k + 1]
-            x = ((part - left) - (right - part)) / (right - left)
-            series = np.moveaxis(self.series[k], 1, 0)
-            added = legendre.legval(x[:, None], series, tensor=False)
-            # At its left edge a panel has added nothing, and not what a series rounds that to.
-            added[part == left] = 0.0
-            out[start : start + _CHUNK] = self.before[k] + added
+        legendre_sums(self.edges, self.before, self.series, t, out)
         return out
 
 

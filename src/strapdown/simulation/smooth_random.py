@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import ConfigError
 from strapdown.simulation.euler_motion import Quaternion, euler_attitude, euler_body_rate
+from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.minimum_jerk import minimum_jerk
 from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
@@ -21,7 +22,7 @@ _CHUNK = 16384
 
 
 @dataclass(frozen=True)
-class SmoothRandom:
+class SmoothRandom(FlatMotion):
     """Fourier series of random phase for the 3-2-1 angles and for the position.
 
     The rates of the three angles and the three accelerations are each flat over the band: equal

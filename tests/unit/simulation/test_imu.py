@@ -18,11 +18,12 @@ from strapdown.simulation import (
     TriadErrors,
     simulate_imu,
 )
+from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.tables import ACCEL, GYRO
 
 
 @dataclass(frozen=True)
-class Swing:
+class Swing(FlatMotion):
     """Rolls as phi sin(w t) about the body's x axis, and shakes along north as sin(w t)."""
 
     frequency: float

@@ -1,0 +1,73 @@
+"""Functions that are polynomials between knots, and Legendre series over panels."""
+
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit(cache=True)
+def panel_of(edges, t, guess):
+    """Panel that holds `t`, of the last one to the right of an edge; `guess` is looked at first."""
+    last = edges.shape[0] - 2
+    if guess <= last and edges[guess] <= t:
+        # Instants mostly advance, and by less than a panel.
+        if guess == last or t < edges[guess + 1]:
+            return guess
+        if guess + 1 == last or t < edges[guess + 2]:
+            return guess + 1
+    low, high = 0, last
+    while low < high:
+        middle = (low + high + 1) // 2
+        if edges[middle] <= t:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@njit(cache=True)
+def legendre_sums(edges, before, series, time, out):
+    """Fill ``out = before + series`` at each instant by Clenshaw's recursion.
+
+    `before` is (p, m), `series` (p, n, m) with n of three or more, `out` (t, m). Exactly `before`
+    at the left edge of a panel, whatever a series rounds that to.
+    """
+    terms, width = series.shape[1], series.shape[2]
+    k = 0
+    for i in range(time.shape[0]):
+        t = time[i]
+        k = panel_of(edges, t, k)
+        left, right = edges[k], edges[k + 1]
+        x = ((t - left) - (right - t)) / (right - left)
+        for j in range(width):
+            if t == left:
+                out[i, j] = before[k, j]
+                continue
+            c0, c1 = series[k, terms - 2, j], series[k, terms - 1, j]
+            degree = terms
+            for n in range(terms - 3, -1, -1):
+                kept = c0
+                degree -= 1
+                c0 = series[k, n, j] - c1 * ((degree - 1) / degree)
+                c1 = kept + c1 * x * ((2 * degree - 1) / degree)
+            out[i, j] = before[k, j] + (c0 + c1 * x)
+
+
+@njit(cache=True)
+def polynomials(knots, coefficients, time, value, first, second):
+    """Piecewise polynomials with their first two derivatives, (t, m) each.
+
+    `coefficients` is (p, n, m), highest power first, of the time since the knot to the left.
+    """
+    terms, width = coefficients.shape[1], coefficients.shape[2]
+    k = 0
+    for i in range(time.shape[0]):
+        k = panel_of(knots, time[i], k)
+        x = time[i] - knots[k]
+        for j in range(width):
+            p, d, dd = coefficients[k, 0, j], 0.0, 0.0
+            for n in range(1, terms):
+                dd = dd * x + d
+                d = d * x + p
+                p = p * x + coefficients[k, n, j]
+            value[i, j], first[i, j], second[i, j] = p, d, 2.0 * dd

@@ -1,0 +1,221 @@
+"""Motions on an ellipsoidal Earth that turns, with everything that follows from their course."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.ellipsoids import Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
+from strapdown.tables import trajectory_table
+
+Array = NDArray[np.float64]
+
+# Nearer to a pole than this, heading and longitude turn faster than a vehicle does.
+MOST_NORTHERN = 89.0  # deg
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a motion begins.
+
+    Attributes
+    ----------
+    lat_deg, lon_deg : float, deg
+        Geodetic.
+    alt : float, m
+        Over the ellipsoid.
+
+    Raises
+    ------
+    ConfigError
+        A number is not finite, or an angle is out of range.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    alt: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not all(math.isfinite(x) for x in (self.lat_deg, self.lon_deg, self.alt)):
+            raise ConfigError(
+                "a coordinate is not finite", quantity="place", remedy="give three numbers"
+            )
+        if abs(self.lat_deg) > 90.0:
+            raise ConfigError(
+                f"a latitude of {self.lat_deg:.9g} deg is beyond the pole",
+                quantity="lat_deg",
+                remedy="latitude and longitude seem to be swapped: latitude comes first"
+                if abs(self.lon_deg) <= 90.0
+                else "give geodetic latitude within -90 to 90 deg, north positive",
+            )
+        if abs(self.lon_deg) > 360.0:
+            raise ConfigError(
+                f"a longitude of {self.lon_deg:.9g} deg is more than a full turn",
+                quantity="lon_deg",
+                remedy="give longitude within -180 to 360 deg, east positive",
+            )
+
+    def place(self, moved: Array) -> Array:
+        """Latitude and longitude in rad and height in m, (n, 3), of what was moved from here."""
+        start = np.array([math.radians(self.lat_deg), math.radians(self.lon_deg), self.alt])
+        return np.asarray(moved + start)
+
+
+@dataclass(frozen=True)
+class Kinematics:
+    """State of a motion at n instants.
+
+    Attributes
+    ----------
+    moved : ndarray, (n, 3)
+        Latitude and longitude in rad and height in m, less those of the origin: what is small
+        is not rounded as if it were large.
+    velocity : ndarray, (n, 3), m/s
+        Relative to the Earth: north, east, down.
+    acceleration : ndarray, (n, 3), m/s²
+        Derivatives by time of the three components of the velocity.
+    q_nb : ndarray, (n, 4)
+        Body to local north-east-down.
+    turning : ndarray, (n, 3), rad/s
+        Rate of the body relative to local level, in body axes.
+    """
+
+    moved: Array
+    velocity: Array
+    acceleration: Array
+    q_nb: Array
+    turning: Array
+
+
+class EarthMotion(ABC):
+    """Base of motions on the Earth: a course, and what sensors feel on it.
+
+    What a course is not smooth at, it names as `breaks`.
+    """
+
+    duration: float
+    origin: Origin
+    ellipsoid: Ellipsoid
+
+    @abstractmethod
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants, (n,) in s."""
+
+    @property
+    @abstractmethod
+    def breaks(self) -> Sequence[float]:
+        """Instants between which the body rate is smooth, from zero to the end, s."""
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Body rate relative to inertial space.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), rad/s
+            ``w_nb + C_nb^T (w_ie + w_en)``.
+        """
+        return self._feel(time)[0]
+
+    def specific_force(self, time: ArrayLike) -> Array:
+        """What an ideal accelerometer reads.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), m/s²
+            ``C_nb^T (v' + (2 w_ie + w_en) x v - g_n)`` with the ellipsoid's normal gravity.
+        """
+        return self._feel(time)[1]
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the body rate from time zero.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), rad
+            Within 1e-14 rad a panel and rounding (`rate_integral.integrate_rate`).
+        """
+        return self._integral(time)
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Attitude relative to local north-east-down, ``q_nb``; (n, 4)."""
+        return self.kinematics(_instants(time)).q_nb
+
+    def trajectory(self, time: ArrayLike, source: str | None = None) -> pd.DataFrame:
+        """Place, velocity and attitude.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+        source : str, optional
+            Name for messages.
+
+        Returns
+        -------
+        DataFrame
+            Trajectory table. Longitude is continuous: it is not wrapped at 180 deg.
+        """
+        t = _instants(time)
+        k = self.kinematics(t)
+        place = k.moved.copy()
+        place[:, :2] = np.degrees(place[:, :2])
+        place += [self.origin.lat_deg, self.origin.lon_deg, self.origin.alt]
+        return trajectory_table(
+            t, place, k.velocity, rotation.euler_from_quaternion(k.q_nb), source=source
+        )
+
+    def _feel(self, time: ArrayLike) -> tuple[Array, Array]:
+        from strapdown._kernels.earth_motion import feel
+
+        k = self.kinematics(_instants(time))
+        rate, force = np.empty((len(k.moved), 3)), np.empty((len(k.moved), 3))
+        feel(
+            self.origin.place(k.moved),
+            k.velocity,
+            k.acceleration,
+            k.q_nb,
+            k.turning,
+            self.ellipsoid.parameters(),
+            rate,
+            force,
+        )
+        return rate, force
+
+    @cached_property
+    def _integral(self) -> RateIntegral:
+        return integrate_rate(self.rate, self.breaks)
+
+
+def check_duration(duration: float) -> None:
+    """Refuse what is no length of time."""
+    if not 0.0 < duration < math.inf:
+        raise ConfigError(
+            f"a motion cannot last {duration:g} s",
+            quantity="duration",
+            remedy="use a number above zero",
+        )
+
+
+def _instants(time: ArrayLike) -> Array:
+    return np.ascontiguousarray(np.asarray(time, dtype=np.float64))

@@ -1,0 +1,103 @@
+"""Place of a vehicle whose velocity is known at every instant, to rounding."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.ellipsoids import Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.earth_motion import MOST_NORTHERN, Origin
+from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
+
+Array = NDArray[np.float64]
+
+# `integrate_rate` stops at 1e-14 of what it is given: with these factors at 1e-17 rad, which is
+# 6e-11 m on the ground, and at 8e-11 m of height. Powers of two round nothing.
+_SCALE = np.array([2.0**10, 2.0**10, 2.0**-13])
+# Latitude acts on its own rate by the radius of the meridian alone, 1 % a radian at most: each
+# round takes away a factor of a hundred and more.
+_ROUNDS = 16
+
+
+@dataclass(frozen=True)
+class PlaceIntegral:
+    """What a velocity adds to latitude, longitude (rad) and height (m) from time zero."""
+
+    scaled: RateIntegral
+
+    def __call__(self, time: ArrayLike) -> Array:
+        """Latitude and longitude in rad and height in m less those of the origin, (n, 3)."""
+        return np.asarray(self.scaled(time) / _SCALE)
+
+
+def integrate_velocity(
+    velocity: Callable[[Array], Array],
+    breaks: Sequence[float],
+    origin: Origin,
+    ellipsoid: Ellipsoid,
+) -> PlaceIntegral:
+    """Integrate a velocity that is smooth between breaks, over the ellipsoid.
+
+    Parameters
+    ----------
+    velocity : callable
+        (n,) instants in s to (n, 3) m/s: north, east, down.
+    breaks : sequence of float, s
+        Where it or a derivative of it may jump; the first is zero, the last the end.
+    origin : Origin
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    PlaceIntegral
+        Within 1e-10 m a panel, and rounding.
+
+    Raises
+    ------
+    ConfigError
+        The vehicle comes within 1 deg of a pole.
+
+    Notes
+    -----
+    ``lat' = v_N/(R_M(lat) + h)``, ``lon' = v_E/((R_N(lat) + h) cos lat)``, ``h' = -v_D``, by
+    Picard's iteration: each round integrates the rates at the places of the one before, as
+    Legendre series over panels, until nothing moves by more than rounding.
+    """
+    from strapdown._kernels.earth_motion import place_rates
+
+    parameters = ellipsoid.parameters()
+    place: PlaceIntegral | None = None
+    ends = np.asarray(breaks, dtype=np.float64)
+
+    def rates(time: ArrayLike) -> Array:
+        t = np.asarray(time, dtype=np.float64)
+        moved = np.zeros((t.size, 3)) if place is None else place(t)
+        at, out = origin.place(moved), np.empty((t.size, 3))
+        _refuse_pole(at)
+        place_rates(at, velocity(t), parameters, out)
+        return np.asarray(out * _SCALE)
+
+    before = np.zeros((ends.size, 3))
+    for _ in range(_ROUNDS):
+        place = PlaceIntegral(integrate_rate(rates, breaks))
+        now = place(ends)
+        # A hundredth of what a double resolves of a latitude.
+        if np.all(np.abs(now - before) <= [1e-18, 1e-18, 1e-11] + 1e-16 * np.abs(now)):
+            break
+        before = now
+    assert place is not None
+    return place
+
+
+def _refuse_pole(place: Array) -> None:
+    highest = float(np.degrees(np.abs(place[:, 0]).max(initial=0.0)))
+    if not highest <= MOST_NORTHERN:
+        raise ConfigError(
+            f"the vehicle comes to a latitude of {highest:.6g} deg",
+            quantity="latitude",
+            remedy=f"stay within {MOST_NORTHERN:g} deg: at a pole there is no heading",
+        )

@@ -1,0 +1,117 @@
+"""A vehicle whose velocity is a mean and a sine in each of north, east and down."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
+from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
+from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+# Part of the greatest horizontal speed under which the path has no direction.
+_LEAST = 1e-3
+
+
+@dataclass(frozen=True)
+class SineVelocityMotion(EarthMotion):
+    """``v = mean + amplitude sin(2 pi t/period + phase)``, without roll, nose along the velocity.
+
+    The motion of ``pyins.sim.generate_sine_velocity_motion``, in closed form: velocity, attitude
+    and their derivatives; the place is their integral to rounding. Pitch is that of the path, nose
+    up where it climbs.
+
+    Attributes
+    ----------
+    duration : float, s
+    origin : Origin
+    mean_velocity : tuple of float, m/s
+        North, east, down.
+    amplitude : tuple of float, m/s
+    period : float, s
+    phase_deg : tuple of float, deg
+        The default makes an ellipse of latitude and longitude where the mean is zero.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    ConfigError
+        The duration or the period is not positive, or the vehicle comes to a stop, where its
+        path has no direction.
+    """
+
+    duration: float
+    origin: Origin
+    mean_velocity: Triple
+    amplitude: Triple = (0.0, 0.0, 0.0)
+    period: float = 60.0
+    phase_deg: Triple = (0.0, 90.0, 0.0)
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        check_duration(self.duration)
+        if not 0.0 < self.period < math.inf:
+            raise ConfigError(
+                f"a velocity cannot change with a period of {self.period:g} s",
+                quantity="period",
+                remedy="use a number above zero",
+            )
+        cycle = np.linspace(0.0, min(self.period, self.duration), 4097)
+        speed = np.hypot(*self._velocity(cycle)[:, :2].T)
+        if speed.min() <= _LEAST * speed.max():
+            raise ConfigError(
+                f"the horizontal speed falls to {speed.min():.3g} m/s, where a path has no heading",
+                quantity="mean_velocity, amplitude",
+                remedy="let the vehicle move at every instant, or use StationaryMotion",
+            )
+
+    @property
+    def breaks(self) -> Sequence[float]:
+        """Every half period, s."""
+        count = max(1, math.ceil(2.0 * self.duration / self.period))
+        return [*(0.5 * self.period * k for k in range(count)), self.duration]
+
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants; as `EarthMotion.kinematics`."""
+        v = self._velocity(time)
+        omega = 2.0 * math.pi / self.period
+        dv = omega * np.asarray(self.amplitude) * np.cos(self._phase(time))
+        north, east, down = v.T
+        d_north, d_east, d_down = dv.T
+        level2 = north * north + east * east
+        level = np.sqrt(level2)
+        d_level = (north * d_north + east * d_east) / level
+        still = np.zeros(time.size)
+        angles = [still, np.arctan2(-down, level), np.arctan2(east, north)]
+        rates = [
+            still,
+            (down * d_level - d_down * level) / (level2 + down * down),
+            (north * d_east - east * d_north) / level2,
+        ]
+        turned, turning = np.degrees(angles).T, np.degrees(rates).T
+        q_nb = euler_attitude(turned, (1.0, 0.0, 0.0, 0.0))
+        return Kinematics(self._moved(time), v, dv, q_nb, euler_body_rate(turned, turning))
+
+    def _phase(self, time: Array) -> Array:
+        # Whole periods are taken away without rounding, so that late phases are as good as early.
+        part = np.fmod(time, self.period) / self.period
+        return np.asarray(2.0 * math.pi * part[:, None] + np.radians(self.phase_deg))
+
+    def _velocity(self, time: Array) -> Array:
+        return np.asarray(
+            self.mean_velocity + np.asarray(self.amplitude) * np.sin(self._phase(time))
+        )
+
+    @cached_property
+    def _moved(self) -> PlaceIntegral:
+        return integrate_velocity(self._velocity, self.breaks, self.origin, self.ellipsoid)
