@@ -25,9 +25,10 @@ def radii(s, a, e2):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def gravity_around(s, c, alt, meridian, transverse, a, e2, gamma, k, f, m):
-    """Normal gravity at a place and how it changes around it; radii of the surface.
+def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
+    """Normal gravity at a place and how it changes around it.
 
+    `w` is the prime vertical's radius over a, `curvature` that of the meridian at the height.
     Returns the north and down components in m/s², the change of each with latitude and with
     height, and the square term of the down component in the height: by it the down component is
     exact in the height, and the rest is of the second order of a displacement.
@@ -38,24 +39,24 @@ def gravity_around(s, c, alt, meridian, transverse, a, e2, gamma, k, f, m):
     surface.
     """
     s2 = s * s
-    # a / transverse is the root of 1 - e2 s2.
     inverse_a = 1.0 / a
-    w = transverse * inverse_a
     numerator = 1.0 + k * s2
-    surface = gamma * w * numerator
-    steep = gamma * w * (2.0 * k + e2 * numerator * w * w)
-    slope = steep * s * c
+    equator = gamma * w
+    surface = equator * numerator
+    steep = equator * (2.0 * k + e2 * numerator * w * w)
+    sc = s * c
+    slope = steep * sc
     x = alt * inverse_a
-    linear = 2.0 * (1.0 + f + m - 2.0 * f * s2)
-    shrink = -1.0 / (meridian + alt)
+    linear = 2.0 * (1.0 + f + m) - 4.0 * f * s2
+    upward = alt * curvature
     return (
-        slope * alt * shrink,
+        -slope * upward,
         surface * (1.0 - x * (linear - 3.0 * x)),
-        steep * (c * c - s2) * alt * shrink,
-        slope * shrink,
-        slope * (1.0 - x * linear) + 8.0 * f * s * c * x * surface,
+        -steep * (c * c - s2) * upward,
+        -slope * curvature,
+        slope * (1.0 - x * linear) + 8.0 * f * x * sc * surface,
         -surface * inverse_a * (linear - 6.0 * x),
-        3.0 * surface * inverse_a * inverse_a,
+        3.0 * inverse_a * inverse_a * surface,
     )
 
 
@@ -64,7 +65,7 @@ def gravity(s, c, alt, a, e2, gamma, k, f, m):
     """North and down components of normal gravity, m/s²; the east one is zero."""
     meridian, transverse = radii(s, a, e2)
     north, down, _, _, _, _, _ = gravity_around(
-        s, c, alt, meridian, transverse, a, e2, gamma, k, f, m
+        s, c, alt, transverse / a, 1.0 / (meridian + alt), a, e2, gamma, k, f, m
     )
     return north, down
 

@@ -63,25 +63,23 @@ def turn_back(w, x, y, z, a, b, c):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def displace(s, c, meridian, transverse, alt, e2, north, east, down):
+def displace(s, c, radius, transverse, change, north, east, down):
     """Change of latitude, longitude and height by a straight displacement in local axes.
 
     First to the meridian of the new place, then along it, on the circle of curvature and the
     change of its radius; what is left out is of the fourth order of displacement over radius.
-    The radii are those of the surface.
+    The radii are those at the height; `change` is half the derivative of the meridian's with
+    latitude, over itself.
     """
-    x = east / ((transverse + alt) * c - s * north - c * down)
-    sag = 0.5 * east * x * (1.0 - 0.25 * x * x)
+    x = east / (transverse * c - s * north - c * down)
+    x2 = x * x
+    sag = 0.5 * east * x * (1.0 - 0.25 * x2)
     along = north - s * sag
     up = c * sag - down
-    radius = meridian + alt
     t = along / (radius + up)
-    w = transverse * (1.0 - e2)
-    # Half the change of the meridian's radius with latitude, over the radius.
-    change = 1.5 * e2 * s * c * meridian * meridian / (w * radius)
     return (
         t * (1.0 - t * (THIRD * t + change)),
-        x * (1.0 - THIRD * x * x),
+        x * (1.0 - THIRD * x2),
         up + 0.5 * along * t * (1.0 - 0.25 * t * t),
     )
 
@@ -96,7 +94,7 @@ def level_turn(s, c, dlat, turn):
     h = 0.5 * dlat
     h2 = h * h
     sh = h * (1.0 - SIXTH * h2)
-    ch = 1.0 - 0.5 * h2 * (1.0 - TWELFTH * h2)
+    ch = 1.0 - 0.5 * h2
     y = 0.5 * turn
     y2 = y * y
     sy = y * (1.0 - SIXTH * y2)
@@ -138,11 +136,15 @@ def ned_step(
 ):
     """State after a step of motion increments; two-step quaternion of Tadic (11)-(19)."""
     meridian, transverse = radii(s, a, e2)
+    w = transverse / a
+    radius = meridian + alt
+    around = transverse + alt
+    curvature = 1.0 / radius
     c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(qw, qx, qy, qz)
     un, ue, ud = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv_x, dv_y, dv_z)
     sn, se, sd = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr_x, dr_y, dr_z)
     gn, gd, gn_lat, gn_alt, gd_lat, gd_alt, gd_alt2 = gravity_around(
-        s, c, alt, meridian, transverse, a, e2, gamma, k, f, m
+        s, c, alt, w, curvature, a, e2, gamma, k, f, m
     )
     on = rate * c
     od = -rate * s
@@ -156,40 +158,45 @@ def ned_step(
     md = half * vd + 0.5 * sd - twelfth * ud + sixth * (gd - on * ve)
 
     # Gravity at the mean place; the second term of the rise is the fall of the level's surface.
-    to_north = mn / (meridian + alt)
-    to_east = me / (transverse + alt)
+    to_north = mn * curvature
+    to_east = me / around
     rise = 2.0 * THIRD * (mn * to_north + me * to_east) - md
     gn += to_north * gn_lat + rise * gn_alt
     gd += to_north * gd_lat + rise * (gd_alt + rise * gd_alt2)
-    # Mean turn z of the level, and gravity turned by it: (g + z x g + 2/3 z x (z x g)), because
-    # the mean square of a turn at constant rate is 4/3 of the squared mean; twice integrated
-    # (g/2 + z x g/3 + z x (z x g)/6), and the change of g with height.
+    # Mean turn z of the level, and gravity turned by it: g + z x (g + 2/3 z x g), because the
+    # mean square of a turn at constant rate is 4/3 of the squared mean. Twice integrated the turn
+    # counts for a third instead of a half; and g changes with height.
     zn = half * on + to_east
     ze = -to_north
     zd = half * od - to_east * s / c
-    tn, te, td = ze * gd, zd * gn - zn * gd, -ze * gn
-    ttn, tte, ttd = zn * zd * gd, ze * zd * gd, -(zn * zn + ze * ze) * gd
+    two_thirds = 2.0 * THIRD * gd
+    tn = ze * gd + two_thirds * zn * zd
+    te = zd * gn - zn * gd + two_thirds * ze * zd
+    td = -ze * gn - two_thirds * (zn * zn + ze * ze)
     dt2 = dt * dt
-    rn = dt * vn + sn + dt2 * (0.5 * gn + THIRD * tn + SIXTH * ttn) + dt * od * me
-    re = dt * ve + se + dt2 * (THIRD * te + SIXTH * tte) + dt * (on * md - od * mn)
-    rd = (
-        dt * vd
-        + sd
-        + dt2 * (0.5 * gd + THIRD * td + SIXTH * ttd + twelfth * gd_alt * vd)
-        - dt * on * me
-    )
-    wn = vn + un + dt * (gn + tn + 2.0 * THIRD * ttn) + od * re
-    we = ve + ue + dt * (te + 2.0 * THIRD * tte) + on * rd - od * rn
-    wd = vd + ud + dt * (gd + td + 2.0 * THIRD * ttd) - on * re
+    rn = dt * (vn + od * me) + sn + dt2 * (0.5 * gn + THIRD * tn)
+    re = dt * (ve + on * md - od * mn) + se + dt2 * THIRD * te
+    rd = dt * (vd - on * me) + sd + dt2 * (0.5 * gd + THIRD * td + twelfth * gd_alt * vd)
+    # The Earth's rate times the displacement.
+    xn, xe, xd = -od * re, od * rn - on * rd, on * re
+    wn = vn + un + dt * (gn + tn) - xn
+    we = ve + ue + dt * te - xe
+    wd = vd + ud + dt * (gd + td) - xd
 
-    # Relative to the Earth: turned back by its rate, r + o x (int t dr) + o x (o x r) dt²/6.
-    bn, be, bd = dt * (rn - mn), dt * (re - me), dt * (rd - md)
-    across = sixth * (on * rn + od * rd)
-    square = sixth * rate * rate
-    dn = rn + od * be + on * across - square * rn
-    de = re + on * bd - od * bn - square * re
-    dd = rd - on * be + od * across - square * rd
-    dlat, dlon, dalt = displace(s, c, meridian, transverse, alt, e2, dn, de, dd)
+    # Relative to the Earth: turned back by its rate, r + o x (int t dr + o x r dt²/6).
+    bn = dt * (rn - mn) - sixth * xn
+    be = dt * (re - me) - sixth * xe
+    bd = dt * (rd - md) - sixth * xd
+    dlat, dlon, dalt = displace(
+        s,
+        c,
+        radius,
+        around,
+        1.5 * e2 * s * c * meridian * curvature * w * w,
+        rn + od * be,
+        re + on * bd - od * bn,
+        rd - on * be,
+    )
 
     fw, fx, fy, fz = level_turn(s, c, dlat, dlon + rate * dt)
     vn, ve, vd = turn_back(fw, fx, fy, fz, wn, we, wd)
@@ -200,9 +207,6 @@ def ned_step(
     n = 1.5 - 0.5 * (bw * bw + bx * bx + by * by + bz * bz)
     sl = dlat * (1.0 - SIXTH * dlat * dlat)
     cl = 1.0 - 0.5 * dlat * dlat
-    sine = s * cl + c * sl
-    cosine = c * cl - s * sl
-    u = 1.5 - 0.5 * (sine * sine + cosine * cosine)
     return (
         lat + dlat,
         lon + dlon,
@@ -214,8 +218,8 @@ def ned_step(
         n * bx,
         n * by,
         n * bz,
-        u * sine,
-        u * cosine,
+        s * cl + c * sl,
+        c * cl - s * sl,
         dlon,
     )
 

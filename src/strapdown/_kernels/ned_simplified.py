@@ -44,7 +44,9 @@ def simplified_advance(
         dt = increments[i, 0]
         s, c = math.sin(lat), math.cos(lat)
         meridian, transverse = radii(s, a, e2)
-        _, g, _, _, _, _, _ = gravity_around(s, c, alt, meridian, transverse, a, e2, gamma, k, f, m)
+        _, g, _, _, _, _, _ = gravity_around(
+            s, c, alt, transverse / a, 1.0 / (meridian + alt), a, e2, gamma, k, f, m
+        )
         rm, rp = meridian + alt, transverse + alt
         on, od = earth_rate(s, c, turning * rate)
         tn, te, td = transport_rate(s, c, vn, ve, rm, rp)

@@ -157,16 +157,21 @@ def dcm_coefficients_truncated(n2, order):
 @njit(cache=True)
 def dcm_from_quat(w, x, y, z):
     """Direction cosine matrix of a unit quaternion, row by row."""
+    # Doubling is exact, so that it may come first.
+    a, b, c = 2.0 * x, 2.0 * y, 2.0 * z
+    xx, yy, zz = x * a, y * b, z * c
+    xy, xz, yz = x * b, x * c, y * c
+    wx, wy, wz = w * a, w * b, w * c
     return (
-        1.0 - 2.0 * (y * y + z * z),
-        2.0 * (x * y - w * z),
-        2.0 * (x * z + w * y),
-        2.0 * (x * y + w * z),
-        1.0 - 2.0 * (x * x + z * z),
-        2.0 * (y * z - w * x),
-        2.0 * (x * z - w * y),
-        2.0 * (y * z + w * x),
-        1.0 - 2.0 * (x * x + y * y),
+        1.0 - (yy + zz),
+        xy - wz,
+        xz + wy,
+        xy + wz,
+        1.0 - (xx + zz),
+        yz - wx,
+        xz - wy,
+        yz + wx,
+        1.0 - (xx + yy),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
@@ -239,8 +239,8 @@ class Mechanization(ABC):
         before = ""
         if last is not None:
             before = (
-                f"; before it {np.degrees(last[0]):.6f} deg of latitude, {last[2]:.6g} m of height, "
-                f"{np.linalg.norm(last[3:6]):.6g} m/s"
+                f"; before it {np.degrees(last[0]):.6f} deg of latitude, {last[2]:.6g} m of "
+                f"height, {np.linalg.norm(last[3:6]):.6g} m/s"
             )
         source = increments.attrs.get("source")
         if why == POLE:
