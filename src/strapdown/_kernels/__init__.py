@@ -33,7 +33,15 @@ _before = _config.CACHE_DIR
 try:
     if not _before:
         _config.CACHE_DIR = cache_folder()
-    for _name in ("rotation", "earth", "increments", "attitude", "rotation_vector", "recursion"):
+    for _name in (
+        "rotation",
+        "earth",
+        "geodetic",
+        "increments",
+        "attitude",
+        "rotation_vector",
+        "recursion",
+    ):
         import_module(f"strapdown._kernels.{_name}")
 except RuntimeError:
     # Path.home() without a home; numba then chooses a place of its own.
