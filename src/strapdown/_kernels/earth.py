@@ -59,7 +59,8 @@ def gravity(s, c, alt, a, e2, gamma, k, f, m):
     spin = 0.5 * m * (1.0 - s2)
     y = 1.0 + x * (first + x * (form + 6.0 * spin + x * (4.0 * spin - form)))
     bend = surface * (6.0 * f - 5.0 * m) * x * (1.0 - 2.0 * x)
-    return -s * c * (slope + bend) * x / (meridian + x), surface / (y * y)
+    # From zero, so that on the surface there is no zero with a minus.
+    return 0.0 - s * c * (slope + bend) * x / (meridian + x), surface / (y * y)
 
 
 @njit(cache=True)
