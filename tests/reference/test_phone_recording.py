@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from strapdown import bench_attitude, read_log, rotation
-from strapdown.formats.earth_frame import ned_from_ecef
+from strapdown import bench_attitude, frames, read_log, rotation
 from strapdown.tables import ACCEL, GYRO, QUATERNION
 
 
@@ -58,7 +57,8 @@ def test_attitude_is_that_of_the_pose(folder, recording):
     # Frame and sample are at most 17 ms apart, in which the car turns by less than 0.5 deg.
     nearest = np.abs(times[:, None] - recording.truth.index.to_numpy()).argmin(axis=0)
     assert np.degrees((pose[nearest].inv() * ours).magnitude()).max() < 0.5
-    same = rotation.to_scipy(ned_from_ecef(np.column_stack([x, y, z])))
+    lat_deg, lon_deg, _ = frames.geodetic_from_ecef(np.column_stack([x, y, z])).T
+    same = rotation.to_scipy(frames.q_ne(lat_deg, lon_deg))
     assert np.degrees((same.inv() * ned).magnitude()).max() < 1e-9
 
 

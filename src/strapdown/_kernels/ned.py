@@ -63,43 +63,49 @@ def turn_back(w, x, y, z, a, b, c):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def displace(s, c, radius, transverse, change, north, east, down):
+def displace(s, c, curvature, parallel, change, north, east, down):
     """Change of latitude, longitude and height by a straight displacement in local axes.
 
     First to the meridian of the new place, then along it, on the circle of curvature and the
     change of its radius; what is left out is of the fourth order of displacement over radius.
-    The radii are those at the height; `change` is half the derivative of the meridian's with
-    latitude, over itself.
+    `curvature` is that of the meridian at the height, `parallel` one over the radius of the
+    parallel, `change` half the derivative of the meridian's radius with latitude, over itself.
     """
-    x = east / (transverse * c - s * north - c * down)
-    x2 = x * x
-    sag = 0.5 * east * x * (1.0 - 0.25 * x2)
-    along = north - s * sag
+    # Quotients by series: a division waits for what it divides by.
+    small = (s * north + c * down) * parallel
+    nearer = 1.0 + small * (1.0 + small * (1.0 + small))
+    first = east * parallel
+    sag = 0.5 * east * first * nearer
+    x = first * nearer
+    along = (north - s * sag) * curvature
     up = c * sag - down
-    t = along / (radius + up)
+    rise = up * curvature
+    t = along * (1.0 - rise * (1.0 - rise * (1.0 - rise)))
+    x2 = x * x
     return (
         t * (1.0 - t * (THIRD * t + change)),
         x * (1.0 - THIRD * x2),
-        up + 0.5 * along * t * (1.0 - 0.25 * t * t),
+        up + 0.5 * (north - s * sag) * t,
     )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
 def level_turn(s, c, dlat, turn):
-    """Quaternion from the new local level to the old one: in closed form from the two places.
+    """Quaternion from the new local level to the old one, from the two places in closed form.
 
-    `turn` is the change of longitude and, relative to inertial space, of the Earth's angle. Both
-    are small.
+    `turn` is the change of longitude and, relative to inertial space, of the Earth's angle; the
+    quaternion is (cos y cos h, sin y cos l, -cos y sin h, -sin y sin l) of half of it, y, half the
+    change of latitude, h, and the latitude between the two, l. Of h, which is no larger than 1e-4
+    for a step of a kilometre, the second order is kept, of y the third. Returns sine and cosine
+    of the new latitude, too.
     """
     h = 0.5 * dlat
-    h2 = h * h
-    sh = h * (1.0 - SIXTH * h2)
-    ch = 1.0 - 0.5 * h2
     y = 0.5 * turn
     y2 = y * y
+    sine, cosine = s + c * h, c - s * h
     sy = y * (1.0 - SIXTH * y2)
-    cy = 1.0 - 0.5 * y2 * (1.0 - TWELFTH * y2)
-    return cy * ch, sy * (c * ch - s * sh), -cy * sh, -sy * (s * ch + c * sh)
+    w = 1.0 - 0.5 * (y2 + h * h)
+    return w, sy * cosine, -(1.0 - 0.5 * y2) * h, -sy * sine, s + dlat * cosine, c - dlat * sine
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -137,9 +143,8 @@ def ned_step(
     """State after a step of motion increments; two-step quaternion of Tadic (11)-(19)."""
     meridian, transverse = radii(s, a, e2)
     w = transverse / a
-    radius = meridian + alt
-    around = transverse + alt
-    curvature = 1.0 / radius
+    curvature = 1.0 / (meridian + alt)
+    parallel = 1.0 / ((transverse + alt) * c)
     c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(qw, qx, qy, qz)
     un, ue, ud = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv_x, dv_y, dv_z)
     sn, se, sd = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr_x, dr_y, dr_z)
@@ -159,7 +164,7 @@ def ned_step(
 
     # Gravity at the mean place; the second term of the rise is the fall of the level's surface.
     to_north = mn * curvature
-    to_east = me / around
+    to_east = me * parallel * c
     rise = 2.0 * THIRD * (mn * to_north + me * to_east) - md
     gn += to_north * gn_lat + rise * gn_alt
     gd += to_north * gd_lat + rise * (gd_alt + rise * gd_alt2)
@@ -168,7 +173,7 @@ def ned_step(
     # counts for a third instead of a half; and g changes with height.
     zn = half * on + to_east
     ze = -to_north
-    zd = half * od - to_east * s / c
+    zd = half * od - me * parallel * s
     two_thirds = 2.0 * THIRD * gd
     tn = ze * gd + two_thirds * zn * zd
     te = zd * gn - zn * gd + two_thirds * ze * zd
@@ -190,23 +195,21 @@ def ned_step(
     dlat, dlon, dalt = displace(
         s,
         c,
-        radius,
-        around,
+        curvature,
+        parallel,
         1.5 * e2 * s * c * meridian * curvature * w * w,
         rn + od * be,
         re + on * bd - od * bn,
         rd - on * be,
     )
 
-    fw, fx, fy, fz = level_turn(s, c, dlat, dlon + rate * dt)
+    fw, fx, fy, fz, s1, c1 = level_turn(s, c, dlat, dlon + rate * dt)
     vn, ve, vd = turn_back(fw, fx, fy, fz, wn, we, wd)
+    # One Newton step towards norm 1, of the norm before the step: so it need not wait for the end.
+    n = 1.5 - 0.5 * (qw * qw + qx * qx + qy * qy + qz * qz)
     bw, bx, by, bz = quat_from_rotvec(phi_x, phi_y, phi_z)
-    bw, bx, by, bz = quat_multiply(qw, qx, qy, qz, bw, bx, by, bz)
+    bw, bx, by, bz = quat_multiply(qw, qx, qy, qz, n * bw, n * bx, n * by, n * bz)
     bw, bx, by, bz = quat_multiply(fw, -fx, -fy, -fz, bw, bx, by, bz)
-    # One Newton step from norms that are nearly 1.
-    n = 1.5 - 0.5 * (bw * bw + bx * bx + by * by + bz * bz)
-    sl = dlat * (1.0 - SIXTH * dlat * dlat)
-    cl = 1.0 - 0.5 * dlat * dlat
     return (
         lat + dlat,
         lon + dlon,
@@ -214,12 +217,12 @@ def ned_step(
         vn,
         ve,
         vd,
-        n * bw,
-        n * bx,
-        n * by,
-        n * bz,
-        s * cl + c * sl,
-        c * cl - s * sl,
+        bw,
+        bx,
+        by,
+        bz,
+        s1,
+        c1,
         dlon,
     )
 

@@ -17,10 +17,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown import rotation
+from strapdown import frames, rotation
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats import npy
-from strapdown.formats.earth_frame import ned_from_ecef
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 
@@ -142,8 +141,9 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
         )
     # Squares of numbers that no unit quaternion holds need not be representable.
     norm = np.linalg.norm(np.where(np.abs(q_ed) < 2.0, q_ed, np.nan), axis=1)
-    q_ne = ned_from_ecef(positions)
-    good = np.isfinite(q_ne).all(axis=1) & np.isfinite(times) & (np.abs(norm - 1.0) < 0.01)
+    distance = np.linalg.norm(np.clip(positions, -frames.FARTHEST, frames.FARTHEST), axis=1)
+    on_earth = (distance >= frames.NEAREST) & (distance < frames.FARTHEST)
+    good = on_earth & np.isfinite(times) & (np.abs(norm - 1.0) < 0.01)
     order = np.flatnonzero(good)[np.argsort(times[good], kind="stable")]
     order = order[np.diff(times[order], prepend=-np.inf) > 0]
     time = raw.columns[next(n for n, (q, _) in raw.stated.items() if q == "time")]
@@ -152,7 +152,8 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
             Finding("left out: the poses hold no attitude", file=name, quantity="attitude")
         )
         return None, files
-    q_nd = rotation.compose(q_ne[order], q_ed[order] / norm[order, None])
+    lat_deg, lon_deg, _ = frames.geodetic_from_ecef(positions[order]).T
+    q_nd = rotation.compose(frames.q_ne(lat_deg, lon_deg), q_ed[order] / norm[order, None])
     sample, q = _at_samples(time, times[order], q_nd)
     truth = np.full((time.size, 4), np.nan)
     truth[sample] = q

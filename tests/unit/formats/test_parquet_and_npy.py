@@ -8,12 +8,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from scipy.spatial.transform import Rotation
 
-from strapdown import rotation
+from strapdown import frames, rotation
 from strapdown.exceptions import DataError
 from strapdown.formats import READERS, read_log, read_raw
-from strapdown.formats.earth_frame import latitude_longitude, ned_from_ecef
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, QUATERNION
 
@@ -148,54 +146,16 @@ def test_an_array_of_python_objects_is_not_loaded(tmp_path):
         read_log(tmp_path)
 
 
-# --- north, east and down ---------------------------------------------------------------
-
-
-def ecef(latitude, longitude, height):
-    """The definition: along the normal from the ellipsoid (WGS 84)."""
-    a, f = 6378137.0, 1.0 / 298.257223563
-    e2 = f * (2.0 - f)
-    n = a / np.sqrt(1.0 - e2 * np.sin(latitude) ** 2)
-    return np.column_stack(
-        [
-            (n + height) * np.cos(latitude) * np.cos(longitude),
-            (n + height) * np.cos(latitude) * np.sin(longitude),
-            (n * (1.0 - e2) + height) * np.sin(latitude),
-        ]
-    )
-
-
-def test_latitude_and_longitude_invert_their_definition():
-    latitude = np.radians(np.linspace(-90.0, 90.0, 181))
-    longitude = np.radians(np.linspace(-179.5, 179.5, 181))
-    for height in (-1e4, 0.0, 1e4, 1e6, 3e7):
-        found = latitude_longitude(ecef(latitude, longitude, height))
-        # Coordinates of 6e6 m are known to 1e-9 m, an angle of 2e-16; conditioned by 1/e² of
-        # the cube root at worst, 150, it stays under 1e-13.
-        assert np.allclose(found[0], latitude, rtol=0, atol=1e-13)
-        poles = np.abs(np.cos(latitude)) < 1e-12
-        assert np.allclose(found[1][~poles], longitude[~poles], rtol=0, atol=1e-13)
-    assert np.isnan(latitude_longitude([[0.0, 0.0, 0.0]])[0]).all()
-
-
-def test_north_east_and_down_are_those_of_scipy():
-    latitude, longitude = np.radians([52.5, -33.9, 0.0, 89.0]), np.radians([13.4, 151.2, -78.5, 5])
-    q = ned_from_ecef(ecef(latitude, longitude, 120.0))
-    # About z by the longitude, then about y by -(latitude + 90 deg), takes ECEF to NED axes.
-    turns = Rotation.from_euler("ZY", np.column_stack([longitude, -latitude - np.pi / 2]))
-    assert np.allclose(rotation.dcm_from_quaternion(q), turns.inv().as_matrix(), atol=1e-13)
-
-
 # --- comma2k19 --------------------------------------------------------------------------
 
 RATE_TRUE = np.array([0.02, -0.05, 0.3])
-PLACE = np.radians([37.7, -122.4])
+PLACE = np.array([37.7, -122.4, 10.0])
 FRAMES = np.arange(0.0, 8.0, 0.05)
 
 
 def segment(folder, flat):
     """A device that turns at one rate, as the arrays of a segment; synthetic."""
-    q_ne = ned_from_ecef(ecef(PLACE[:1], PLACE[1:], 10.0))[0]
+    q_ne = frames.q_ne(*PLACE[:2])
     t = np.arange(0.003, 7.9, 0.0096)
     start = rotation.quaternion_from_euler([1.0, -4.0, 30.0])
     q_nd = rotation.compose(
@@ -210,7 +170,7 @@ def segment(folder, flat):
         ("IMU", "magnetometer", "value"): np.tile([20.0, 0.0, 40.0], (FRAMES.size, 1)),
         ("global_pose", "frame_times"): 46408.0 + FRAMES,
         ("global_pose", "frame_positions"): np.tile(
-            ecef(PLACE[:1], PLACE[1:], 10.0), (FRAMES.size, 1)
+            frames.ecef_from_geodetic(PLACE), (FRAMES.size, 1)
         ),
         ("global_pose", "frame_orientations"): rotation.compose(rotation.conjugate(q_ne), q_nd),
     }
