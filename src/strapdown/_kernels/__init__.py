@@ -35,7 +35,7 @@ try:
         _config.CACHE_DIR = cache_folder()
     for _name in (
         *("rotation", "earth", "increments", "attitude", "rotation_vector", "recursion"),
-        *("motion_increments",),
+        *("motion_increments", "motion_blocks"),
     ):
         import_module(f"strapdown._kernels.{_name}")
 except RuntimeError:
