@@ -22,7 +22,7 @@ from strapdown.exceptions import DataError
 from strapdown.tables import EULER, NED, TRAJECTORY_ERROR, VELOCITY, trajectory_table
 
 _spec = importlib.util.spec_from_file_location(
-    "trajectories", Path(__file__).parent / "trajectories.py"
+    "made_trajectories", Path(__file__).with_name("made_trajectories.py")
 )
 made = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(made)
