@@ -98,9 +98,9 @@ class DifferenceSummary:
         return f"{named}, {span}"
 
     def __str__(self) -> str:
-        lines = [self.title, f"{'':20}{'rms':>11}{'largest':>11}{'at s':>11}{'final':>11}"]
+        lines = [self.title, f"{'':24}{'rms':>11}{'largest':>11}{'at s':>11}{'final':>11}"]
         lines += [
-            f"{e.quantity + ' ' + e.unit:20}{e.rms:11.4g}{e.largest:11.4g}{e.largest_at:11.6g}"
+            f"{e.quantity + ' ' + e.unit:24}{e.rms:11.4g}{e.largest:11.4g}{e.largest_at:11.6g}"
             f"{e.final:11.4g}"
             for e in self.errors
         ]
