@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.evaluation.earth_centred import ecef_from_geodetic, geodetic_from_ecef, q_en
+from strapdown.evaluation.earth_centred import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.exceptions import DataError
 from strapdown.tables import EULER, GEODETIC, VELOCITY, check_trajectory, trajectory_table
 
@@ -55,11 +55,11 @@ class _Nodes:
 
 def _nodes(trajectory: pd.DataFrame, ellipsoid: Ellipsoid) -> _Nodes:
     place = trajectory[GEODETIC].to_numpy(dtype=np.float64)
-    to_earth = q_en(place)
+    to_earth = rotation.conjugate(q_ne(place[:, 0], place[:, 1]))
     q_nb = rotation.quaternion_from_euler(trajectory[EULER].to_numpy(dtype=np.float64))
     return _Nodes(
         trajectory.index.to_numpy(dtype=np.float64),
-        ecef_from_geodetic(place, ellipsoid),
+        ecef_from_geodetic(place, ellipsoid=ellipsoid),
         rotation.rotate(to_earth, trajectory[VELOCITY].to_numpy(dtype=np.float64)),
         rotation.compose(to_earth, q_nb),
     )
@@ -167,13 +167,13 @@ def trajectory_at(
         nodes = _nodes(trajectory.iloc[used], ellipsoid)
         after = after - used.start
         r, v, q_eb = _between(nodes, after - 1, after, apart)
-        place = geodetic_from_ecef(r, ellipsoid)
-        q_ne = rotation.conjugate(q_en(place))
+        place = geodetic_from_ecef(r, ellipsoid=ellipsoid)
+        to_level = q_ne(place[:, 0], place[:, 1])
         out[~same] = np.hstack(
             [
                 place,
-                rotation.rotate(q_ne, v),
-                rotation.euler_from_quaternion(rotation.compose(q_ne, q_eb)),
+                rotation.rotate(to_level, v),
+                rotation.euler_from_quaternion(rotation.compose(to_level, q_eb)),
             ]
         )
     return trajectory_table(

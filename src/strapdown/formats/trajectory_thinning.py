@@ -79,7 +79,7 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
     if n <= most:
         return Thinned(np.arange(n), n, 0.0)
     time = trajectory.index.to_numpy(dtype=np.float64)
-    place = ecef_from_geodetic(trajectory[GEODETIC].to_numpy(dtype=np.float64), ellipsoid)
+    place = ecef_from_geodetic(trajectory[GEODETIC].to_numpy(dtype=np.float64), ellipsoid=ellipsoid)
     pieces = max(1, min(-(-n // LONGEST_PIECE), (most - 1) // 2))
     kept = sorted({int(k) for k in np.linspace(0, n - 1, pieces + 1).round()})
     heap: list[tuple[float, int, int, int]] = []

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.evaluation.earth_centred import ecef_from_geodetic, q_en
+from strapdown.evaluation.earth_centred import ecef_from_geodetic, q_ne
 from strapdown.exceptions import DataError
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
@@ -48,13 +48,14 @@ def poses(
     """
     chosen = options or TrajectoryFileOptions()
     place = trajectory[GEODETIC].to_numpy(dtype=np.float64)
-    position = ecef_from_geodetic(place, chosen.ellipsoid)
-    to_earth = q_en(place)
+    position = ecef_from_geodetic(place, ellipsoid=chosen.ellipsoid)
+    to_level = q_ne(place[:, 0], place[:, 1])
     q_wb = rotation.compose(
-        to_earth, rotation.quaternion_from_euler(trajectory[EULER].to_numpy(dtype=np.float64))
+        rotation.conjugate(to_level),
+        rotation.quaternion_from_euler(trajectory[EULER].to_numpy(dtype=np.float64)),
     )
     if chosen.tum_frame != "ecef":
-        q_we = rotation.conjugate(to_earth[0])
+        q_we = to_level[0]
         if chosen.tum_frame == "enu":
             q_we = rotation.compose(rotation.Q_NED_ENU, q_we)
             q_wb = rotation.compose(q_wb, _Q_FRD_FLU)

@@ -203,3 +203,28 @@ def test_what_stands_still_tells_nothing(tmp_path):
     assert read_trajectory(save(tmp_path / "a.csv", ROWS)).attrs["findings"] == ()
     one = read_trajectory(save(tmp_path / "b.csv", ROWS[:1]))
     assert len(one) == 1
+
+
+def test_a_recorded_drive_is_believed_and_its_mistakes_are_seen(tmp_path, recordings):
+    # A car with an RTK receiver; it has no attitude, so that the course stands for the heading.
+    import pandas as pd
+
+    log = pd.read_csv(recordings("car_rtk/part1_gnss_rtk.csv"))
+    log.columns = [c.removeprefix("# ") for c in log.columns]
+    log["roll"], log["pitch"] = 0.0, 0.0
+    log["heading"] = np.degrees(np.arctan2(log["vE"], log["vN"])) % 360.0
+
+    def read(table):
+        table.to_csv(tmp_path / "a.csv", index=False)
+        return read_trajectory(tmp_path / "a.csv", {"time": "gps_sow_s"})
+
+    back = read(log)
+    assert back.attrs["findings"] == ()
+    assert np.array_equal(back["alt"], log["h_ell_m"])
+    plain = log.rename(columns={"lat_deg": "lat", "lon_deg": "lon"})
+    with pytest.raises(DataError, match="if they are radians"):
+        read(plain.assign(lat=np.radians(plain["lat"]), lon=np.radians(plain["lon"])))
+    with pytest.raises(DataError, match="if it is in radians"):
+        read(log.assign(heading=np.radians(log["heading"])))
+    with pytest.raises(DataError, match=r"row 2, lat: .* beyond the pole"):
+        read(log.rename(columns={"lat_deg": "lon_deg", "lon_deg": "lat_deg"}))
