@@ -8,6 +8,7 @@ from strapdown.simulation.imu import simulate_imu
 from strapdown.simulation.minimum_jerk import Track
 from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
+from strapdown.simulation.sculling import Sculling
 from strapdown.simulation.smooth_random import SmoothRandom
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "Pulse",
     "PulseMotion",
     "Scenario",
+    "Sculling",
     "SmoothRandom",
     "Track",
     "TriadErrors",
