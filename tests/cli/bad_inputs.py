@@ -41,8 +41,8 @@ def stamps(values: list[str], header: str = HEADER) -> Callable[[Path], Path]:
     return make
 
 
-def turning(header: str, scale: float) -> Callable[[Path], Path]:
-    """A slow tumble of 20 s: rates in rad/s over `scale`, gravity in g."""
+def turning(header: str, scale: float, force_scale: float = 1.0) -> Callable[[Path], Path]:
+    """A slow tumble of 20 s: rates in rad/s over `scale`, gravity in g times `force_scale`."""
 
     def make(folder: Path) -> Path:
         t = np.arange(2001) * 0.01
@@ -51,7 +51,8 @@ def turning(header: str, scale: float) -> Callable[[Path], Path]:
         # Rates of roll and pitch in body axes, heading kept: w = (p, q cos, -q sin).
         rates = np.column_stack([p, q * np.cos(roll), -q * np.sin(roll)]) / scale
         force = [np.sin(pitch), -np.sin(roll) * np.cos(pitch), -np.cos(roll) * np.cos(pitch)]
-        lines = [",".join(f"{v:.6f}" for v in row) for row in np.column_stack([t, rates, *force])]
+        table = np.column_stack([t, rates, force_scale * np.transpose(force)])
+        lines = [",".join(f"{v:.6f}" for v in row) for row in table]
         return text(folder / "log.csv", lines, header)
 
     return make
@@ -278,6 +279,30 @@ CASES = [
         "Degrees that were called radians, and gravity tells it",
         turning("time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g", np.pi / 180.0),
         fails=False,
+    ),
+    Case(
+        "Increments of each sample without a unit",
+        turning("time_s,gx,gy,gz,ax,ay,az", 100.0, 9.80665 / 100.0),
+    ),
+    Case(
+        "The same with their units stated",
+        turning("time_s,gx,gy,gz,ax,ay,az", 100.0, 9.80665 / 100.0),
+        ("--gyro-unit", "rad", "--accel-unit", "m/s"),
+        fails=False,
+    ),
+    Case(
+        "Columns that are named increments, and hold rates",
+        turning("time_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,ax_g,ay_g,az_g", 1.0),
+        fails=False,
+    ),
+    Case(
+        "Increments whose unit is not in their names",
+        turning("time_s,dtheta_x,dtheta_y,dtheta_z,ax_g,ay_g,az_g", 100.0),
+    ),
+    Case(
+        "Increments that are called values at their stamps",
+        turning("time_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,ax_g,ay_g,az_g", 100.0),
+        ("--sampling", "instantaneous"),
     ),
     Case(
         "A unit that is none",

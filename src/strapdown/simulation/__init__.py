@@ -9,6 +9,7 @@ from strapdown.simulation.imu import simulate_imu
 from strapdown.simulation.minimum_jerk import Track
 from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
+from strapdown.simulation.sculling import Sculling
 from strapdown.simulation.sine_velocity import SineVelocityMotion
 from strapdown.simulation.smooth_random import SmoothRandom
 from strapdown.simulation.stationary import StationaryMotion
@@ -25,6 +26,7 @@ __all__ = [
     "Pulse",
     "PulseMotion",
     "Scenario",
+    "Sculling",
     "SineVelocityMotion",
     "SmoothRandom",
     "StationaryMotion",
