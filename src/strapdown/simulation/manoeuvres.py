@@ -102,7 +102,7 @@ class Manoeuvre(Protocol):
 
 @dataclass(frozen=True)
 class Accelerate:
-    """Change the speed to `to` (m/s) in `duration` (s), with least jerk."""
+    """Change the speed to `to` (m/s) in `duration` (s), with least jerk; it may fall too."""
 
     to: float
     duration: float
@@ -123,6 +123,36 @@ class Accelerate:
             )
         course.move(course.speed, course.time, self.duration, self.to)
         course.time += self.duration
+
+
+@dataclass(frozen=True)
+class Brake(Accelerate):
+    """Come down to the speed `to` (m/s) in `duration` (s), with least jerk."""
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        if self.to >= course.speed_now:
+            raise _unfit(
+                f"to brake from {course.speed_now:g} to {self.to:g} m/s",
+                "let the vehicle move faster before, or accelerate",
+                "to",
+            )
+        super().lay(course)
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Brake to a stop in `braking` (s), and stand for `stay` (s)."""
+
+    braking: float
+    stay: float = 0.0
+
+    def lay(self, course: Course) -> None:
+        """Add it to a course."""
+        Brake(0.0, self.braking).lay(course)
+        if not 0.0 <= self.stay < math.inf:
+            raise _unfit(f"it is {self.stay:g}", "use zero or more", "stay")
+        course.time += self.stay
 
 
 @dataclass(frozen=True)

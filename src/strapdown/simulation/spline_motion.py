@@ -257,14 +257,14 @@ def _check_points(time: Array, place: Array) -> None:
     if falls.size:
         k = int(falls[0])
         raise ConfigError(
-            f"place {k + 2} has {time[k + 1]:.9g} s, which does not come after {time[k]:.9g} s",
-            quantity="time",
+            f"{time[k + 1]:.9g} s does not come after {time[k]:.9g} s",
+            quantity=f"place {k + 2}, time",
             remedy="give rising times",
         )
     if time[0] != 0.0:
         raise ConfigError(
-            f"the first place has {time[0]:.9g} s",
-            quantity="time",
+            f"it is {time[0]:.9g} s",
+            quantity="place 1, time",
             remedy="count from the first place, at 0 s",
         )
     for k, (lat, lon, alt) in enumerate(place.tolist()):
@@ -273,7 +273,7 @@ def _check_points(time: Array, place: Array) -> None:
         except ConfigError as error:
             f = error.finding
             raise ConfigError(
-                f"place {k + 1}: {f.what}", quantity=f.quantity, remedy=f.remedy
+                f.what, quantity=f"place {k + 1}, {f.quantity}", remedy=f.remedy
             ) from None
 
 

@@ -51,15 +51,15 @@ def through_waypoints(
     if (times is None) == (speeds is None):
         raise ConfigError(
             "there are neither times nor speeds, or both",
-            quantity="waypoints",
+            quantity="places",
             remedy="give each place a time, or each leg a speed",
         )
     same = np.flatnonzero(np.all(np.diff(rows, axis=0) == 0.0, axis=1))
     if same.size:
         k = int(same[0])
         raise ConfigError(
-            f"waypoint {k + 2} is in the same place as waypoint {k + 1}",
-            quantity="waypoints",
+            f"it is where place {k + 1} is",
+            quantity=f"place {k + 2}",
             remedy="leave it out: a path through it has no heading there",
         )
     stamps = _times(rows, speeds, ellipsoid) if speeds is not None else np.array(times, dtype=float)
@@ -82,8 +82,8 @@ def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Arra
     for k, speed in enumerate(speeds):
         if not 0.0 < speed < math.inf:
             raise ConfigError(
-                f"{speed:g} m/s to waypoint {k + 2}",
-                quantity="speed",
+                f"it is {speed:g} m/s",
+                quantity=f"place {k + 2}, speed",
                 remedy="use a number above zero",
             )
     from strapdown._kernels.earth import radii
