@@ -26,6 +26,8 @@ _DEGREE = 5  # continuous to the fourth derivative
 _LOOKS = 16
 # Part of the greatest horizontal speed under which a path has no direction.
 _LEAST = 1e-3
+# Cosine of the turn from one look to the next over which a path turns back.
+_BEND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,13 +230,17 @@ class SplineMotion(EarthMotion):
                 remedy="go slower there, or give more places around the bend",
             )
         level = np.hypot(velocity[:, 0], velocity[:, 1])
-        slowest = int(np.argmin(level))
-        if self.euler is None and level[slowest] <= _LEAST * level.max():
-            raise ConfigError(
-                f"the path stops or turns back at {looks[slowest]:.4g} s, and has no heading there",
-                quantity="place",
-                remedy="give places that lead round the bend",
-            )
+        if self.euler is None:
+            along = np.sum(velocity[:-1, :2] * velocity[1:, :2], axis=1)
+            lost = level <= _LEAST * level.max()
+            lost[:-1] |= along < _BEND * level[:-1] * level[1:]
+            if lost.any():
+                raise ConfigError(
+                    f"the path stops or turns back at {looks[np.argmax(lost)]:.4g} s, and has no "
+                    "heading there",
+                    quantity="place",
+                    remedy="give places that lead round the bend",
+                )
         if self.euler is None:
             pitch = np.degrees(np.arctan2(np.abs(velocity[:, 2]), level))
             _check_pitch(pitch, looks)

@@ -35,6 +35,8 @@ CLIMB_RAMP = 3.0
 
 # Quantities of the simulation, as a file has them.
 _KEYS = {
+    "acceleration": "most_acceleration_m_per_s2",
+    "place": "waypoints",
     "angle": "angle_deg",
     "bank": "bank_deg",
     "distance": "distance_m",
