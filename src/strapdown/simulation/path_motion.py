@@ -134,6 +134,7 @@ class PathMotion(EarthMotion):
             path.acceleration,
             euler_attitude(turned, (1.0, 0.0, 0.0, 0.0)),
             euler_body_rate(turned, turning),
+            turned,
         )
 
     def _path(self, time: Array) -> _Path:

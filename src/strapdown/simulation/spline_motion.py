@@ -184,7 +184,8 @@ class SplineMotion(EarthMotion):
         else:
             angles, rates, _ = self._turn(time)
         q_nb = euler_attitude(angles, (1.0, 0.0, 0.0, 0.0))
-        return Kinematics(moved, velocity, acceleration, q_nb, euler_body_rate(angles, rates))
+        turning = euler_body_rate(angles, rates)
+        return Kinematics(moved, velocity, acceleration, q_nb, turning, angles)
 
     @cached_property
     def _course(self) -> Spline:
