@@ -263,19 +263,18 @@ class Mechanization(ABC):
         source = increments.attrs.get("source")
         if why == POLE:
             raise DivergenceError(
-                f"the step ending at {time:.9g} s comes nearer to a pole than "
+                f"the sample at {time:.9g} s (step {step + 1}) comes nearer to a pole than "
                 f"{self.latitude_limit_deg:g} deg of latitude{before}: north, and every angle from "
                 "it, changes too fast there",
                 file=source,
-                row=step + 1,
                 quantity="lat",
                 remedy="end the run before it; north-east-down has no meaning at a pole",
             )
         given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
         raise DivergenceError(
-            f"the state has diverged in the step ending at {time:.9g} s ({given}){before}",
+            f"the state has diverged with the sample at {time:.9g} s (step {step + 1}: {given})"
+            f"{before}",
             file=source,
-            row=step + 1,
             quantity="state",
             remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
             "gravity (-9.8 on z at level rest), a burst; and at the start: an attitude in rad, "
