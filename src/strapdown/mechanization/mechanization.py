@@ -61,7 +61,7 @@ class Mechanization(ABC):
     height_limits: tuple[float, float] = (-15_000.0, 1_000_000.0)
 
     name: ClassVar[str]
-    title: ClassVar[str]
+    summary: ClassVar[str]
     source: ClassVar[str]
 
     def __post_init__(self) -> None:

@@ -36,8 +36,8 @@ class Tadic(Mechanization):
     transport_rate: bool = True
 
     name: ClassVar[str] = "tadic"
-    title: ClassVar[str] = "north-east-down, with a paper's simplifications"
-    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+    summary: ClassVar[str] = "the same without the terms that the paper leaves out"
+    source: ClassVar[str] = "Tadic (2016) (1)-(19)"
 
     def begin(self, start: NavState) -> Array:
         """Return the state of the kernel at a start, (11,)."""
