@@ -16,7 +16,7 @@ def modules() -> None:
     from strapdown.formats import READERS
     from strapdown.formats.log_writers import LOG_WRITERS
     from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
-    from strapdown.mechanization import MECHANIZATIONS
+    from strapdown.mechanization import MECHANIZATIONS, Mechanization
     from strapdown.sensors.catalogue import SENSORS, load_sensor
     from strapdown.simulation import SCENARIOS
 
@@ -36,12 +36,12 @@ def modules() -> None:
     )
     out.print("Mechanizations", style="bold")
     print_table(
-        ["name", "source", "options", "what it does"],
+        ["name", "source", "own options", "what it does"],
         [
             [
                 name,
                 cls.source,
-                ", ".join(f.name for f in fields(cls)),
+                ", ".join(f.name for f in fields(cls)[len(fields(Mechanization)) :]) or "–",
                 cls.summary,
             ]
             for name, cls in MECHANIZATIONS.items()
