@@ -34,7 +34,7 @@ def page(tmp_path_factory, run_cli):
         folder = tmp_path_factory.mktemp(f"case{number}")
         source = case.make(folder)
         before = sorted(p.name for p in folder.rglob("*"))
-        result = run_cli("attitude", source, "--out", folder / "out", *case.options)
+        result = run_cli(case.command, source, "--out", folder / "out", *case.options)
         said = result.err.replace(str(folder) + os.sep, "")
         assert "Traceback" not in said
         if case.fails:

@@ -1,0 +1,241 @@
+"""Vehicles that follow a path: speed, climb and turn as tracks, with what the body does on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
+from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
+from strapdown.simulation.minimum_jerk import STILL, Track
+from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
+from strapdown.simulation.track_integral import integrate_track
+from strapdown.simulation.waves import Wave, sum_waves
+
+Array = NDArray[np.float64]
+
+# Beyond this pitch, heading and roll turn about nearly one axis and mean nothing to a vehicle.
+MOST_PITCH = 80.0  # deg
+
+
+@dataclass(frozen=True)
+class PathMotion(EarthMotion):
+    """Velocity of a given speed, climb and course; the place is its integral to rounding.
+
+    Everything is in closed form but that integral. Where the speed is zero the vehicle stands,
+    to the last bit.
+
+    Attributes
+    ----------
+    duration : float, s
+    origin : Origin
+    heading_deg : float, deg
+        At time zero.
+    speed : Track, m/s
+        Along the path.
+    turn_rate : Track, deg/s
+        Derivative of the course, positive to the right; its first time is zero.
+    climb : Track, deg
+        Angle of the path over the horizon.
+    coordinated : bool
+        Bank so that the turn is not felt sideways: ``tan roll = v cos(climb) turn_rate/g`` with
+        the standard gravity.
+    sway_roll, sway_pitch : float, deg/(m/s²)
+        What a body on springs does: it leans out of a turn by the one times the lateral
+        acceleration, and noses up by the other times the acceleration of its speed.
+    roll_deg : float, deg
+        Added to every roll.
+    attack_deg : float, deg
+        Pitch over that of the path.
+    roll_waves, pitch_waves, heading_waves : tuple of Wave, deg
+        Added to the angles.
+    heave_waves : tuple of Wave, m
+        Added to the place, downward.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    ConfigError
+        The duration is not positive, or the pitch goes beyond 80 deg.
+    """
+
+    duration: float
+    origin: Origin
+    heading_deg: float = 0.0
+    speed: Track = STILL
+    turn_rate: Track = STILL
+    climb: Track = STILL
+    coordinated: bool = False
+    sway_roll: float = 0.0
+    sway_pitch: float = 0.0
+    roll_deg: float = 0.0
+    attack_deg: float = 0.0
+    roll_waves: tuple[Wave, ...] = ()
+    pitch_waves: tuple[Wave, ...] = ()
+    heading_waves: tuple[Wave, ...] = ()
+    heave_waves: tuple[Wave, ...] = ()
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        check_duration(self.duration)
+        steepest = max(abs(x) for x in self.climb.values) + abs(self.attack_deg)
+        steepest += sum(abs(w.amplitude) for w in self.pitch_waves)
+        if not steepest <= MOST_PITCH:
+            raise ConfigError(
+                f"the pitch goes up to {steepest:.6g} deg",
+                quantity="pitch",
+                remedy=f"stay within {MOST_PITCH:g} deg",
+            )
+
+    @property
+    def breaks(self) -> Sequence[float]:
+        """Where a track begins another move, and as often that no wave is overlooked, s."""
+        waves = (*self.roll_waves, *self.pitch_waves, *self.heading_waves, *self.heave_waves)
+        step = min([self.duration, *(w.period for w in waves)])
+        inner = {*self.speed.times, *self.turn_rate.times, *self.climb.times}
+        inner |= {step * k for k in range(math.ceil(self.duration / step))}
+        return [0.0, *sorted(t for t in inner if 0.0 < t < self.duration), self.duration]
+
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants; as `EarthMotion.kinematics`."""
+        path = self._path(time)
+        # What is felt sideways, and how it changes.
+        lateral = path.level * path.swing
+        d_lateral = path.d_level * path.swing + path.level * path.d_swing
+        roll, d_roll = self.roll_deg - self.sway_roll * lateral, -self.sway_roll * d_lateral
+        if self.coordinated:
+            part, d_part = lateral / STANDARD_GRAVITY, d_lateral / STANDARD_GRAVITY
+            roll += np.degrees(np.arctan(part))
+            d_roll += np.degrees(d_part / (1.0 + part * part))
+        rolling, pitching = sum_waves(self.roll_waves, time), sum_waves(self.pitch_waves, time)
+        yawing = sum_waves(self.heading_waves, time)
+        angles = [
+            roll + rolling[0],
+            path.climb + self.attack_deg + self.sway_pitch * path.d_speed + pitching[0],
+            path.course + yawing[0],
+        ]
+        rates = [
+            d_roll + rolling[1],
+            path.d_climb + self.sway_pitch * path.dd_speed + pitching[1],
+            path.turn + yawing[1],
+        ]
+        turned, turning = np.column_stack(angles), np.column_stack(rates)
+        return Kinematics(
+            self._moved(time),
+            path.velocity,
+            path.acceleration,
+            euler_attitude(turned, (1.0, 0.0, 0.0, 0.0)),
+            euler_body_rate(turned, turning),
+            turned,
+        )
+
+    def _path(self, time: Array) -> _Path:
+        speed, d_speed, dd_speed = self.speed.evaluate(time)
+        climb, d_climb, _ = self.climb.evaluate(time)
+        turn, d_turn, _ = self.turn_rate.evaluate(time)
+        course = self.heading_deg + integrate_track(self.turn_rate, time)
+        _, heave, d_heave = sum_waves(self.heave_waves, time)
+        slope, d_slope, swing = np.radians(climb), np.radians(d_climb), np.radians(turn)
+        # Whole turns are taken away in degrees, where they have no rounding.
+        angle = np.radians(course - 360.0 * np.rint(course / 360.0))
+        north, east, flat, steep = np.cos(angle), np.sin(angle), np.cos(slope), np.sin(slope)
+        level, up = speed * flat, speed * steep
+        d_level, d_up = d_speed * flat - up * d_slope, d_speed * steep + level * d_slope
+        velocity = [level * north, level * east, heave - up]
+        acceleration = [
+            d_level * north - level * east * swing,
+            d_level * east + level * north * swing,
+            d_heave - d_up,
+        ]
+        return _Path(
+            d_speed,
+            dd_speed,
+            climb,
+            d_climb,
+            turn,
+            course,
+            level,
+            d_level,
+            swing,
+            np.radians(d_turn),
+            np.column_stack(velocity),
+            np.column_stack(acceleration),
+        )
+
+    @cached_property
+    def _moved(self) -> PlaceIntegral:
+        def velocity(time: Array) -> Array:
+            return self._path(time).velocity
+
+        return integrate_velocity(velocity, self.breaks, self.origin, self.ellipsoid)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """What the tracks give: deg in climb, turn and course, rad/s in swing; level is a speed."""
+
+    d_speed: Array
+    dd_speed: Array
+    climb: Array
+    d_climb: Array
+    turn: Array
+    course: Array
+    level: Array
+    d_level: Array
+    swing: Array
+    d_swing: Array
+    velocity: Array
+    acceleration: Array
+
+
+def rocking_stand(
+    duration: float,
+    origin: Origin,
+    *,
+    roll_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    heading_deg: float = 0.0,
+    roll_waves: Sequence[Wave] = (),
+    pitch_waves: Sequence[Wave] = (),
+    heading_waves: Sequence[Wave] = (),
+    ellipsoid: Ellipsoid = WGS84,
+) -> PathMotion:
+    """A body that rocks about a fixed place.
+
+    Parameters
+    ----------
+    duration : float, s
+    origin : Origin
+    roll_deg, pitch_deg, heading_deg : float, deg
+        Means of the angles.
+    roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    PathMotion
+
+    Raises
+    ------
+    ConfigError
+        As `PathMotion`.
+    """
+    return PathMotion(
+        duration,
+        origin,
+        heading_deg=heading_deg,
+        attack_deg=pitch_deg,
+        roll_deg=roll_deg,
+        roll_waves=tuple(roll_waves),
+        pitch_waves=tuple(pitch_waves),
+        heading_waves=tuple(heading_waves),
+        ellipsoid=ellipsoid,
+    )
