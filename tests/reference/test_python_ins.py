@@ -21,7 +21,6 @@ from pyins.transform import compute_state_difference
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from exact_increments import errors, start_of
-
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.simulation import (
