@@ -28,7 +28,7 @@ from strapdown.export_c.layout import WIDTH, comment, number
 from strapdown.export_c.main import main_program
 from strapdown.export_c.translate import Translator
 from strapdown.export_c.vector import make_vector
-from strapdown.increments import INTERPOLATIONS
+from strapdown.increments.angle import INTERPOLATIONS
 from strapdown.tables import SAMPLINGS as KINDS
 from strapdown.tables import check_imu
 

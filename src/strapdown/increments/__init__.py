@@ -1,0 +1,14 @@
+"""From samples of rate and specific force to increments of angle, velocity and distance."""
+
+from strapdown.increments.accuracy import MotionAccuracy, motion_accuracy
+from strapdown.increments.angle import increments_from_imu
+from strapdown.increments.motion import motion_increments
+from strapdown.increments.summed import imu_from_increments
+
+__all__ = [
+    "MotionAccuracy",
+    "imu_from_increments",
+    "increments_from_imu",
+    "motion_accuracy",
+    "motion_increments",
+]
