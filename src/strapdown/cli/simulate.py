@@ -12,22 +12,31 @@ EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out
 
 def simulate(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="A scenario (see: strapdown modules).")
-    ],
-    rate: Annotated[float, typer.Option(metavar="HZ", help="Samples a second.")] = 100.0,
-    sampling: Annotated[
         str,
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="A scenario (see: strapdown modules), or a trajectory's file (.toml), whose "
+            "values the options replace.",
+        ),
+    ],
+    rate: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Samples a second (100).")
+    ] = None,
+    sampling: Annotated[
+        str | None,
         typer.Option(
             metavar="KIND",
-            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
-            "there).",
+            help="instantaneous (the rate at the stamp, as without it) or mean (over the interval "
+            "that ends there).",
         ),
-    ] = "instantaneous",
+    ] = None,
     formats: Annotated[
-        str,
-        typer.Option("--format", metavar="F", help="csv, npz, h5, mat (joined by commas), or all."),
-    ] = "csv",
-    seed: Annotated[int, typer.Option(help="Of the errors.")] = 0,
+        str | None,
+        typer.Option(
+            "--format", metavar="F", help="csv, npz, h5, mat (joined by commas), or all (csv)."
+        ),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="Of the errors (0).")] = None,
     sensor: Annotated[
         str | None,
         typer.Option(
@@ -44,25 +53,26 @@ def simulate(
     json: Annotated[bool, typer.Option("--json", help="Print the scenario as JSON alone.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Write the log of a scenario together with its exact attitude."""
+    """Write the log of a scenario or a trajectory together with its exact truth."""
     from strapdown.cli.console import console, print_seal, progress
     from strapdown.report.simulation import simulate as write
 
+    title = Path(name).stem if name.lower().endswith(".toml") else name
     with progress(quiet or json) as report:
         report("simulating and writing", 0.5)
         seal = write(
             name,
-            out or Path(f"{name}-simulated"),
+            out or Path(f"{title}-simulated"),
             rate=rate,
             sampling=sampling,
             seed=seed,
             sensor=sensor,
-            formats=formats.replace(",", " ").split(),
+            formats=None if formats is None else formats.replace(",", " ").split(),
             force=force,
         )
     if json:
         typer.echo((seal.path / "scenario.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         files = sorted(p.name for p in seal.path.iterdir())
-        console().print(f"{name}: {', '.join(files)}")
+        console().print(f"{title}: {', '.join(files)}")
         print_seal(seal, "scenario.json")

@@ -6,7 +6,7 @@ sampling, the axes and, where it is known, the true attitude.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +14,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats import csv, hdf5, matlab, npz
-from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
+from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION, VELOCITY
 
-__all__ = ["LOG_WRITERS", "write_attitude_csv"]
+__all__ = ["LOG_WRITERS", "log_formats", "write_attitude_csv", "write_trajectory_csv"]
 
 _AXES = "forward-right-down"
 
@@ -77,6 +78,33 @@ LOG_WRITERS: dict[str, LogWriter] = {
 }
 
 
+def log_formats(names: Sequence[str]) -> tuple[str, ...]:
+    """Look up the formats that a person names.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of `LOG_WRITERS`; ``all`` stands for each.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    ConfigError
+        There is no such format.
+    """
+    for name in names:
+        if name not in (*LOG_WRITERS, "all"):
+            raise ConfigError(
+                f"there is no writer for '{name}'",
+                quantity="--format",
+                remedy=nearest(name, [*LOG_WRITERS, "all"]),
+            )
+    return tuple(LOG_WRITERS) if "all" in names else tuple(names)
+
+
 def write_attitude_csv(path: Path, attitude: pd.DataFrame) -> None:
     """Write an Attitude table as text.
 
@@ -90,4 +118,31 @@ def write_attitude_csv(path: Path, attitude: pd.DataFrame) -> None:
     columns |= {f"{e}_deg": attitude[e].to_numpy() for e in EULER}
     csv.write(
         path, columns, {"attitude": "body forward-right-down to north-east-down, scalar first"}
+    )
+
+
+def write_trajectory_csv(path: Path, trajectory: pd.DataFrame) -> None:
+    """Write a Trajectory table as text.
+
+    Parameters
+    ----------
+    path : Path
+    trajectory : DataFrame
+    """
+    columns = {"time_s": trajectory.index.to_numpy(dtype=np.float64)}
+    columns |= {
+        f"{name}{unit}": trajectory[name].to_numpy(dtype=np.float64)
+        for names, unit in ((["lat", "lon"], "_deg"), (["alt"], "_m"))
+        for name in names
+    }
+    columns |= {f"{v}_m_s": trajectory[v].to_numpy(dtype=np.float64) for v in VELOCITY}
+    columns |= {f"{e}_deg": trajectory[e].to_numpy(dtype=np.float64) for e in EULER}
+    csv.write(
+        path,
+        columns,
+        {
+            "place": "geodetic latitude and longitude, height over the ellipsoid",
+            "velocity": "relative to the Earth: north, east, down",
+            "attitude": "body forward-right-down to north-east-down",
+        },
     )

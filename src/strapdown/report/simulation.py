@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
-from strapdown.config import ScenarioSpec, SimulateSpec, specify
-from strapdown.exceptions import ConfigError, nearest
-from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
+from strapdown.config import ScenarioSpec, SimulateSpec, read_trajectory_spec, specify
+from strapdown.exceptions import ConfigError
+from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
+from strapdown.report.stated_errors import stated_errors
+from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.systems.attitude_source import scenario_errors, sensor_file, simulate_scenario
 
@@ -21,31 +22,33 @@ def simulate(
     name: str,
     out: str | Path,
     *,
-    rate: float = 100.0,
-    sampling: str = "instantaneous",
-    seed: int = 0,
+    rate: float | None = None,
+    sampling: str | None = None,
+    seed: int | None = None,
     sensor: str | None = None,
-    formats: str | Sequence[str] = ("csv",),
+    formats: str | Sequence[str] | None = None,
     force: bool = False,
 ) -> Seal:
-    """Write the log of a scenario and its exact attitude.
+    """Write the log of a scenario or of a trajectory's file, with its exact truth.
 
     Parameters
     ----------
     name : str
-        One of `simulation.SCENARIOS`.
+        One of `simulation.SCENARIOS`, or the path of a trajectory's file, which ends in ``.toml``.
+        What is None below is as the file says, or else as named here.
     out : str or Path
         Folder to make.
     rate : float, Hz
+        100.
     sampling : {'instantaneous', 'mean'}
-        The rate at each stamp, or its exact mean over the interval that ends there.
+        The rate at each stamp (as without it), or its exact mean over the interval that ends there.
     seed : int
-        Of the errors.
+        Of the errors; 0.
     sensor : str, optional
         One of `sensors.catalogue.SENSORS`, or the path of a file in the same form: the errors
         of one unit of it, drawn with the seed, take the place of the scenario's own.
     formats : sequence of str
-        Of `formats.log_writers.LOG_WRITERS`, or ``all``.
+        Of `formats.log_writers.LOG_WRITERS`, or ``all``; ``csv``.
     force : bool
         Replace a bundle that is there.
 
@@ -53,40 +56,45 @@ def simulate(
     -------
     Seal
         The folder holds ``log.*`` (rad/s, body forward-right-down, with the true attitude in
-        further columns), ``truth.csv`` and ``scenario.json``.
+        further columns), ``scenario.json``, and the truth: ``truth.csv`` with the attitude of a
+        scenario, ``trajectory.csv`` with the place, velocity and attitude of a trajectory.
 
     Raises
     ------
     ConfigError
-        The scenario, the rate, the sampling, the sensor or a format is unknown, or `out` may not be
-        written.
+        The scenario, the rate, the sampling, the sensor or a format is unknown, `out` may not be
+        written, or something in the file does not fit; the message names the key.
     """
+    wanted = [formats] if isinstance(formats, str) else formats and list(formats)
+    if wanted is not None and not wanted:
+        raise ConfigError("none is named", quantity="--format", remedy="name csv, npz, h5 or mat")
+    wanted = wanted and [f.lower() for f in wanted]
+    if name.lower().endswith(".toml"):
+        trajectory = read_trajectory_spec(
+            Path(name),
+            rate_hz=rate,
+            sampling=sampling and sampling.lower(),
+            seed=seed,
+            sensor=sensor,
+            formats=wanted,
+        )
+        return write_trajectory_simulation(trajectory, Path(out), force=force)
     scenario = specify(
         ScenarioSpec,
         name=name.lower(),
-        rate_hz=rate,
-        sampling=sampling.lower(),
-        seed=seed,
+        rate_hz=100.0 if rate is None else rate,
+        sampling=(sampling or "instantaneous").lower(),
+        seed=seed or 0,
         sensor=sensor,
     )
-    wanted = [formats] if isinstance(formats, str) else list(formats)
-    if not wanted:
-        raise ConfigError("none is named", quantity="--format", remedy="name csv, npz, h5 or mat")
-    spec = specify(SimulateSpec, scenario=scenario, formats=tuple(f.lower() for f in wanted))
+    spec = specify(SimulateSpec, scenario=scenario, formats=tuple(wanted or ["csv"]))
     return write_simulation(spec, Path(out), force=force)
 
 
 def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> Seal:
     """Write a simulation from its specification; as `simulate`."""
     check_destination(out, force)
-    formats = tuple(LOG_WRITERS) if "all" in spec.formats else spec.formats
-    for name in formats:
-        if name not in LOG_WRITERS:
-            raise ConfigError(
-                f"there is no writer for '{name}'",
-                quantity="--format",
-                remedy=nearest(name, [*LOG_WRITERS, "all"]),
-            )
+    formats = log_formats(spec.formats)
     imu, truth = simulate_scenario(spec.scenario)
     scenario = find_scenario(spec.scenario.name)
     errors = scenario_errors(spec.scenario)
@@ -95,7 +103,7 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
         out,
         command="simulate",
         configuration=spec.model_dump(mode="json"),
-        inputs=sensor_file(spec.scenario),
+        inputs=sensor_file(spec.scenario.sensor),
         force=force,
         seals=seals,
     ) as folder:
@@ -115,8 +123,8 @@ def write_simulation(spec: SimulateSpec, out: Path, *, force: bool = False) -> S
             **_describe_motion(scenario.motion),
             "references": scenario.references,
             "sensor": spec.scenario.sensor and Path(spec.scenario.sensor).name,
-            "gyro_errors": _stated(errors.gyro, "rad_per_s"),
-            "accel_errors": _stated(errors.accel or TriadErrors(), "m_per_s2"),
+            "gyro_errors": stated_errors(errors.gyro, "rad_per_s"),
+            "accel_errors": stated_errors(errors.accel or TriadErrors(), "m_per_s2"),
             "final_attitude": {
                 "time_s": float(truth.index[-1]),
                 "q_nb": [float(final[q]) for q in ("q_w", "q_x", "q_y", "q_z")],
@@ -152,28 +160,3 @@ def _fields(thing: object) -> dict[str, object]:
         value = getattr(thing, f.name)
         found[f.name] = _fields(value) if hasattr(value, "__dataclass_fields__") else value
     return found
-
-
-# What follows the unit of the triad in a key, or stands instead of it.
-_AFTER = {"noise_density": "_per_sqrt_hz", "random_walk": "_per_sqrt_s", "trend": "_per_s"}
-_UNITS = {
-    "correlation_time": "s",
-    "jitter": "s",
-    "bandwidth": "hz",
-    "misalignment": "rad",
-    "scale": "relative",
-    "nonlinearity_2": "relative",
-    "nonlinearity_3": "relative",
-}
-
-
-def _stated(errors: TriadErrors, unit: str) -> dict[str, Any]:
-    """The errors that there are, each key with its unit."""
-    none, stated = TriadErrors(), {}
-    for f in fields(errors):
-        value = getattr(errors, f.name)
-        if value != getattr(none, f.name):
-            of = _UNITS.get(f.name, unit + _AFTER.get(f.name, ""))
-            of += "_per_m_per_s2" if f.name == "g_sensitivity" else ""
-            stated[f"{f.name}_{of}"] = value
-    return stated

@@ -25,12 +25,13 @@ from strapdown.bundle import (
     unsealed_changes,
     versions,
 )
-from strapdown.config import AttitudeSpec, ReproduceSpec, SimulateSpec
+from strapdown.config import AttitudeSpec, ReproduceSpec, SimulateSpec, TrajectorySpec
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.attitude import write_attitude
 from strapdown.report.reproduction import make_reproduction, write_reproduction
 from strapdown.report.simulation import write_simulation
+from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.systems.attitude_bench import run_bench
 
 __all__ = ["Verification", "verify"]
@@ -70,6 +71,9 @@ def _rerun_attitude(configuration: dict[str, Any], out: Path, sealed: set[str]) 
 
 
 def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    if "trajectory" in configuration:
+        trajectory = TrajectorySpec.model_validate(configuration["trajectory"])
+        return write_trajectory_simulation(trajectory, out)
     return write_simulation(SimulateSpec.model_validate(configuration), out)
 
 

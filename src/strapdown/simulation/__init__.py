@@ -8,10 +8,15 @@ from strapdown.simulation.handling import Handling
 from strapdown.simulation.imu import simulate_imu
 from strapdown.simulation.minimum_jerk import Track
 from strapdown.simulation.motion import Motion, Pulse, PulseMotion
+from strapdown.simulation.path_motion import PathMotion, rocking_stand
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
 from strapdown.simulation.sine_velocity import SineVelocityMotion
 from strapdown.simulation.smooth_random import SmoothRandom
+from strapdown.simulation.spline_motion import SplineMotion
 from strapdown.simulation.stationary import StationaryMotion
+from strapdown.simulation.vehicles import aircraft, car, ship
+from strapdown.simulation.waves import Wave
+from strapdown.simulation.waypoints import through_waypoints
 
 __all__ = [
     "SCENARIOS",
@@ -22,15 +27,23 @@ __all__ = [
     "ImuErrors",
     "Motion",
     "Origin",
+    "PathMotion",
     "Pulse",
     "PulseMotion",
     "Scenario",
     "SineVelocityMotion",
     "SmoothRandom",
+    "SplineMotion",
     "StationaryMotion",
     "Track",
     "TriadErrors",
+    "Wave",
+    "aircraft",
+    "car",
     "find_scenario",
     "gesture",
+    "rocking_stand",
+    "ship",
     "simulate_imu",
+    "through_waypoints",
 ]

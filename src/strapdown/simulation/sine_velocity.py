@@ -14,6 +14,7 @@ from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.exceptions import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
 from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
+from strapdown.simulation.path_attitude import along_velocity
 from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
 
 Array = NDArray[np.float64]
@@ -86,19 +87,7 @@ class SineVelocityMotion(EarthMotion):
         v = self._velocity(time)
         omega = 2.0 * math.pi / self.period
         dv = omega * np.asarray(self.amplitude) * np.cos(self._phase(time))
-        north, east, down = v.T
-        d_north, d_east, d_down = dv.T
-        level2 = north * north + east * east
-        level = np.sqrt(level2)
-        d_level = (north * d_north + east * d_east) / level
-        still = np.zeros(time.size)
-        angles = [still, np.arctan2(-down, level), np.arctan2(east, north)]
-        rates = [
-            still,
-            (down * d_level - d_down * level) / (level2 + down * down),
-            (north * d_east - east * d_north) / level2,
-        ]
-        turned, turning = np.degrees(angles).T, np.degrees(rates).T
+        turned, turning = along_velocity(v, dv)
         q_nb = euler_attitude(turned, (1.0, 0.0, 0.0, 0.0))
         return Kinematics(self._moved(time), v, dv, q_nb, euler_body_rate(turned, turning))
 

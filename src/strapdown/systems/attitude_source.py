@@ -130,11 +130,11 @@ def input_files(role: str, path: str, files: tuple[Path, ...]) -> InputFiles:
     return InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
 
 
-def sensor_file(spec: ScenarioSpec) -> tuple[InputFiles, ...]:
-    """The file that the sensor of a scenario was read from, where the catalogue has none."""
-    if spec.sensor is None or spec.sensor.lower() in SENSORS:
+def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
+    """The file that a sensor was read from, where it is not of the catalogue."""
+    if sensor is None or sensor.lower() in SENSORS:
         return ()
-    return (input_files("sensor", spec.sensor, (Path(spec.sensor),)),)
+    return (input_files("sensor", sensor, (Path(sensor),)),)
 
 
 def _scenario(spec: ScenarioSpec) -> Source:
@@ -159,7 +159,7 @@ def _scenario(spec: ScenarioSpec) -> Source:
         np.ones(len(truth), dtype=bool),
         (),
         (),
-        sensor_file(spec),
+        sensor_file(spec.sensor),
         (float(lost.iloc[-1]), float(lost.max())),
         clean,
     )

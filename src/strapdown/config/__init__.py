@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+from pydantic import Field, FiniteFloat
 
-from strapdown.exceptions import ConfigError
+from strapdown.config.spec import Spec, specify
+from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
 
-__all__ = ["AttitudeSpec", "LogSpec", "ReproduceSpec", "ScenarioSpec", "SimulateSpec", "specify"]
-
-
-class Spec(BaseModel):
-    """Frozen, and strict about names."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+__all__ = [
+    "AttitudeSpec",
+    "LogSpec",
+    "ReproduceSpec",
+    "ScenarioSpec",
+    "SimulateSpec",
+    "TrajectorySpec",
+    "read_trajectory_spec",
+    "specify",
+]
 
 
 class ScenarioSpec(Spec):
@@ -74,37 +78,3 @@ class ReproduceSpec(Spec):
     """One paper re-made; everything else is fixed in the code."""
 
     paper: str
-
-
-S = TypeVar("S", bound=Spec)
-
-
-def specify(form: type[S], **values: Any) -> S:
-    """Make a specification, or say which value does not fit.
-
-    Parameters
-    ----------
-    form : type
-        One of the specifications here.
-    **values
-        Its fields.
-
-    Returns
-    -------
-    Spec
-
-    Raises
-    ------
-    ConfigError
-        A value is of the wrong kind or out of range.
-    """
-    try:
-        return form(**values)
-    except ValidationError as error:
-        first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(
-            f"{first['input']!r} does not fit: {first['msg'].lower()}",
-            quantity=place,
-            remedy="give another value",
-        ) from None

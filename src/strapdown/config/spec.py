@@ -1,0 +1,73 @@
+"""What all specifications share: their form, and what is said where one does not fit."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic_core import PydanticCustomError
+
+from strapdown.exceptions import ConfigError, nearest
+
+__all__ = ["Spec", "TableSpec", "refuse", "specify"]
+
+
+class Spec(BaseModel):
+    """Frozen, and strict about names."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class TableSpec(Spec):
+    """A table that a person writes: a key that is not known is answered with the nearest."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, data: Any) -> Any:
+        for key in data if isinstance(data, dict) else ():
+            if key not in cls.model_fields:
+                raise refuse(key, "there is no such key", nearest(key, cls.model_fields))
+        return data
+
+
+def refuse(key: str, what: str, remedy: str) -> PydanticCustomError:
+    """What a validator raises about one of its keys, with a remedy of its own."""
+    return PydanticCustomError(
+        "refused",
+        "{what}",
+        {"key": key, "what": what, "remedy": remedy},
+    )
+
+
+S = TypeVar("S", bound=Spec)
+
+
+def specify(form: type[S], **values: Any) -> S:
+    """Make a specification, or say which value does not fit.
+
+    Parameters
+    ----------
+    form : type
+        One of the specifications here.
+    **values
+        Its fields.
+
+    Returns
+    -------
+    Spec
+
+    Raises
+    ------
+    ConfigError
+        A value is of the wrong kind or out of range.
+    """
+    try:
+        return form(**values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise ConfigError(
+            f"{first['input']!r} does not fit: {first['msg'].lower()}",
+            quantity=place,
+            remedy="give another value",
+        ) from None

@@ -1,0 +1,221 @@
+"""Vehicles that follow a path: speed, climb and turn as tracks, with what the body does on it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
+from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
+from strapdown.simulation.minimum_jerk import STILL, Track
+from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
+from strapdown.simulation.track_integral import integrate_track
+from strapdown.simulation.waves import Wave, sum_waves
+
+Array = NDArray[np.float64]
+
+# Beyond this pitch, heading and roll turn about nearly one axis and mean nothing to a vehicle.
+MOST_PITCH = 80.0  # deg
+
+
+@dataclass(frozen=True)
+class PathMotion(EarthMotion):
+    """Velocity of a given speed, climb and course; the place is its integral to rounding.
+
+    Everything is in closed form but that integral. Where the speed is zero the vehicle stands,
+    to the last bit.
+
+    Attributes
+    ----------
+    duration : float, s
+    origin : Origin
+    heading_deg : float, deg
+        At time zero.
+    speed : Track, m/s
+        Along the path.
+    turn_rate : Track, deg/s
+        Derivative of the course, positive to the right; its first time is zero.
+    climb : Track, deg
+        Angle of the path over the horizon.
+    coordinated : bool
+        Bank so that the turn is not felt sideways: ``tan roll = v cos(climb) turn_rate/g`` with
+        the standard gravity.
+    sway_roll, sway_pitch : float, deg/(m/s²)
+        What a body on springs does: it leans out of a turn by the one times the lateral
+        acceleration, and noses up by the other times the acceleration of its speed.
+    roll_deg : float, deg
+        Added to every roll.
+    attack_deg : float, deg
+        Pitch over that of the path.
+    roll_waves, pitch_waves, heading_waves : tuple of Wave, deg
+        Added to the angles.
+    heave_waves : tuple of Wave, m
+        Added to the place, downward.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    ConfigError
+        The duration is not positive, or the pitch goes beyond 80 deg.
+    """
+
+    duration: float
+    origin: Origin
+    heading_deg: float = 0.0
+    speed: Track = STILL
+    turn_rate: Track = STILL
+    climb: Track = STILL
+    coordinated: bool = False
+    sway_roll: float = 0.0
+    sway_pitch: float = 0.0
+    roll_deg: float = 0.0
+    attack_deg: float = 0.0
+    roll_waves: tuple[Wave, ...] = ()
+    pitch_waves: tuple[Wave, ...] = ()
+    heading_waves: tuple[Wave, ...] = ()
+    heave_waves: tuple[Wave, ...] = ()
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        check_duration(self.duration)
+        steepest = max(abs(x) for x in self.climb.values) + abs(self.attack_deg)
+        steepest += sum(abs(w.amplitude) for w in self.pitch_waves)
+        if not steepest <= MOST_PITCH:
+            raise ConfigError(
+                f"the pitch goes up to {steepest:.6g} deg",
+                quantity="pitch",
+                remedy=f"stay within {MOST_PITCH:g} deg",
+            )
+
+    @property
+    def breaks(self) -> Sequence[float]:
+        """Where a track begins another move, and as often that no wave is overlooked, s."""
+        waves = (*self.roll_waves, *self.pitch_waves, *self.heading_waves, *self.heave_waves)
+        step = min([self.duration, *(w.period for w in waves)])
+        inner = {*self.speed.times, *self.turn_rate.times, *self.climb.times}
+        inner |= {step * k for k in range(math.ceil(self.duration / step))}
+        return [0.0, *sorted(t for t in inner if 0.0 < t < self.duration), self.duration]
+
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants; as `EarthMotion.kinematics`."""
+        speed, d_speed, dd_speed = self.speed.evaluate(time)
+        climb, d_climb, _ = self.climb.evaluate(time)
+        turn, d_turn, _ = self.turn_rate.evaluate(time)
+        course = self._course(time)
+        velocity, acceleration = self._moving(time)
+        slope, d_slope, swing = np.radians(climb), np.radians(d_climb), np.radians(turn)
+        d_swing = np.radians(d_turn)
+        # What is felt sideways, and how it changes.
+        level = speed * np.cos(slope)
+        d_level = d_speed * np.cos(slope) - speed * np.sin(slope) * d_slope
+        lateral, d_lateral = level * swing, d_level * swing + level * d_swing
+        roll, d_roll = self.roll_deg - self.sway_roll * lateral, -self.sway_roll * d_lateral
+        if self.coordinated:
+            part, d_part = lateral / STANDARD_GRAVITY, d_lateral / STANDARD_GRAVITY
+            roll += np.degrees(np.arctan(part))
+            d_roll += np.degrees(d_part / (1.0 + part * part))
+        rolling, pitching = sum_waves(self.roll_waves, time), sum_waves(self.pitch_waves, time)
+        yawing = sum_waves(self.heading_waves, time)
+        angles = [
+            roll + rolling[0],
+            climb + self.attack_deg + self.sway_pitch * d_speed + pitching[0],
+            course + yawing[0],
+        ]
+        rates = [
+            d_roll + rolling[1],
+            d_climb + self.sway_pitch * dd_speed + pitching[1],
+            turn + yawing[1],
+        ]
+        turned, turning = np.column_stack(angles), np.column_stack(rates)
+        return Kinematics(
+            self._moved(time),
+            velocity,
+            acceleration,
+            euler_attitude(turned, (1.0, 0.0, 0.0, 0.0)),
+            euler_body_rate(turned, turning),
+        )
+
+    def _course(self, time: Array) -> Array:
+        return self.heading_deg + integrate_track(self.turn_rate, time)
+
+    def _moving(self, time: Array) -> tuple[Array, Array]:
+        """Velocity and its derivative, north-east-down."""
+        speed, d_speed, _ = self.speed.evaluate(time)
+        climb, d_climb, _ = (np.radians(x) for x in self.climb.evaluate(time))
+        d_course, course = np.radians(self.turn_rate.evaluate(time)[0]), self._course(time)
+        # Whole turns are taken away in degrees, where they have no rounding.
+        course = np.radians(course - 360.0 * np.rint(course / 360.0))
+        _, heave, d_heave = sum_waves(self.heave_waves, time)
+        north, east = np.cos(course), np.sin(course)
+        flat, up = speed * np.cos(climb), speed * np.sin(climb)
+        d_flat = d_speed * np.cos(climb) - up * d_climb
+        d_up = d_speed * np.sin(climb) + flat * d_climb
+        velocity = np.column_stack([flat * north, flat * east, heave - up])
+        acceleration = np.column_stack(
+            [
+                d_flat * north - flat * east * d_course,
+                d_flat * east + flat * north * d_course,
+                d_heave - d_up,
+            ]
+        )
+        return velocity, acceleration
+
+    @cached_property
+    def _moved(self) -> PlaceIntegral:
+        def velocity(time: Array) -> Array:
+            return self._moving(time)[0]
+
+        return integrate_velocity(velocity, self.breaks, self.origin, self.ellipsoid)
+
+
+def rocking_stand(
+    duration: float,
+    origin: Origin,
+    *,
+    roll_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    heading_deg: float = 0.0,
+    roll_waves: Sequence[Wave] = (),
+    pitch_waves: Sequence[Wave] = (),
+    heading_waves: Sequence[Wave] = (),
+    ellipsoid: Ellipsoid = WGS84,
+) -> PathMotion:
+    """A body that rocks about a fixed place.
+
+    Parameters
+    ----------
+    duration : float, s
+    origin : Origin
+    roll_deg, pitch_deg, heading_deg : float, deg
+        Means of the angles.
+    roll_waves, pitch_waves, heading_waves : sequence of Wave, deg
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    PathMotion
+
+    Raises
+    ------
+    ConfigError
+        As `PathMotion`.
+    """
+    return PathMotion(
+        duration,
+        origin,
+        heading_deg=heading_deg,
+        attack_deg=pitch_deg,
+        roll_deg=roll_deg,
+        roll_waves=tuple(roll_waves),
+        pitch_waves=tuple(pitch_waves),
+        heading_waves=tuple(heading_waves),
+        ellipsoid=ellipsoid,
+    )

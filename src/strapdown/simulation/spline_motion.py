@@ -1,0 +1,303 @@
+"""Motions through given places: a spline is the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.earth_motion import MOST_NORTHERN, EarthMotion, Kinematics, Origin
+from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
+from strapdown.simulation.path_attitude import along_velocity
+from strapdown.simulation.path_motion import MOST_PITCH
+from strapdown.tables import EULER, GEODETIC, check_trajectory
+
+Array = NDArray[np.float64]
+
+_DEGREE = 5  # continuous to the fourth derivative
+# Looks between two knots for what a spline does there.
+_LOOKS = 16
+# Part of the greatest horizontal speed under which a path has no direction.
+_LEAST = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Spline:
+    """Quintic spline of m coordinates: knots (p + 1,), coefficients (p, 6, m)."""
+
+    knots: Array
+    coefficients: Array
+
+    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
+        """Value and first two derivatives, (n, m) each."""
+        from strapdown._kernels.piecewise import polynomials
+
+        shape = (time.size, self.coefficients.shape[2])
+        value, first, second = np.empty(shape), np.empty(shape), np.empty(shape)
+        polynomials(self.knots, self.coefficients, time, value, first, second)
+        return value, first, second
+
+
+def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
+    """Spline of the fifth degree through values, whose third and fourth derivatives end at zero.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Two or more, rising.
+    values : array_like, (n, m)
+
+    Returns
+    -------
+    Spline
+        With continuous fourth derivative: of all curves through the values the one of least mean
+        square third derivative. Two values give a straight line.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    t, rows = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    zero = np.zeros(rows.shape[1])
+    if len(t) == 2:
+        slope = (rows[1] - rows[0]) / (t[1] - t[0])
+        coefficients = np.zeros((1, _DEGREE + 1, rows.shape[1]))
+        coefficients[0, -2], coefficients[0, -1] = slope, rows[0]
+        return Spline(t, coefficients)
+    ends = [(3, zero), (4, zero)]
+    spline = make_interp_spline(t, rows, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
+    knots = np.unique(spline.t)
+    # Taylor coefficients at the left of each piece, highest power first.
+    powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(_DEGREE, -1, -1)]
+    return Spline(knots, np.ascontiguousarray(np.stack(powers, axis=1)))
+
+
+@dataclass(frozen=True, eq=False)
+class SplineMotion(EarthMotion):
+    """Places at instants, joined by a quintic spline; attitudes likewise, or along the path.
+
+    The spline is the truth: velocity, acceleration and rates are its derivatives, not those of
+    what the places were taken from.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        From zero, rising; two or more.
+    place : ndarray, (n, 3)
+        Latitude and longitude in deg, height in m.
+    euler : ndarray, (n, 3), deg, optional
+        Roll, pitch, heading, splined likewise, headings along the shorter way. Without it the nose
+        points along the velocity and the roll is zero.
+    ellipsoid : Ellipsoid
+    most_acceleration : float, m/s²
+        The spline may not take more than this.
+
+    Raises
+    ------
+    ConfigError
+        A number is not finite, time does not begin at zero or advance, a latitude is out of range
+        or near a pole, a place is repeated, the pitch goes beyond 80 deg, the path stops or turns
+        back where the nose is to follow it, or the acceleration is too large.
+    """
+
+    time: Array
+    place: Array
+    euler: Array | None = None
+    ellipsoid: Ellipsoid = WGS84
+    most_acceleration: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("time", "place", "euler"):
+            value = getattr(self, name)
+            if value is not None:
+                copy = np.array(value, dtype=np.float64)
+                copy.flags.writeable = False
+                object.__setattr__(self, name, copy)
+        _check_points(self.time, self.place)
+        if self.euler is not None:
+            _check_euler(self.euler, len(self.time))
+        self._look()
+
+    @classmethod
+    def from_trajectory(
+        cls, trajectory: pd.DataFrame, ellipsoid: Ellipsoid = WGS84
+    ) -> SplineMotion:
+        """Make a motion through the places and attitudes of a Trajectory table.
+
+        Parameters
+        ----------
+        trajectory : DataFrame
+            Its velocities are not used. Time is counted from its first row.
+        ellipsoid : Ellipsoid
+
+        Returns
+        -------
+        SplineMotion
+
+        Raises
+        ------
+        DataError, ConfigError
+            As `tables.check_trajectory`, and as the class.
+        """
+        check_trajectory(trajectory)
+        stamps = np.asarray(trajectory.index, dtype=np.float64)
+        return cls(
+            stamps - stamps[0],
+            trajectory[GEODETIC].to_numpy(dtype=np.float64),
+            trajectory[EULER].to_numpy(dtype=np.float64),
+            ellipsoid,
+        )
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """Length in s."""
+        return float(self.time[-1])
+
+    @property
+    def origin(self) -> Origin:  # type: ignore[override]
+        """The first place."""
+        lat, lon, alt = (float(x) for x in self.place[0])
+        return Origin(lat, lon, alt)
+
+    @property
+    def breaks(self) -> Sequence[float]:
+        """The knots, s."""
+        return [float(t) for t in self._course.knots]
+
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants; as `EarthMotion.kinematics`."""
+        from strapdown._kernels.earth_motion import velocities
+
+        moved, first, second = self._course(time)
+        velocity, acceleration = np.empty(moved.shape), np.empty(moved.shape)
+        parameters = self.ellipsoid.parameters()
+        velocities(self.origin.place(moved), first, second, parameters, velocity, acceleration)
+        if self._turn is None:
+            angles, rates = along_velocity(velocity, acceleration)
+        else:
+            angles, rates, _ = self._turn(time)
+        q_nb = euler_attitude(angles, (1.0, 0.0, 0.0, 0.0))
+        return Kinematics(moved, velocity, acceleration, q_nb, euler_body_rate(angles, rates))
+
+    @cached_property
+    def _course(self) -> Spline:
+        moved = self.place - self.place[0]
+        moved[:, 1] = _unwrapped(self.place[:, 1]) - self.place[0, 1]
+        moved[:, :2] = np.radians(moved[:, :2])
+        return quintic(self.time, moved)
+
+    @cached_property
+    def _turn(self) -> Spline | None:
+        if self.euler is None:
+            return None
+        angles = self.euler.copy()
+        for column in (0, 2):
+            angles[:, column] = _unwrapped(angles[:, column])
+        return quintic(self.time, angles)
+
+    def _look(self) -> None:
+        """See that what the spline does between the places can be followed."""
+        from strapdown._kernels.earth_motion import velocities
+
+        part = np.linspace(0.0, 1.0, _LOOKS, endpoint=False)
+        looks = (self.time[:-1, None] + np.diff(self.time)[:, None] * part).ravel()
+        looks = np.append(looks, self.time[-1])
+        moved, first, second = self._course(looks)
+        at = self.origin.place(moved)
+        highest = float(np.degrees(np.abs(at[:, 0]).max()))
+        if highest > MOST_NORTHERN:
+            raise ConfigError(
+                f"the path comes to a latitude of {highest:.6g} deg",
+                quantity="lat_deg",
+                remedy=f"stay within {MOST_NORTHERN:g} deg: at a pole there is no heading",
+            )
+        velocity, acceleration = np.empty(moved.shape), np.empty(moved.shape)
+        velocities(at, first, second, self.ellipsoid.parameters(), velocity, acceleration)
+        size = np.linalg.norm(acceleration, axis=1)
+        worst = int(np.argmax(size))
+        if size[worst] > self.most_acceleration:
+            raise ConfigError(
+                f"the path takes {size[worst]:.3g} m/s² at {looks[worst]:.4g} s, more than the "
+                f"{self.most_acceleration:g} m/s² allowed",
+                quantity="acceleration",
+                remedy="go slower there, or give more places around the bend",
+            )
+        level = np.hypot(velocity[:, 0], velocity[:, 1])
+        slowest = int(np.argmin(level))
+        if self.euler is None and level[slowest] <= _LEAST * level.max():
+            raise ConfigError(
+                f"the path stops or turns back at {looks[slowest]:.4g} s, and has no heading there",
+                quantity="place",
+                remedy="give places that lead round the bend",
+            )
+        if self.euler is None:
+            pitch = np.degrees(np.arctan2(np.abs(velocity[:, 2]), level))
+            _check_pitch(pitch, looks)
+        elif self._turn is not None:
+            _check_pitch(np.abs(self._turn(looks)[0][:, 1]), looks)
+
+
+def _check_points(time: Array, place: Array) -> None:
+    if time.ndim != 1 or len(time) < 2 or place.shape != (len(time), 3):
+        raise ConfigError(
+            f"times of shape {time.shape} and places of shape {place.shape}",
+            quantity="place",
+            remedy="give two places or more, each with its time",
+        )
+    if not (np.isfinite(time).all() and np.isfinite(place).all()):
+        raise ConfigError(
+            "a time or a coordinate is not finite", quantity="place", remedy="leave it out"
+        )
+    falls = np.flatnonzero(np.diff(time) <= 0.0)
+    if falls.size:
+        k = int(falls[0])
+        raise ConfigError(
+            f"{time[k + 1]:.9g} s does not come after {time[k]:.9g} s",
+            quantity=f"place {k + 2}, time",
+            remedy="give rising times",
+        )
+    if time[0] != 0.0:
+        raise ConfigError(
+            f"it is {time[0]:.9g} s",
+            quantity="place 1, time",
+            remedy="count from the first place, at 0 s",
+        )
+    for k, (lat, lon, alt) in enumerate(place.tolist()):
+        try:
+            Origin(lat, lon, alt)
+        except ConfigError as error:
+            f = error.finding
+            raise ConfigError(
+                f.what, quantity=f"place {k + 1}, {f.quantity}", remedy=f.remedy
+            ) from None
+
+
+def _check_euler(euler: Array, count: int) -> None:
+    if euler.shape != (count, 3) or not np.isfinite(euler).all():
+        raise ConfigError(
+            f"angles of shape {euler.shape}, or not finite",
+            quantity="euler",
+            remedy="give roll, pitch and heading in deg for each place",
+        )
+
+
+def _check_pitch(pitch: Array, time: Array) -> None:
+    worst = int(np.argmax(pitch))
+    if pitch[worst] > MOST_PITCH:
+        raise ConfigError(
+            f"the pitch comes to {pitch[worst]:.4g} deg at {time[worst]:.4g} s",
+            quantity="pitch",
+            remedy=f"stay within {MOST_PITCH:g} deg",
+        )
+
+
+def _unwrapped(angles: Array) -> Array:
+    """Angles in deg, each next to the one before it; what needs no turn is left to the last bit."""
+    steps = np.diff(angles)
+    turns = np.cumsum(np.rint(steps / 360.0))
+    return np.asarray(np.r_[angles[:1], angles[1:] - 360.0 * turns])

@@ -1,0 +1,105 @@
+"""A path through waypoints, in time or at a speed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.spline_motion import SplineMotion
+
+Array = NDArray[np.float64]
+
+
+def through_waypoints(
+    places: Sequence[tuple[float, float, float]],
+    *,
+    times: Sequence[float] | None = None,
+    speeds: Sequence[float] | None = None,
+    most_acceleration: float = 30.0,
+    ellipsoid: Ellipsoid = WGS84,
+) -> SplineMotion:
+    """A vehicle without roll, nose along its path.
+
+    Parameters
+    ----------
+    places : sequence of (lat_deg, lon_deg, alt)
+        deg, deg, m; two or more.
+    times : sequence of float, s
+        From zero, one a place.
+    speeds : sequence of float, m/s
+        Instead of times: the mean speed along the straight line from each place to the next.
+    most_acceleration : float, m/s²
+        Of the spline through the places.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    SplineMotion
+
+    Raises
+    ------
+    ConfigError
+        Neither or both of times and speeds are given, or not as many as there are places or legs,
+        a place is repeated, or as `SplineMotion`.
+    """
+    rows = np.array(places, dtype=np.float64).reshape(-1, 3)
+    if (times is None) == (speeds is None):
+        raise ConfigError(
+            "there are neither times nor speeds, or both",
+            quantity="places",
+            remedy="give each place a time, or each leg a speed",
+        )
+    same = np.flatnonzero(np.all(np.diff(rows, axis=0) == 0.0, axis=1))
+    if same.size:
+        k = int(same[0])
+        raise ConfigError(
+            f"it is where place {k + 1} is",
+            quantity=f"place {k + 2}",
+            remedy="leave it out: a path through it has no heading there",
+        )
+    stamps = _times(rows, speeds, ellipsoid) if speeds is not None else np.array(times, dtype=float)
+    return SplineMotion(
+        stamps,
+        rows,
+        None,
+        ellipsoid,
+        most_acceleration,
+    )
+
+
+def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Array:
+    if len(speeds) != len(places) - 1:
+        raise ConfigError(
+            f"{len(speeds)} speeds for {len(places) - 1} legs",
+            quantity="speed",
+            remedy="give one for each leg",
+        )
+    for k, speed in enumerate(speeds):
+        if not 0.0 < speed < math.inf:
+            raise ConfigError(
+                f"it is {speed:g} m/s",
+                quantity=f"place {k + 2}, speed",
+                remedy="use a number above zero",
+            )
+    from strapdown._kernels.earth import radii
+
+    times = [0.0]
+    for (lat, lon, alt), (to_lat, to_lon, to_alt), speed in zip(
+        places[:-1], places[1:], speeds, strict=True
+    ):
+        # The straight line on the ground at the middle; it only shares out time.
+        middle = math.radians(0.5 * (lat + to_lat))
+        meridian, transverse = radii(
+            math.sin(middle), ellipsoid.semi_major_axis, ellipsoid.eccentricity_squared
+        )
+        height = 0.5 * (alt + to_alt)
+        north = (meridian + height) * math.radians(to_lat - lat)
+        across = math.remainder(to_lon - lon, 360.0)
+        east = (transverse + height) * math.cos(middle) * math.radians(across)
+        times.append(times[-1] + math.hypot(north, east, to_alt - alt) / speed)
+    return np.array(times)

@@ -1,0 +1,229 @@
+"""From a trajectory's specification to the motion, and to what a sensor reads on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from strapdown.config import TrajectorySpec, motions
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.simulation import (
+    EarthMotion,
+    ImuErrors,
+    Origin,
+    SineVelocityMotion,
+    StationaryMotion,
+    Wave,
+    aircraft,
+    car,
+    rocking_stand,
+    ship,
+    simulate_imu,
+    through_waypoints,
+)
+from strapdown.simulation import manoeuvres as steps
+from strapdown.simulation.vehicles import LIMITS
+
+# How fast a turn or a climb comes and goes where nothing is said, s.
+TURN_RAMP = {"car": 1.0, "aircraft": 3.0, "ship": 10.0}
+CLIMB_RAMP = 3.0
+
+# Quantities of the simulation, as a file has them.
+_KEYS = {
+    "angle": "angle_deg",
+    "bank": "bank_deg",
+    "distance": "distance_m",
+    "duration": "duration_s",
+    "height": "height_m",
+    "offset": "offset_m",
+    "period": "period_s",
+    "radius": "radius_m",
+    "ramp": "ramp_s",
+    "rate": "rate_hz",
+    "speed": "speed_m_per_s",
+    "time": "time_s",
+    "to": "to_m_per_s",
+}
+
+
+def simulate_trajectory(
+    spec: TrajectorySpec,
+) -> tuple[EarthMotion, ImuErrors, pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Simulate a trajectory.
+
+    Parameters
+    ----------
+    spec : TrajectorySpec
+
+    Returns
+    -------
+    motion : EarthMotion
+    errors : ImuErrors
+    imu, attitude, trajectory : DataFrame
+        Imu, Attitude and Trajectory tables on the same stamps; the last two are exact.
+
+    Raises
+    ------
+    ConfigError
+        The sensor, the ellipsoid or the sampling is unknown, or the motion cannot be; the message
+        names the key.
+    """
+    errors = load_sensor(spec.sensor).draw(spec.seed) if spec.sensor else ImuErrors()
+    try:
+        motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
+        imu, attitude = simulate_imu(
+            motion,
+            errors,
+            rate=spec.rate_hz,
+            sampling=spec.sampling,
+            seed=spec.seed,
+            source=spec.name,
+        )
+        trajectory = motion.trajectory(imu.index.to_numpy(dtype=np.float64), source=spec.name)
+    except ConfigError as error:
+        raise _with_key(error, f"{spec.name}.toml") from None
+    return motion, errors, imu, attitude, trajectory
+
+
+def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
+    """Make the motion of a specification.
+
+    Raises
+    ------
+    ConfigError
+        It cannot be: a latitude beyond the pole, a turn too tight for its speed and so on.
+    """
+    if isinstance(spec, motions.WaypointsSpec):
+        return _waypoints(spec, ellipsoid)
+    origin = Origin(spec.lat_deg, spec.lon_deg, spec.alt_m)
+    if isinstance(spec, motions.SineVelocitySpec):
+        return SineVelocityMotion(
+            spec.duration_s,
+            origin,
+            spec.mean_velocity_m_per_s,
+            spec.amplitude_m_per_s,
+            spec.period_s,
+            spec.phase_deg,
+            ellipsoid,
+        )
+    if isinstance(spec, motions.StationarySpec):
+        angles = (spec.roll_deg, spec.pitch_deg, spec.heading_deg)
+        return StationaryMotion(spec.duration_s, origin, *angles, ellipsoid)
+    if isinstance(spec, motions.RockingStandSpec):
+        return rocking_stand(
+            spec.duration_s,
+            origin,
+            roll_deg=spec.roll_deg,
+            pitch_deg=spec.pitch_deg,
+            heading_deg=spec.heading_deg,
+            roll_waves=_angle_waves(spec.roll_waves),
+            pitch_waves=_angle_waves(spec.pitch_waves),
+            heading_waves=_angle_waves(spec.heading_waves),
+            ellipsoid=ellipsoid,
+        )
+    return _vehicle(spec, origin, ellipsoid)
+
+
+def _vehicle(
+    spec: motions.CarSpec | motions.AircraftSpec | motions.ShipSpec,
+    origin: Origin,
+    ellipsoid: Ellipsoid,
+) -> EarthMotion:
+    limits = LIMITS[spec.kind]
+    if spec.most_acceleration_m_per_s2 is not None:
+        limits = replace(limits, acceleration=spec.most_acceleration_m_per_s2)
+    if spec.most_lateral_m_per_s2 is not None:
+        limits = replace(limits, lateral=spec.most_lateral_m_per_s2)
+    listed = [_step(one, TURN_RAMP[spec.kind]) for one in spec.manoeuvres]
+    if isinstance(spec, motions.CarSpec):
+        return car(
+            origin,
+            listed,
+            heading_deg=spec.heading_deg,
+            speed=spec.speed_m_per_s,
+            sway_roll=spec.roll_deg_per_m_per_s2,
+            sway_pitch=spec.pitch_deg_per_m_per_s2,
+            limits=limits,
+            ellipsoid=ellipsoid,
+        )
+    if isinstance(spec, motions.ShipSpec):
+        return ship(
+            origin,
+            listed,
+            heading_deg=spec.heading_deg,
+            speed=spec.speed_m_per_s,
+            roll_waves=_angle_waves(spec.roll_waves),
+            pitch_waves=_angle_waves(spec.pitch_waves),
+            heading_waves=_angle_waves(spec.heading_waves),
+            heave_waves=[Wave(w.amplitude_m, w.period_s, w.phase_deg) for w in spec.heave_waves],
+            limits=limits,
+            ellipsoid=ellipsoid,
+        )
+    if spec.most_bank_deg is not None:
+        limits = replace(limits, bank_deg=spec.most_bank_deg)
+    return aircraft(
+        origin,
+        listed,
+        heading_deg=spec.heading_deg,
+        speed=spec.speed_m_per_s,
+        attack_deg=spec.angle_of_attack_deg,
+        limits=limits,
+        ellipsoid=ellipsoid,
+    )
+
+
+def _step(spec: motions.Step, ramp: float) -> tuple[str, steps.Manoeuvre]:
+    """One manoeuvre with its name."""
+    side = -1.0 if spec.do in ("turn_left", "descend") else 1.0
+    step: steps.Manoeuvre
+    if isinstance(spec, motions.SpeedSpec):
+        change = steps.Brake if spec.do == "brake" else steps.Accelerate
+        step = change(spec.to_m_per_s, spec.duration_s)
+    elif isinstance(spec, motions.StopSpec):
+        step = steps.Stop(spec.braking_s, spec.stay_s)
+    elif isinstance(spec, motions.StraightSpec):
+        if spec.duration_s is not None:
+            step = steps.Straight(spec.duration_s)
+        else:
+            step = steps.Along(spec.distance_m or 0.0)
+    elif isinstance(spec, motions.TurnSpec):
+        step = steps.Turn(side * spec.angle_deg, spec.radius_m, spec.ramp_s or ramp)
+    elif isinstance(spec, motions.BankedTurnSpec):
+        step = steps.BankedTurn(side * spec.angle_deg, spec.bank_deg, spec.ramp_s or ramp)
+    elif isinstance(spec, motions.LaneChangeSpec):
+        step = steps.LaneChange(spec.offset_m, spec.duration_s)
+    elif isinstance(spec, motions.ClimbSpec):
+        step = steps.Climb(side * spec.angle_deg, spec.height_m, spec.ramp_s or CLIMB_RAMP)
+    else:
+        step = steps.Level(spec.ramp_s or CLIMB_RAMP)
+    return spec.do, step
+
+
+def _waypoints(spec: motions.WaypointsSpec, ellipsoid: Ellipsoid) -> EarthMotion:
+    places = [(w.lat_deg, w.lon_deg, w.alt_m) for w in spec.waypoints]
+    times = [w.time_s for w in spec.waypoints if w.time_s is not None]
+    speeds = [w.speed_m_per_s or spec.speed_m_per_s or 0.0 for w in spec.waypoints[1:]]
+    return through_waypoints(
+        places,
+        times=times or None,
+        speeds=None if times else speeds,
+        most_acceleration=spec.most_acceleration_m_per_s2,
+        ellipsoid=ellipsoid,
+    )
+
+
+def _angle_waves(waves: Iterable[motions.AngleWaveSpec]) -> tuple[Wave, ...]:
+    return tuple(Wave(w.amplitude_deg, w.period_s, w.phase_deg) for w in waves)
+
+
+def _with_key(error: ConfigError, name: str) -> ConfigError:
+    """The error with the keys of a file in place of the simulation's own words."""
+    f = error.finding
+    parts = (f.quantity or "").split(", ")
+    words = [_KEYS.get(part, part).replace("place ", "waypoint ") for part in parts]
+    return ConfigError(f.what, file=name, row=f.row, quantity=", ".join(words), remedy=f.remedy)
