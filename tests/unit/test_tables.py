@@ -95,3 +95,18 @@ def test_gaps_are_found_against_the_log_s_own_habit():
     bursts = np.cumsum(np.tile([0.002, 0.002, 0.002, 0.002, 0.042], 50))
     assert tables.find_gaps(bursts) == []
     assert len(tables.find_gaps(np.concatenate([bursts, bursts + bursts[-1] + 0.5]))) == 1
+
+
+def test_errors_and_standard_deviations_of_a_trajectory():
+    table = tables.trajectory_error_table(TIME, RATE, -RATE - 1.0, RATE, "err.csv")
+    assert list(table.columns) == tables.TRAJECTORY_ERROR
+    tables.check_trajectory_error(table.assign(further=np.nan))
+    with pytest.raises(DataError, match=r"err.csv, row 1, VN: a standard deviation of -1"):
+        tables.check_trajectory_sd(table)
+    tables.check_trajectory_sd(table.abs())
+    with pytest.raises(DataError, match="missing columns: down"):
+        tables.check_trajectory_error(table.drop(columns="down"))
+    with pytest.raises(DataError, match="row 3, east: not a finite number"):
+        tables.trajectory_error_table(TIME, spoiled(RATE, (2, 1), np.nan), RATE, RATE)
+    with pytest.raises(DataError, match="different lengths"):
+        tables.trajectory_error_table(TIME, RATE[:2], RATE, RATE)

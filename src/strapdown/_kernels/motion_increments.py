@@ -56,19 +56,19 @@ def integral_coefficients(u):
 def motion_exponential(wx, wy, wz, ax, ay, az, px, py, pz, tau):
     """Velocity and distance dv, dr of the exponential of (w, a, p, tau); its turn is w."""
     b, c, d = integral_coefficients(wx * wx + wy * wy + wz * wz)
-    # V1 p + tau V2 a = p + a' / 2 + w x (b p + c a' + w x (c p + d a')) with a' = tau a.
     kx, ky, kz = cross(wx, wy, wz, ax, ay, az)
-    ux, uy, uz = cross(wx, wy, wz, b * ax + c * kx, b * ay + c * ky, b * az + c * kz)
-    tx, ty, tz = tau * ax, tau * ay, tau * az
-    kx, ky, kz = cross(wx, wy, wz, c * px + d * tx, c * py + d * ty, c * pz + d * tz)
-    sx, sy, sz = cross(wx, wy, wz, b * px + c * tx + kx, b * py + c * ty + ky, b * pz + c * tz + kz)
+    lx, ly, lz = cross(wx, wy, wz, kx, ky, kz)
+    mx, my, mz = cross(wx, wy, wz, px, py, pz)
+    nx, ny, nz = cross(wx, wy, wz, mx, my, mz)
+    half = 0.5 * tau
+    e, f = tau * c, tau * d
     return (
-        ax + ux,
-        ay + uy,
-        az + uz,
-        px + 0.5 * tx + sx,
-        py + 0.5 * ty + sy,
-        pz + 0.5 * tz + sz,
+        ax + (b * kx + c * lx),
+        ay + (b * ky + c * ly),
+        az + (b * kz + c * lz),
+        (px + b * mx + c * nx) + (half * ax + (e * kx + f * lx)),
+        (py + b * my + c * ny) + (half * ay + (e * ky + f * ly)),
+        (pz + b * mz + c * nz) + (half * az + (e * kz + f * lz)),
     )
 
 

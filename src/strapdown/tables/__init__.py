@@ -20,6 +20,9 @@ MotionIncrements        ``time`` s, its end    ``dt`` s, ``phi_x..z`` rad (rotat
                                                gave, in the body axes at the start of the step)
 Trajectory              ``time`` s             ``lat lon`` deg, ``alt`` m (ellipsoidal), ``VN VE
                                                VD`` m/s, ``roll pitch heading`` deg
+TrajectoryError         ``time`` s             ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch
+                                               heading`` deg: errors (estimate minus truth), or
+                                               standard deviations
 Attitude                ``time`` s             ``q_w q_x q_y q_z`` (body to local level) and
                                                ``roll pitch heading`` deg
 References              none                   ``time`` s, ``kind`` (``known``, ``tilt``,
@@ -57,6 +60,12 @@ from strapdown.tables.motion_increments import (
 )
 from strapdown.tables.references import REFERENCE_KINDS, check_references, references_table
 from strapdown.tables.trajectory import TRAJECTORY, check_trajectory, trajectory_table
+from strapdown.tables.trajectory_errors import (
+    TRAJECTORY_ERROR,
+    check_trajectory_error,
+    check_trajectory_sd,
+    trajectory_error_table,
+)
 
 __all__ = [
     "ACCEL",
@@ -76,6 +85,7 @@ __all__ = [
     "SAMPLINGS",
     "THETA",
     "TRAJECTORY",
+    "TRAJECTORY_ERROR",
     "VELOCITY",
     "Gap",
     "attitude_table",
@@ -85,10 +95,13 @@ __all__ = [
     "check_motion_increments",
     "check_references",
     "check_trajectory",
+    "check_trajectory_error",
+    "check_trajectory_sd",
     "find_gaps",
     "imu_table",
     "increments_table",
     "motion_increments_table",
     "references_table",
+    "trajectory_error_table",
     "trajectory_table",
 ]

@@ -1,0 +1,127 @@
+"""Do a trajectory's places, velocities and headings tell of one motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.tables import EULER, VELOCITY
+
+Array = NDArray[np.float64]
+
+__all__ = ["judge_trajectory"]
+
+# A sphere will do to tell factors of 57.
+EARTH = 6.371e6  # m
+# A vehicle that stays within this tells nothing.
+LEAST_MOTION = 5.0  # m, root mean square
+MOVING = 1.0  # m/s
+# Misfit of places and integrated velocity, as a share of the motion: what is no agreement, and what
+# another reading must reach to be believed.
+DISAGREE, AGREE = 0.5, 0.1
+
+
+def judge_trajectory(
+    table: pd.DataFrame, *, angles_stated: bool, euler_stated: bool
+) -> list[Finding]:
+    """Compare places with the integral of velocity, and heading with the course.
+
+    Parameters
+    ----------
+    table : DataFrame
+        A Trajectory table.
+    angles_stated, euler_stated : bool
+        The file says the unit of latitude and longitude, and of the attitude; radians are then
+        not looked for.
+
+    Returns
+    -------
+    list of Finding
+        Places and velocities that disagree without a reason that is seen.
+
+    Raises
+    ------
+    DataError
+        They disagree, and agree if latitude and longitude are exchanged, or taken as radians;
+        or heading disagrees with the course and agrees if taken as radians.
+    """
+    file = table.attrs.get("source")
+    if len(table) < 3:
+        return []
+    time = table.index.to_numpy(dtype=np.float64)
+    velocity = table[VELOCITY[:2]].to_numpy(dtype=np.float64)
+    if not euler_stated:
+        _refuse_radians_of_attitude(table[EULER].to_numpy(dtype=np.float64), velocity, file)
+    steps = np.diff(time)[:, None]
+    moved = np.vstack([np.zeros(2), np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * steps, 0)])
+    moved -= moved.mean(axis=0)
+    size = float(np.sqrt(np.square(moved).sum(axis=1).mean()))
+    if not size > LEAST_MOTION:
+        return []
+    lat, lon = table["lat"].to_numpy(dtype=np.float64), table["lon"].to_numpy(dtype=np.float64)
+
+    def misfit(lat_deg: Array, lon_deg: Array) -> float:
+        phi, lam = np.radians(lat_deg), np.unwrap(np.radians(lon_deg))
+        place = EARTH * np.column_stack([phi, (lam - lam[0]) * np.cos(phi.mean())])
+        place -= place.mean(axis=0)
+        return float(np.sqrt(np.square(place - moved).sum(axis=1).mean())) / size
+
+    plain = misfit(lat, lon)
+    if plain < DISAGREE:
+        return []
+    readings: list[tuple[str, str, Callable[[], float], bool]] = [
+        (
+            "latitude and longitude are exchanged",
+            "exchange the names of the columns, or say which is which with columns={'lat': …}",
+            lambda: misfit(lon, lat),
+            bool(np.abs(lon).max() <= 90.0),
+        ),
+        (
+            "they are radians",
+            "name the columns lat_rad and lon_rad",
+            lambda: misfit(np.degrees(lat), np.degrees(lon)),
+            not angles_stated and bool(np.abs(lat).max() < 1.6 and np.abs(lon).max() < 6.3),
+        ),
+    ]
+    for why, remedy, of, possible in readings:
+        if possible and of() < AGREE:
+            raise DataError(
+                f"places and velocities disagree ({plain:.0%} of the motion is unexplained), and "
+                f"agree if {why} ({of():.1%})",
+                file=file,
+                quantity="lat, lon",
+                remedy=remedy,
+            )
+    return [
+        Finding(
+            f"places and the integral of velocity disagree by {plain:.0%} of the motion",
+            file=file,
+            quantity="lat, lon",
+            remedy="check the units and the axes of both: north, east, down in m/s",
+        )
+    ]
+
+
+def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None) -> None:
+    fast = np.hypot(velocity[:, 0], velocity[:, 1]) > MOVING
+    if fast.sum() < 3 or np.abs(euler).max() > 6.3:
+        return
+    course = np.degrees(np.arctan2(velocity[fast, 1], velocity[fast, 0]))
+
+    def apart(heading_deg: Array) -> float:
+        return float(np.median(np.abs(np.remainder(course - heading_deg + 180.0, 360.0) - 180.0)))
+
+    heading = euler[fast, 2]
+    plain, radians = apart(heading), apart(np.degrees(heading))
+    # Nothing drives 20 deg beside its heading and, by accident, along 57 times its heading.
+    if plain > 20.0 and radians < 5.0:
+        raise DataError(
+            f"heading is {plain:.0f}° from the course, and {radians:.1f}° if it is in radians",
+            file=file,
+            quantity="heading",
+            remedy="name the columns roll_rad, pitch_rad and heading_rad",
+        )

@@ -1,0 +1,113 @@
+"""Trajectories from files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats import csv
+from strapdown.formats.find_columns import Column
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.recording import RawLog
+from strapdown.formats.trajectory_columns import (
+    QUANTITIES,
+    TrajectoryColumn,
+    find_trajectory_columns,
+)
+from strapdown.formats.trajectory_plausibility import judge_trajectory
+from strapdown.tables import trajectory_table
+
+Array = NDArray[np.float64]
+
+__all__ = ["read_trajectory"]
+
+_ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
+
+
+def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) -> pd.DataFrame:
+    """Read a trajectory from a text table.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``.csv``, ``.txt``, ``.tsv`` or ``.dat``, with a header.
+    columns : mapping of str to str, optional
+        Quantity (``time``, ``lat``, ``lon``, ``alt``, ``VN``, ``VE``, ``VD``, ``roll``, ``pitch``,
+        ``heading``) to the name of its column, where the names do not say it.
+
+    Returns
+    -------
+    DataFrame
+        A Trajectory table. Names may carry a unit: ``lat_deg``, ``Latitude (rad)``, ``vel_north
+        [m/s]``, ``time_ms``; without one degrees, metres and seconds are taken. A velocity up is
+        turned. Dates count in seconds from 1970. ``attrs``: ``source``, the name of the file;
+        ``ellipsoid``, where a comment states it, or None; ``findings``, a tuple of Finding.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, or `columns` names what is not there.
+    DataError
+        The file is empty or no text table, a column is missing or has no numbers, a value is not
+        finite, time does not advance, a latitude is beyond the pole; or places and velocities show
+        that latitude and longitude are exchanged or in radians, or that the attitude is in
+        radians.
+    """
+    path = Path(path)
+    raw = _raw(path)
+    found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
+    values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
+    try:
+        table = trajectory_table(
+            values["time"],
+            np.column_stack([values[q] for q in ("lat", "lon", "alt")]),
+            np.column_stack([values[q] for q in ("VN", "VE", "VD")]),
+            np.column_stack([values[q] for q in ("roll", "pitch", "heading")]),
+            source=raw.name,
+        )
+    except DataError as error:
+        # The row of the table is not that of the file.
+        said = error.finding
+        raise DataError(
+            said.what,
+            file=raw.name,
+            row=None if said.row is None else raw.row(said.row - 1),
+            quantity=said.quantity,
+            remedy=said.remedy,
+        ) from None
+    judged = judge_trajectory(
+        table,
+        angles_stated=found["lat"].stated and found["lon"].stated,
+        euler_stated=found["heading"].stated,
+    )
+    stated = _ELLIPSOID.search(path.read_bytes()[:4096].decode("utf-8", "replace"))
+    table.attrs["ellipsoid"] = stated.group(1) if stated else None
+    table.attrs["findings"] = (*raw.findings, *judged)
+    return table
+
+
+def _raw(path: Path) -> RawLog:
+    if not path.exists():
+        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+    if not csv.detect(path):
+        raise DataError(
+            "a trajectory is read from a text table alone",
+            file=path.name,
+            remedy=f"give a file with the ending {', '.join(csv.SUFFIXES)}",
+        )
+    return csv.read(path)
+
+
+def _values(raw: RawLog, quantity: str, column: TrajectoryColumn) -> Array:
+    of = Column(column.source, None, "")
+    if quantity == "time":
+        ticks, dated = ticks_of(raw, of)
+        return np.asarray(ticks * (1e-9 if dated else column.factor), dtype=np.float64)
+    values = np.asarray(numbers(raw, of, quantity), dtype=np.float64)
+    return values if column.factor == 1.0 else values * column.factor

@@ -1,0 +1,118 @@
+"""Trajectories in the format of the TUM RGB-D benchmark, as evo and its like read it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.evaluation.earth_centred import ecef_from_geodetic, q_ne
+from strapdown.exceptions import DataError
+from strapdown.formats.trajectory_csv import one_line
+from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
+from strapdown.tables import EULER, GEODETIC, check_trajectory
+
+Array = NDArray[np.float64]
+
+__all__ = ["poses", "write_tum"]
+
+# Half a turn about forward: from forward-left-up to forward-right-down, and back.
+_Q_FRD_FLU = (0.0, 1.0, 0.0, 0.0)
+
+
+def poses(
+    trajectory: pd.DataFrame, options: TrajectoryFileOptions | None = None
+) -> tuple[Array, Array]:
+    """Positions and attitudes in one right-handed Cartesian frame.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        A Trajectory table of one row or more.
+    options : TrajectoryFileOptions, optional
+        Its `tum_frame` and `ellipsoid`.
+
+    Returns
+    -------
+    position : ndarray, (n, 3), m
+        ``enu`` and ``ned``: in the plane that touches the ellipsoid under the first place, from
+        there; the Earth falls away below it by ``d²/2R``. ``ecef``: from the Earth's centre.
+    q_wb : ndarray, (n, 4)
+        Body to world, scalar first, of one sign along the way. World and body axes are in
+        `TUM_FRAMES`. The local level turns as the vehicle moves over the Earth, and the world
+        does not: both are told apart here.
+    """
+    chosen = options or TrajectoryFileOptions()
+    place = trajectory[GEODETIC].to_numpy(dtype=np.float64)
+    position = ecef_from_geodetic(place, ellipsoid=chosen.ellipsoid)
+    to_level = q_ne(place[:, 0], place[:, 1])
+    q_wb = rotation.compose(
+        rotation.conjugate(to_level),
+        rotation.quaternion_from_euler(trajectory[EULER].to_numpy(dtype=np.float64)),
+    )
+    if chosen.tum_frame != "ecef":
+        q_we = to_level[0]
+        if chosen.tum_frame == "enu":
+            q_we = rotation.compose(rotation.Q_NED_ENU, q_we)
+            q_wb = rotation.compose(q_wb, _Q_FRD_FLU)
+        position = rotation.rotate(q_we, position - position[0])
+        q_wb = rotation.compose(q_we, q_wb)
+    # q and -q are one attitude; readers that interpolate want neighbours alike.
+    along = (q_wb[1:] * q_wb[:-1]).sum(axis=1)
+    sign = np.cumprod(np.r_[math.copysign(1.0, q_wb[0, 0]), np.where(along < 0.0, -1.0, 1.0)])
+    # No minus before a zero.
+    return position + 0.0, q_wb * sign[:, None] + 0.0
+
+
+def write_tum(
+    path: Path,
+    trajectory: pd.DataFrame,
+    *,
+    name: str = "trajectory",
+    options: TrajectoryFileOptions | None = None,
+) -> None:
+    """Write a trajectory as lines of ``time x y z qx qy qz qw``.
+
+    Parameters
+    ----------
+    path : Path
+    trajectory : DataFrame
+        A Trajectory table of one row or more.
+    name : str
+    options : TrajectoryFileOptions, optional
+        Axes and ellipsoid; the comments at the top say them, and where the origin is.
+
+    Raises
+    ------
+    DataError
+        The table is not valid, or has no rows.
+
+    Notes
+    -----
+    The quaternion is scalar last, body to world; velocities have no place in this format.
+    """
+    chosen = options or TrajectoryFileOptions()
+    check_trajectory(trajectory)
+    if trajectory.empty:
+        raise DataError("the trajectory has no rows", remedy="write one that has")
+    position, q_wb = poses(trajectory, chosen)
+    world, body = TUM_FRAMES[chosen.tum_frame]
+    lat, lon, alt = (float(v) for v in trajectory[GEODETIC].iloc[0])
+    head = [
+        f"# trajectory: {one_line(name)}",
+        f"# ellipsoid: {chosen.ellipsoid.name}",
+        f"# world axes: {world}",
+        f"# body axes: {body}",
+        "# quaternion: body to world, scalar last",
+    ]
+    if chosen.tum_frame != "ecef":
+        head.append(f"# origin lat lon deg, height m: {lat!r} {lon!r} {alt!r}")
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    rows = np.column_stack([time, position, q_wb[:, 1:], q_wb[:, :1]]).tolist()
+    lines = [" ".join(map(repr, row)) for row in rows]
+    text = "\n".join([*head, "# time x y z qx qy qz qw", *lines]) + "\n"
+    path.write_bytes(text.encode())

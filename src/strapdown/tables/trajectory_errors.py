@@ -1,0 +1,112 @@
+"""Tables of a trajectory's error, or of its standard deviation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.exceptions import DataError
+from strapdown.tables.checks import (
+    as_array,
+    check_columns,
+    check_rows,
+    check_same_length,
+    check_time,
+    index_of,
+    values_of,
+)
+from strapdown.tables.columns import EULER, NED, VELOCITY
+
+TRAJECTORY_ERROR = [*NED, *VELOCITY, *EULER]
+
+
+def trajectory_error_table(
+    time: ArrayLike,
+    place: ArrayLike,
+    velocity: ArrayLike,
+    euler: ArrayLike,
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Make a TrajectoryError table: errors, or standard deviations.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    place : array_like, (n, 3), m
+        North, east, down.
+    velocity : array_like, (n, 3), m/s
+        North, east, down.
+    euler : array_like, (n, 3), deg
+        Of roll, pitch, heading.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+        An error is estimate minus truth.
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, a value is not finite, or time does not advance.
+    """
+    stamps = as_array(time, None, "time", source)
+    places, speeds = as_array(place, 3, "place", source), as_array(velocity, 3, "velocity", source)
+    angles = as_array(euler, 3, "euler", source)
+    check_same_length(source, time=stamps, place=places, velocity=speeds, euler=angles)
+    table = pd.DataFrame(
+        np.hstack([places, speeds, angles]),
+        index=pd.Index(stamps, name="time"),
+        columns=TRAJECTORY_ERROR,
+    )
+    table.attrs["source"] = source
+    check_trajectory_error(table)
+    return table
+
+
+def check_trajectory_error(table: pd.DataFrame) -> None:
+    """Check a TrajectoryError table that holds errors.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Further columns are let be.
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, or time does not advance.
+    """
+    source = table.attrs.get("source")
+    check_columns(table, TRAJECTORY_ERROR, source)
+    check_time(index_of(table), source)
+    check_rows(values_of(table, TRAJECTORY_ERROR), TRAJECTORY_ERROR, source)
+
+
+def check_trajectory_sd(table: pd.DataFrame) -> None:
+    """Check a TrajectoryError table that holds standard deviations.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Further columns are let be.
+
+    Raises
+    ------
+    DataError
+        As `check_trajectory_error`, or a value is negative.
+    """
+    check_trajectory_error(table)
+    values = values_of(table, TRAJECTORY_ERROR)
+    negative = values < 0.0
+    if negative.any():
+        row, column = (int(i) for i in np.argwhere(negative)[0])
+        raise DataError(
+            f"a standard deviation of {values[row, column]:.9g} is negative",
+            file=table.attrs.get("source"),
+            row=row + 1,
+            quantity=TRAJECTORY_ERROR[column],
+            remedy="give standard deviations, and not errors or variances with a sign",
+        )
