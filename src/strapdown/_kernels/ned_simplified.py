@@ -27,7 +27,17 @@ STATE = 11
 
 @njit(cache=True, error_model="numpy")
 def simplified_advance(
-    state, increments, reference, earth, options, coriolis, turning, transport, azimuth, fixed, history
+    state,
+    increments,
+    reference,
+    earth,
+    options,
+    coriolis,
+    turning,
+    transport,
+    azimuth,
+    fixed,
+    history,
 ):
     """As `ned.ned_advance`; three switches are 1 or 0.
 

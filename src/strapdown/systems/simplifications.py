@@ -9,8 +9,9 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
-from strapdown import earth
+from strapdown import earth, rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
 from strapdown.exceptions import DivergenceError
@@ -32,11 +33,15 @@ __all__ = [
     "SIMPLIFICATIONS",
     "TRIPS",
     "Trip",
-    "largest_errors",
+    "error_course",
     "mechanization_errors",
-    "predicted_position",
+    "predicted_errors",
     "sensor_errors",
+    "sensor_increments",
+    "straight",
 ]
+
+Array = NDArray[np.float64]
 
 #: Columns of the tables made here: largest of each over the trip.
 ERRORS = ("position_m", "velocity_m_per_s", "attitude_deg")
@@ -50,9 +55,7 @@ SIMPLIFICATIONS: dict[str, Tadic] = {
     "no transport rate": replace(_EVERY, transport_rate=False),
     "gravity 9.80665": replace(_EVERY, gravity=STANDARD_GRAVITY),
     "the paper's": Tadic(),
-    "all: flat Earth": Tadic(
-        earth_rate=False, transport_rate=False, gravity=STANDARD_GRAVITY
-    ),
+    "all: flat Earth": Tadic(earth_rate=False, transport_rate=False, gravity=STANDARD_GRAVITY),
 }
 
 
@@ -77,7 +80,8 @@ class Trip:
     @cached_property
     def increments(self) -> pd.DataFrame:
         """Motion increments of perfect sensors."""
-        return motion_increments(simulate_imu(self.motion, ImuErrors(), rate=self.rate)[0])
+        imu, _ = simulate_imu(self.motion, ImuErrors(), rate=self.rate)
+        return motion_increments(imu, interpolation="cubic")
 
     @cached_property
     def truth(self) -> pd.DataFrame:
@@ -99,9 +103,27 @@ def _crash() -> EarthMotion:
     )
 
 
-def _straight(duration: float) -> EarthMotion:
-    along = 20.0 * math.sqrt(0.5)
-    return SineVelocityMotion(duration, Origin(45.0, 20.0, 100.0), (along, along, 0.0))
+def straight(
+    duration: float, speed: float, *, lat_deg: float = 45.0, alt: float = 100.0, east: bool = False
+) -> EarthMotion:
+    """Level motion at one speed, to the north-east or to the east.
+
+    Parameters
+    ----------
+    duration : float, s
+    speed : float, m/s
+    lat_deg : float, deg
+    alt : float, m
+    east : bool
+
+    Returns
+    -------
+    EarthMotion
+    """
+    part = math.sqrt(0.5)
+    north, to_east = (0.0, 1.0) if east else (part, part)
+    origin = Origin(lat_deg, 20.0, alt)
+    return SineVelocityMotion(duration, origin, (speed * north, speed * to_east, 0.0))
 
 
 def _drive() -> EarthMotion:
@@ -126,24 +148,20 @@ def _drive() -> EarthMotion:
     return replace(whole, duration=600.0)
 
 
-def _flight() -> EarthMotion:
-    return SineVelocityMotion(3600.0, Origin(45.0, 20.0, 10_000.0), (0.0, 230.0, 0.0))
-
-
 #: From a crash to a flight, by name.
 TRIPS: dict[str, Trip] = {
     "crash": Trip("0.75 s of a crash", _crash(), 2000.0, "free"),
-    "10 s": Trip("10 s at 20 m/s", _straight(10.0), 100.0, "free"),
-    "60 s": Trip("60 s at 20 m/s", _straight(60.0), 100.0, "free"),
+    "10 s": Trip("10 s at 20 m/s", straight(10.0, 20.0), 100.0, "free"),
+    "60 s": Trip("60 s at 20 m/s", straight(60.0, 20.0), 100.0, "free"),
     "drive": Trip("10 min of driving", _drive(), 100.0, "held"),
-    "flight": Trip("1 h at 230 m/s", _flight(), 10.0, "held"),
+    "flight": Trip("1 h at 230 m/s", straight(3600.0, 230.0, alt=1e4, east=True), 10.0, "held"),
 }
 
 
-def largest_errors(
+def error_course(
     trip: Trip, mechanization: Mechanization, increments: pd.DataFrame | None = None
-) -> dict[str, float]:
-    """Navigate a trip from its exact start; largest error of each kind over it.
+) -> pd.DataFrame:
+    """Navigate a trip from its exact start, and compare with the truth.
 
     Parameters
     ----------
@@ -155,21 +173,26 @@ def largest_errors(
 
     Returns
     -------
-    dict
-        `ERRORS`: length of the difference in place, in m, in velocity, in m/s, and of the
-        rotation between the attitudes, in deg. NaN where the run has diverged.
+    DataFrame
+        At every sample `ERRORS`: length of the difference in place, in m, in velocity, in m/s,
+        and of the rotation between the attitudes, in deg.
+
+    Raises
+    ------
+    DivergenceError
+        As `run_mechanization`.
     """
     start = NavState.from_trajectory(trip.truth)
     used = trip.increments if increments is None else increments
-    try:
-        run = run_mechanization(replace(mechanization, height=trip.height), start, used)
-    except DivergenceError:
-        return dict.fromkeys(ERRORS, math.nan)
+    run = run_mechanization(replace(mechanization, height=trip.height), start, used)
     difference = trajectory_differences(run.trajectory, trip.truth)
-    return {
-        name: float(np.linalg.norm(difference[columns].to_numpy(), axis=1).max())
-        for name, columns in zip(ERRORS, (NED, VELOCITY, ROTATION_ERROR), strict=True)
-    }
+    return pd.DataFrame(
+        {
+            name: np.linalg.norm(difference[columns].to_numpy(dtype=np.float64), axis=1)
+            for name, columns in zip(ERRORS, (NED, VELOCITY, ROTATION_ERROR), strict=True)
+        },
+        index=difference.index,
+    )
 
 
 def mechanization_errors(trip: Trip) -> pd.DataFrame:
@@ -185,11 +208,33 @@ def mechanization_errors(trip: Trip) -> pd.DataFrame:
         Columns `ERRORS`; one row each, by name.
     """
     tried: dict[str, Mechanization] = {"NorthEastDown": NorthEastDown(), **SIMPLIFICATIONS}
-    return pd.DataFrame({name: largest_errors(trip, m) for name, m in tried.items()}).T
+    return pd.DataFrame({name: error_course(trip, m).max() for name, m in tried.items()}).T
+
+
+def sensor_increments(trip: Trip, sensor: str, unit: int) -> pd.DataFrame:
+    """Motion increments of a trip from a unit of a real sensor, its gyro bias taken away.
+
+    Parameters
+    ----------
+    trip : Trip
+    sensor : str
+        Of the catalogue.
+    unit : int
+        Seed.
+
+    Returns
+    -------
+    DataFrame
+        MotionIncrements table.
+    """
+    drawn = load_sensor(sensor).draw(unit)
+    # A rest before the trip tells it; the accelerometers' biases it does not tell.
+    known = replace(drawn, gyro=replace(drawn.gyro, bias=0.0))
+    return motion_increments(simulate_imu(trip.motion, known, rate=trip.rate, seed=unit)[0])
 
 
 def sensor_errors(trip: Trip, sensor: str, units: Sequence[int] = range(9)) -> pd.DataFrame:
-    """Errors of `NorthEastDown` with units of a real sensor, whose gyro bias is taken away.
+    """Errors of `NorthEastDown` with units of a real sensor, as `sensor_increments` has them.
 
     Parameters
     ----------
@@ -202,47 +247,59 @@ def sensor_errors(trip: Trip, sensor: str, units: Sequence[int] = range(9)) -> p
     Returns
     -------
     DataFrame
-        Columns `ERRORS`; one row a unit.
+        Columns `ERRORS`; one row a unit; infinite where the run has diverged.
     """
     rows = {}
     for unit in units:
-        drawn = load_sensor(sensor).draw(unit)
-        # A rest before the trip tells it; the accelerometers' biases it does not tell.
-        known = replace(drawn, gyro=replace(drawn.gyro, bias=0.0))
-        imu, _ = simulate_imu(trip.motion, known, rate=trip.rate, seed=unit)
-        rows[unit] = largest_errors(trip, NorthEastDown(), motion_increments(imu))
+        try:
+            course = error_course(trip, NorthEastDown(), sensor_increments(trip, sensor, unit))
+            rows[unit] = course.max()
+        except DivergenceError:
+            rows[unit] = pd.Series(math.inf, index=list(ERRORS))
     return pd.DataFrame(rows).T
 
 
-def predicted_position(trip: Trip, simplification: str) -> float:
-    """Position error of a simplification by hand, at the end of a trip of constant velocity.
+def predicted_errors(trip: Trip, simplification: str) -> pd.Series:
+    """Largest errors of a simplification from its formula, without running a mechanization.
 
     Parameters
     ----------
     trip : Trip
-        Its velocity at the start is taken for that of the whole.
     simplification : str
         Of `SIMPLIFICATIONS`.
 
     Returns
     -------
-    float, m
-        With ``v`` the velocity, ``w`` the rates that are left out and ``t`` the time: the Coriolis
-        term gives ``(2 w_ie + w_en) x v t²/2``; a rate that the attitude does not follow tilts
-        it by ``w t``, which turns the specific force: ``w x f t³/6``; gravity ``dg t²/2``. A held
-        height leaves the horizontal part. Without what the error itself does: up to some minutes.
+    Series
+        `ERRORS`. What is left out of the Coriolis term, ``w_c x v``, and what the attitude, which
+        is turned by ``a = int w dt`` of the rates that it does not follow, makes of the specific
+        force, ``a x f``, and the error of gravity, are integrated over the exact motion: at
+        constant velocity ``(w_c x v + dg) t²/2 - w x g t³/6``. A held height leaves the horizontal
+        part. What the error does to itself is left out: it counts after some minutes, and on an
+        hour's flight it is all (Schuler's period is 84 min).
     """
     left = SIMPLIFICATIONS[simplification]
-    at = trip.truth.iloc[0]
-    v = at[VELOCITY].to_numpy(dtype=np.float64)
-    t = trip.motion.duration
-    g = earth.gravity(at["lat"], at["alt"])
-    turning = earth.earth_rate(at["lat"])
-    transport = earth.transport_rate(at["lat"], at["alt"], v)
+    time = trip.truth.index.to_numpy(dtype=np.float64)
+    v = trip.truth[VELOCITY].to_numpy(dtype=np.float64)
+    lat, alt = (trip.truth[name].to_numpy(dtype=np.float64) for name in ("lat", "alt"))
+    turning, transport = earth.earth_rate(lat), earth.transport_rate(lat, alt, v)
+    force = rotation.rotate(trip.motion.attitude(time), trip.motion.specific_force(time))
     kept = left.coriolis * (2.0 * turning * left.earth_rate + transport * left.transport_rate)
     missing = turning * (not left.earth_rate) + transport * (not left.transport_rate)
-    error = np.cross(2.0 * turning + transport - kept, v) * t**2 / 2.0
-    error += np.cross(missing, -g) * t**3 / 6.0
+    turned = _integral(missing, time)
+    error = np.cross(2.0 * turning + transport - kept, v) + np.cross(turned, force)
     if left.gravity is not None:
-        error[2] += (left.gravity - g[2]) * t**2 / 2.0
-    return float(np.linalg.norm(error[:2] if trip.height == "held" else error))
+        error[:, 2] += left.gravity - earth.gravity(lat, alt)[:, 2]
+    if trip.height == "held":
+        error[:, 2] = 0.0
+    speed = _integral(error, time)
+    parts = (_integral(speed, time), speed, np.degrees(turned))
+    return pd.Series(
+        {n: np.linalg.norm(x, axis=1).max() for n, x in zip(ERRORS, parts, strict=True)}
+    )
+
+
+def _integral(values: Array, time: Array) -> Array:
+    """From the first instant to each, by the trapezoid."""
+    steps = 0.5 * np.diff(time)[:, None] * (values[1:] + values[:-1])
+    return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
