@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import ctypes
-import shutil
-import subprocess
-import tempfile
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks.c_library import c_library
 from benchmarks.measure import Ratio, by_turns
 
 SAMPLES = 200_000
@@ -20,23 +17,6 @@ STEP = 0.01
 def rates() -> np.ndarray:
     t = np.arange(SAMPLES) * STEP
     return np.column_stack([0.3 * np.sin(t), 0.2 * np.cos(0.7 * t), np.full(SAMPLES, 0.1)])
-
-
-def c_loop() -> ctypes.CDLL | None:
-    if shutil.which("gcc") is None:
-        print("no gcc on this machine: the C loop is left out")
-        return None
-    library = Path(tempfile.mkdtemp()) / "limit.so"
-    flags = ["-O3", "-march=native", "-fno-math-errno", "-mprefer-vector-width=128"]
-    source = Path(__file__).with_name("attitude_limit.c")
-    subprocess.run(
-        ["gcc", *flags, "-shared", "-fPIC", str(source), "-o", str(library), "-lm"], check=True
-    )
-    loaded = ctypes.CDLL(str(library))
-    pointer = ctypes.POINTER(ctypes.c_double)
-    loaded.att_exact.argtypes = [ctypes.c_long, pointer, ctypes.c_double, pointer]
-    loaded.att_exact.restype = None
-    return loaded
 
 
 def ratios() -> Iterator[Ratio]:
@@ -56,8 +36,10 @@ def ratios() -> Iterator[Ratio]:
         kernel.quaternion_advance(start, dt, theta, dtheta, history, 0.0, 1.0)
 
     pointer = ctypes.POINTER(ctypes.c_double)
-    library = c_loop()
+    library = c_library("attitude_limit.c")
     if library is not None:
+        library.att_exact.argtypes = [ctypes.c_long, pointer, ctypes.c_double, pointer]
+        library.att_exact.restype = None
         out = np.zeros((SAMPLES + 1, 4))
         out[0, 0] = 1.0
         g, q = gyro.ctypes.data_as(pointer), out.ctypes.data_as(pointer)

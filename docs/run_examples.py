@@ -1,7 +1,8 @@
 """Run every example of the manual and compare what it prints with what is written.
 
 ``python docs/run_examples.py`` says where they differ; ``--write`` puts what was printed into the
-pages. Each page has a temporary folder of its own, in which its examples run in order. A line
+pages. Each page has a temporary folder of its own, in which its examples run in order; the files of
+``examples`` are in it under that name. A line
 that is ``…`` alone stands for any number of lines, and ``…`` in a line for any text. Recordings
 are looked for where STRAPDOWN_DATA points; a page that needs them is left out without it.
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -160,6 +162,7 @@ def check(page: Path, write: bool) -> int:
         return 0
     differ, pieces, last = 0, [], 0
     with tempfile.TemporaryDirectory() as folder:
+        shutil.copytree(HERE / "examples", Path(folder) / "examples")
         for match in blocks:
             lines = []
             for command, expected in commands(match.group(1)):

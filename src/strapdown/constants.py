@@ -8,8 +8,10 @@ from __future__ import annotations
 import math
 
 __all__ = [
+    "ACCEL_SUMS",
     "ACCEL_UNITS",
     "CORTEX_M4F_CYCLES",
+    "GYRO_SUMS",
     "GYRO_UNITS",
     "MAG_UNITS",
     "STANDARD_GRAVITY",
@@ -39,6 +41,10 @@ ACCEL_UNITS: dict[str, float] = {
     "-m/s2": -1.0,
     "-g": -STANDARD_GRAVITY,
 }
+
+#: Factors to rad and to m/s, of the increments of sensors that sum over each sample.
+GYRO_SUMS: dict[str, float] = {"rad": 1.0, "deg": _DEGREE}
+ACCEL_SUMS: dict[str, float] = {"m/s": 1.0, "g*s": STANDARD_GRAVITY}
 
 #: Factors to µT.
 MAG_UNITS: dict[str, float] = {

@@ -41,8 +41,8 @@ def stamps(values: list[str], header: str = HEADER) -> Callable[[Path], Path]:
     return make
 
 
-def turning(header: str, scale: float) -> Callable[[Path], Path]:
-    """A slow tumble of 20 s: rates in rad/s over `scale`, gravity in g."""
+def turning(header: str, scale: float, force_scale: float = 1.0) -> Callable[[Path], Path]:
+    """A slow tumble of 20 s: rates in rad/s over `scale`, gravity in g times `force_scale`."""
 
     def make(folder: Path) -> Path:
         t = np.arange(2001) * 0.01
@@ -51,7 +51,8 @@ def turning(header: str, scale: float) -> Callable[[Path], Path]:
         # Rates of roll and pitch in body axes, heading kept: w = (p, q cos, -q sin).
         rates = np.column_stack([p, q * np.cos(roll), -q * np.sin(roll)]) / scale
         force = [np.sin(pitch), -np.sin(roll) * np.cos(pitch), -np.cos(roll) * np.cos(pitch)]
-        lines = [",".join(f"{v:.6f}" for v in row) for row in np.column_stack([t, rates, *force])]
+        table = np.column_stack([t, rates, force_scale * np.transpose(force)])
+        lines = [",".join(f"{v:.6f}" for v in row) for row in table]
         return text(folder / "log.csv", lines, header)
 
     return make
@@ -200,6 +201,43 @@ def cut_json(folder: Path) -> Path:
     return folder / "rec.json"
 
 
+SECOND = "43.5861, lon_deg = 39.7215"
+THIRD = "43.5868, lon_deg = 39.7242"
+CAR = """rate_hz = 100
+[motion]
+kind = "car"
+lat_deg = 55.75
+lon_deg = 37.62
+manoeuvres = [
+  { do = "accelerate", to_m_per_s = 15, duration_s = 8 },
+  { do = "turn_left", radius_m = 30 },
+]
+"""
+WAYPOINTS = """[motion]
+kind = "waypoints"
+speed_m_per_s = 10
+waypoints = [
+  { lat_deg = 43.5850, lon_deg = 39.7203 },
+  { lat_deg = 43.5861, lon_deg = 39.7215 },
+  { lat_deg = 43.5868, lon_deg = 39.7242 },
+]
+"""
+
+
+def trajectory(
+    old: str, new: str, whole: str = CAR, options: tuple[str, ...] = ()
+) -> tuple[Callable[[Path], Path], tuple[str, ...], bool, str]:
+    """A trajectory's file in which a piece of text is replaced; what follows a case's title."""
+    assert whole.count(old) == 1
+
+    def make(folder: Path) -> Path:
+        path = folder / "car.toml"
+        path.write_text(whole.replace(old, new), encoding="utf-8")
+        return path
+
+    return make, options, True, "simulate"
+
+
 @dataclass(frozen=True)
 class Case:
     """One bad input.
@@ -211,6 +249,7 @@ class Case:
     make: Callable[[Path], Path]
     options: tuple[str, ...] = ()
     fails: bool = True
+    command: str = "attitude"
 
 
 CASES = [
@@ -278,6 +317,30 @@ CASES = [
         "Degrees that were called radians, and gravity tells it",
         turning("time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g", np.pi / 180.0),
         fails=False,
+    ),
+    Case(
+        "Increments of each sample without a unit",
+        turning("time_s,gx,gy,gz,ax,ay,az", 100.0, 9.80665 / 100.0),
+    ),
+    Case(
+        "The same with their units stated",
+        turning("time_s,gx,gy,gz,ax,ay,az", 100.0, 9.80665 / 100.0),
+        ("--gyro-unit", "rad", "--accel-unit", "m/s"),
+        fails=False,
+    ),
+    Case(
+        "Columns that are named increments, and hold rates",
+        turning("time_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,ax_g,ay_g,az_g", 1.0),
+        fails=False,
+    ),
+    Case(
+        "Increments whose unit is not in their names",
+        turning("time_s,dtheta_x,dtheta_y,dtheta_z,ax_g,ay_g,az_g", 100.0),
+    ),
+    Case(
+        "Increments that are called values at their stamps",
+        turning("time_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,ax_g,ay_g,az_g", 100.0),
+        ("--sampling", "instantaneous"),
     ),
     Case(
         "A unit that is none",
@@ -455,4 +518,43 @@ CASES = [
     ),
     Case("An array that was cut", cut_array),
     Case("A damaged Parquet file", no_parquet),
+    Case("A trajectory that is no TOML", *trajectory('"car"', '"car')),
+    Case("A key of a trajectory that is not known", *trajectory("rate_hz", "rate")),
+    Case("A key of a motion that is not known", *trajectory("lon_deg", "long_deg")),
+    Case("A key of a motion that is missing", *trajectory("lat_deg = 55.75", "")),
+    Case("A motion without its kind", *trajectory('kind = "car"', "")),
+    Case("A kind of motion that is not known", *trajectory('"car"', '"cart"')),
+    Case("A manoeuvre that is not known", *trajectory('"turn_left"', '"turnleft"')),
+    Case("A key of a manoeuvre that is not known", *trajectory("radius_m", "radius")),
+    Case("A number of the wrong sign", *trajectory("duration_s = 8", "duration_s = -8")),
+    Case("Text for a number", *trajectory("lat_deg = 55.75", 'lat_deg = "55 N"')),
+    Case(
+        "Latitude and longitude swapped",
+        *trajectory("lat_deg = 55.75\nlon_deg = 37.62", "lat_deg = 151.2\nlon_deg = -33.9"),
+    ),
+    Case("A turn that is too tight for its speed", *trajectory("radius_m = 30", "radius_m = 3")),
+    Case("More acceleration than a car has", *trajectory("duration_s = 8", "duration_s = 1")),
+    Case("A turn of a vehicle that stands", *trajectory("to_m_per_s = 15", "to_m_per_s = 0")),
+    Case(
+        "A distance and a duration at once",
+        *trajectory('"turn_left", radius_m = 30', '"straight", distance_m = 9, duration_s = 3'),
+    ),
+    Case("A sensor that is not known", *trajectory("rate_hz = 100", 'sensor = "mpu-6000"')),
+    Case("An ellipsoid that is not known", *trajectory("rate_hz = 100", 'ellipsoid = "wgs72"')),
+    Case("A rate under which nothing is left", *trajectory("= 100", "= 0.001")),
+    Case(
+        "A waypoint twice",
+        *trajectory(THIRD, SECOND, WAYPOINTS),
+    ),
+    Case(
+        "Waypoints with a time and without",
+        *trajectory("39.7242 }", "39.7242, time_s = 50 }", WAYPOINTS),
+    ),
+    Case(
+        "A path that turns back",
+        *trajectory(THIRD, "43.5850, lon_deg = 39.7203", WAYPOINTS),
+    ),
+    Case("A path that is too fast for its bends", *trajectory("= 10", "= 200", WAYPOINTS)),
+    Case("Another format than there is", *trajectory("= 100", "= 50", CAR, ("--format", "xls"))),
+    Case("A trajectory's file that is not there", lambda f: f / "cart.toml", (), True, "simulate"),
 ]

@@ -28,7 +28,7 @@ from strapdown._kernels.rotation_vector import ALIKE, cross
 SERIES_LIMIT = 0.0625
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def integral_coefficients(u):
     """Coefficients b, c, d of V1 = 1 + b [w x] + c [w x]^2, V2 = 1/2 + c [w x] + d [w x]^2.
 
@@ -52,7 +52,7 @@ def integral_coefficients(u):
     return b, (1.0 - 2.0 * k * s) / u, (0.5 - b) / u
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def motion_exponential(wx, wy, wz, ax, ay, az, px, py, pz, tau):
     """Velocity and distance dv, dr of the exponential of (w, a, p, tau); its turn is w."""
     b, c, d = integral_coefficients(wx * wx + wy * wy + wz * wz)
@@ -72,7 +72,7 @@ def motion_exponential(wx, wy, wz, ax, ay, az, px, py, pz, tau):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def line_motion(
     dt, k, wx, wy, wz, fx, fy, fz, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z
 ):
@@ -102,7 +102,7 @@ def line_motion(
     return px, py, pz, vx, vy, vz, rx, ry, rz
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def linear_motion(dt, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z):
     """Phi, dv, dr of the step between two samples of rate w and force f, joined by lines."""
     h = 0.5 * dt
@@ -130,7 +130,7 @@ def linear_motion(dt, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def mean_motion(dt, before, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z):
     """Phi, dv, dr of a step with means w1 and f1, after one of length `before` with w0, f0.
 

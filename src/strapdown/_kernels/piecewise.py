@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 
@@ -33,6 +34,9 @@ def legendre_sums(edges, before, series, time, out):
     at the left edge of a panel, whatever a series rounds that to.
     """
     terms, width = series.shape[1], series.shape[2]
+    lower, upper = np.empty(terms), np.empty(terms)
+    for n in range(terms):
+        lower[n], upper[n] = (n + 1) / (n + 2), (2 * n + 3) / (n + 2)
     k = 0
     for i in range(time.shape[0]):
         t = time[i]
@@ -44,12 +48,10 @@ def legendre_sums(edges, before, series, time, out):
                 out[i, j] = before[k, j]
                 continue
             c0, c1 = series[k, terms - 2, j], series[k, terms - 1, j]
-            degree = terms
             for n in range(terms - 3, -1, -1):
                 kept = c0
-                degree -= 1
-                c0 = series[k, n, j] - c1 * ((degree - 1) / degree)
-                c1 = kept + c1 * x * ((2 * degree - 1) / degree)
+                c0 = series[k, n, j] - c1 * lower[n]
+                c1 = kept + c1 * x * upper[n]
             out[i, j] = before[k, j] + (c0 + c1 * x)
 
 

@@ -135,13 +135,15 @@ def attitude(
     ] = None,
     gyro_unit: Annotated[
         str | None,
-        typer.Option(metavar="UNIT", help="rad/s, deg/s, …", rich_help_panel=_LOG),
+        typer.Option(
+            metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.", rich_help_panel=_LOG
+        ),
     ] = None,
     accel_unit: Annotated[
         str | None,
         typer.Option(
             metavar="UNIT",
-            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS).",
+            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS); m/s: increments.",
             rich_help_panel=_LOG,
         ),
     ] = None,

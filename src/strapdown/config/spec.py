@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
@@ -21,12 +21,16 @@ class Spec(BaseModel):
 class TableSpec(Spec):
     """A table that a person writes: a key that is not known is answered with the nearest."""
 
+    #: Fields that no person writes.
+    unwritten: ClassVar[tuple[str, ...]] = ()
+
     @model_validator(mode="before")
     @classmethod
     def _known(cls, data: Any) -> Any:
         for key in data if isinstance(data, dict) else ():
             if key not in cls.model_fields:
-                raise refuse(key, "there is no such key", nearest(key, cls.model_fields))
+                known = [name for name in cls.model_fields if name not in cls.unwritten]
+                raise refuse(key, "there is no such key", nearest(key, known))
         return data
 
 

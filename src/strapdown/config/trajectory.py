@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from pydantic import Field, FiniteFloat, ValidationError, field_validator
 
@@ -18,6 +18,8 @@ __all__ = ["TrajectorySpec", "read_trajectory_spec"]
 
 class TrajectorySpec(TableSpec):
     """One run of the simulator over a motion on the Earth."""
+
+    unwritten: ClassVar[tuple[str, ...]] = ("name",)
 
     name: str = "trajectory"
     title: str = ""
@@ -92,10 +94,8 @@ def _explained(error: Any, file: str) -> ConfigError:
     elif error["type"] == "union_tag_not_found":
         key = context["discriminator"].strip("'")
         place.append(key)
-        what, remedy = (
-            "it is missing",
-            f"Known: {', '.join(KINDS if key == 'kind' else MANOEUVRES)}.",
-        )
+        known = KINDS if key == "kind" else MANOEUVRES
+        what, remedy = "it is missing", f"write {key} = …; known: {', '.join(known)}"
     elif error["type"] == "union_tag_invalid":
         place.append(context["discriminator"].strip("'"))
         tags = re.findall(r"'(\w+)'", context["expected_tags"])

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.evaluation.earth_centred import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.exceptions import DataError
+from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.tables import EULER, GEODETIC, VELOCITY, check_trajectory, trajectory_table
 
 Array = NDArray[np.float64]

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.evaluation.earth_centred import ecef_from_geodetic, place_difference
 from strapdown.evaluation.trajectory_at import (
     SAME_BEAT,
     interpolation_cost,
@@ -16,6 +15,7 @@ from strapdown.evaluation.trajectory_at import (
     trajectory_at,
 )
 from strapdown.exceptions import DataError, Finding
+from strapdown.frames import ecef_from_geodetic, place_difference
 from strapdown.tables import (
     EULER,
     GEODETIC,

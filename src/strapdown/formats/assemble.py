@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.formats.assemble_truth import truth_of_log
-from strapdown.formats.columns import parse_axes, parse_unit
+from strapdown.formats.columns import parse_axes, parse_unit, says_increment
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import (
@@ -24,6 +24,7 @@ from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.plausibility import report_absurd, report_gaps
 from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
 from strapdown.formats.stamps import Stamps, read_stamps
+from strapdown.formats.summed import OPEN, SUMS, intervals, sampling_of_sums
 from strapdown.results import Reading
 from strapdown.tables import SAMPLINGS, imu_table
 
@@ -84,9 +85,12 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         )
     readings = [_time_reading(raw, found, stamps, int(kept[0]))]
     body: dict[str, Array] = {}
+    summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     for triad, (unit, why) in units.items():
-        factor = UNITS[triad][unit]
+        factor = {**UNITS[triad], **SUMS[triad]}[unit]
         body[triad] = (values[triad][:, axes.axis] * np.array(axes.sign) * factor)[kept]
+        if triad in summed:
+            body[triad] /= intervals(time, kept)
         for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
             column = found[f"{triad}_{AXES[axis]}"]
             readings.append(
@@ -98,7 +102,10 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
                     float(values[triad][kept[0], axis]),
                 )
             )
-    sampling = _sampling(raw, options, findings)
+    if summed:
+        sampling = sampling_of_sums(summed, set(units), options.sampling, raw.name, findings)
+    else:
+        sampling = _sampling(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
     imu = imu_table(
@@ -191,7 +198,7 @@ def _units(
             asked.add(triad)
         try:
             if stated is None:
-                _refuse_open(found, triad)
+                _refuse_open(raw, found, triad)
             units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
         except DataError as error:
             if triad == "gyro":
@@ -203,17 +210,22 @@ def _units(
     return units
 
 
-def _refuse_open(found: dict[str, Column], triad: str) -> None:
+def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
     """Refuse a unit that the file leaves open: of f and -f the numbers cannot tell which.
 
     Raises
     ------
     DataError
     """
-    unit = found[f"{triad}_x"].unit
+    column = found[f"{triad}_x"]
+    unit = column.unit
+    if unit is None and says_increment(column.source):
+        unit = OPEN[triad]
     if unit and " or " in unit:
         raise DataError(
             f"the file leaves open whether it is in {unit}",
+            file=raw.name,
+            quantity=triad,
             remedy=f"state it with --{triad}-unit",
         )
 
@@ -226,7 +238,12 @@ def _stated_unit(
         return parse_unit(asked, triad), f"stated by --{triad}-unit"
     columns = [found[f"{triad}_{a}"] for a in AXES]
     units = {c.unit for c in columns}
-    if len(units) == 1 and (unit := columns[0].unit) in UNITS[triad]:
+    known = set(UNITS[triad])
+    # Degrees in a name are often meant a second: only a name that says increments is believed.
+    if all(says_increment(c.source) for c in columns):
+        known |= set(SUMS[triad])
+    unit = columns[0].unit
+    if len(units) == 1 and unit is not None and unit in known:
         stated = columns[0].why == "stated by the file"
         return unit, "stated by the file" if stated else "in its name"
     return None

@@ -5,7 +5,14 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
+from strapdown.constants import (
+    ACCEL_SUMS,
+    ACCEL_UNITS,
+    GYRO_SUMS,
+    GYRO_UNITS,
+    MAG_UNITS,
+    TIME_UNITS,
+)
 from strapdown.exceptions import ConfigError, nearest
 
 __all__ = [
@@ -15,6 +22,7 @@ __all__ = [
     "parse_column_option",
     "parse_unit",
     "read_name",
+    "says_increment",
 ]
 
 _AXES = "xyz"
@@ -56,6 +64,11 @@ TRIADS = {
         "compass",
         "m",
     ],
+}
+# Names that say that a column holds the increments of each sample.
+SUMMED = {
+    "gyro": ["dtheta", "deltatheta", "dangle", "deltaangle", "angleincrement", "dang"],
+    "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
 }
 TIMES = [
     "time",
@@ -117,6 +130,8 @@ _SPELLINGS = {
     "deg/h": "deg/h deg/hr deg_h deg_per_h °/h",
     "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
     "g": "g g0 gs",
+    "m/s": "m/s m_s mps m_per_s m/sec m·s-1 m*s^-1",
+    "g*s": "g*s g·s g_s",
     "mg": "mg",
     "uT": "ut µt μt microtesla",
     "nT": "nt nanotesla",
@@ -226,7 +241,27 @@ def _quantity(word: str) -> str | None:
             return f"{triad}_{word[-1]}"
         if word in names and len(word) > 1:
             return triad
+    for triad, names in SUMMED.items():
+        if word in names or (word[-1:] in _AXES and word[:-1] in names):
+            return triad if word in names else f"{triad}_{word[-1]}"
     return None
+
+
+def says_increment(name: str) -> bool:
+    """Whether a name says that its column holds the increments of each sample.
+
+    Parameters
+    ----------
+    name : str
+        As ``dtheta_x_rad``, ``delta_v_y (m/s)``, ``dv[2]``.
+    """
+    text = _BRACKETS.sub("", INDEXED.sub(r"\1", name.strip()))
+    known = [n for names in SUMMED.values() for n in names]
+    words, _ = _split_unit([w for w in re.split(r"[\s_\-/:.]+", text.lower()) if w])
+    return any(
+        (word := "".join(words[start:])) in known or (word[-1:] in _AXES and word[:-1] in known)
+        for start in range(len(words))
+    )
 
 
 def parse_unit(text: str, kind: str) -> str:
@@ -247,7 +282,12 @@ def parse_unit(text: str, kind: str) -> str:
     ConfigError
         It is no unit of that kind.
     """
-    known = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS, "time": TIME_UNITS}[kind]
+    known = {
+        "gyro": {**GYRO_UNITS, **GYRO_SUMS},
+        "accel": {**ACCEL_UNITS, **ACCEL_SUMS},
+        "mag": MAG_UNITS,
+        "time": TIME_UNITS,
+    }[kind]
     unit = UNIT_OF.get(text.strip().lower(), text)
     if unit not in known:
         raise ConfigError(

@@ -5,7 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats.columns import INDEXED, QUANTITIES, TRIADS, UNIT_OF, read_name
+from strapdown.formats.columns import (
+    INDEXED,
+    QUANTITIES,
+    TRIADS,
+    UNIT_OF,
+    read_name,
+    says_increment,
+)
 from strapdown.formats.recording import RawLog, ReadOptions
 
 AXES = "xyz"
@@ -105,6 +112,9 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         if len(names) > 1 and quantity == "time":
             # A clock that says its unit goes before one that does not.
             names = [n for n in names if _unit_of(raw, n)] or names
+        if len(names) > 1:
+            # Rates go before the increments that stand beside them.
+            names = [n for n in names if not says_increment(n)] or names
         if len(names) > 1:
             raise ConfigError(
                 f"{len(names)} columns could be it: {', '.join(names)}",

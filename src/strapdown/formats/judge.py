@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats.inference import THRESHOLD, Inference
+from strapdown.formats.summed import SUMS, sum_of
 
 Array = NDArray[np.float64]
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
@@ -47,7 +48,8 @@ def inferred_unit(
             f"({'; '.join(form.evidence)}; confidence {form.confidence:.3g})",
             file=file,
             quantity=triad,
-            remedy="divide each by its step of time, and name the unit in the column",
+            remedy=f"if they are, state it with {_flag(triad)}: "
+            f"{sum_of(_likely(unit), triad)}, the unit of the increment of each sample",
         )
     if unit is not None and unit.settled and (form is None or form.value == "rate"):
         findings.append(
@@ -60,6 +62,10 @@ def inferred_unit(
         )
         return str(unit.value), str(unit)
     raise DataError(_not_told(unit), file=file, quantity=triad, remedy=_choices(triad, values))
+
+
+def _likely(unit: Inference | None) -> str | None:
+    return str(unit.value) if unit is not None and unit.settled else None
 
 
 def _flag(triad: str) -> str:
@@ -122,13 +128,20 @@ def report_contradictions(
         form = said.get(f"{triad}_form")
         if triad in asked or not heard or other is None or not other.settled:
             continue
-        if form is not None and form.settled and form.value == "increment":
+        value = str(other.value)
+        told = form.value if form is not None and form.settled else None
+        if unit in SUMS[triad]:
+            if told != "rate":
+                continue
+            what = f"the numbers look like rates, not increments of each sample; {form}"
+        elif told == "increment":
             what = f"the numbers look like increments of each sample, not rates; {form}"
+            value = sum_of(value, triad)
         elif other.value != unit.lstrip("-") and (form is None or form.value == "rate"):
             what = f"the numbers contradict {unit}, which is stated; {other}"
         else:
             continue
-        remedy = f"if the statement is wrong, say {_flag(triad)} {other.value}"
+        remedy = f"if the statement is wrong, say {_flag(triad)} {value}"
         findings.append(Finding(what, file=file, quantity=triad, remedy=remedy))
     gravity = said.get("gravity")
     if "accel" in units and gravity is not None and gravity.settled and gravity.value == "removed":

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.evaluation.earth_centred import ecef_from_geodetic
+from strapdown.frames import ecef_from_geodetic
 from strapdown.tables import GEODETIC
 
 Array = NDArray[np.float64]

@@ -10,10 +10,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.evaluation.earth_centred import ecef_from_geodetic, q_ne
 from strapdown.exceptions import DataError
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
+from strapdown.frames import ecef_from_geodetic, q_ne
 from strapdown.tables import EULER, GEODETIC, check_trajectory
 
 Array = NDArray[np.float64]

@@ -90,7 +90,7 @@ def motion_increments(
         count = motion_blocks.join_blocks(dt, samples, out, last, joined)
         # A step is as long as its stamps say, to the last bit.
         ends, out = ends[last[:count]], joined[:count].copy()
-    table = pd.DataFrame(out, index=pd.Index(ends, name="time"), columns=MOTION)
+    table = pd.DataFrame(out, index=pd.Index(ends, name="time"), columns=MOTION, copy=False)
     table.attrs["source"] = imu.attrs.get("source")
     check_motion_increments(table)
     return table

@@ -17,8 +17,8 @@ from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import ELLIPSOIDS, find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
 from strapdown.nav_state import NavState
-from strapdown.tables import MOTION, trajectory_table
-from strapdown.tables.trajectory import TRAJECTORY
+from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
+from strapdown.tables.checks import values_of
 
 Array = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class Mechanization(ABC):
     height_limits: tuple[float, float] = (-15_000.0, 1_000_000.0)
 
     name: ClassVar[str]
-    title: ClassVar[str]
+    summary: ClassVar[str]
     source: ClassVar[str]
 
     def __post_init__(self) -> None:
@@ -172,11 +172,25 @@ class Mechanization(ABC):
         DataError
             `heights` is missing where the height is damped, or has another length.
         """
-        rows = motion_rows(increments)
+        rows = values_of(increments, MOTION)
+        history = np.empty((len(rows), ROW))
+        after = state.copy()
+        self.advance_into(after, rows, increments, heights, history, backward=backward)
+        return after, history
+
+    def advance_into(
+        self,
+        state: Array,
+        rows: Array,
+        increments: pd.DataFrame,
+        heights: ArrayLike | None,
+        history: Array,
+        *,
+        backward: bool,
+    ) -> None:
+        """As `advance`, in place; `rows` are those of `increments`."""
         reference = self._heights(heights, len(rows))
         earth = find_ellipsoid(self.ellipsoid).parameters()
-        after = state.copy()
-        history = np.empty((len(rows), ROW))
         if backward:
             # The same motion met backward is a motion with opposite velocity on an Earth that
             # turns the other way.
@@ -184,16 +198,15 @@ class Mechanization(ABC):
             reverse_increments(forward, rows)
             reference = reference[::-1].copy()
             earth[RATE] *= -1.0
-            after[V : V + 3] *= -1.0
-        made, why = self.advance_rows(after, rows, reference, earth, history)
+            state[V : V + 3] *= -1.0
+        made, why = self.advance_rows(state, rows, reference, earth, history)
         if why:
             at = len(rows) - 1 - made if backward else made
             self._refuse(why, at, increments, history[made - 1] if made else None)
         if backward:
-            after[V : V + 3] *= -1.0
-            history = history[::-1].copy()
+            state[V : V + 3] *= -1.0
+            history[:] = history[::-1].copy()
             history[:, V : V + 3] *= -1.0
-        return after, history
 
     def trajectory(
         self, time: ArrayLike, history: Array, source: str | None = None
@@ -211,9 +224,14 @@ class Mechanization(ABC):
         -------
         DataFrame
         """
-        table = np.empty((len(history), len(TRAJECTORY)))
-        trajectory_rows(history, table)
-        return trajectory_table(time, table[:, :3], table[:, 3:6], table[:, 6:], source)
+        rows = np.empty((len(history), len(TRAJECTORY)))
+        trajectory_rows(history, rows)
+        table = pd.DataFrame(
+            rows, index=pd.Index(np.asarray(time), name="time"), columns=TRAJECTORY, copy=False
+        )
+        table.attrs["source"] = source
+        check_trajectory(table)
+        return table
 
     def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
         if self.height != "damped":
@@ -245,28 +263,20 @@ class Mechanization(ABC):
         source = increments.attrs.get("source")
         if why == POLE:
             raise DivergenceError(
-                f"the step ending at {time:.9g} s comes nearer to a pole than "
+                f"the sample at {time:.9g} s (step {step + 1}) comes nearer to a pole than "
                 f"{self.latitude_limit_deg:g} deg of latitude{before}: north, and every angle from "
                 "it, changes too fast there",
                 file=source,
-                row=step + 1,
                 quantity="lat",
                 remedy="end the run before it; north-east-down has no meaning at a pole",
             )
         given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
         raise DivergenceError(
-            f"the state has diverged in the step ending at {time:.9g} s ({given}){before}",
+            f"the state has diverged with the sample at {time:.9g} s (step {step + 1}: {given})"
+            f"{before}",
             file=source,
-            row=step + 1,
             quantity="state",
             remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
             "gravity (-9.8 on z at level rest), a burst; and at the start: an attitude in rad, "
             "an over-long run with a free height",
         )
-
-
-def motion_rows(increments: pd.DataFrame) -> Array:
-    """Take the rows of a MotionIncrements table as the kernels have them, (n, 10)."""
-    if list(increments.columns) == MOTION:
-        return np.ascontiguousarray(increments.to_numpy(dtype=np.float64))
-    return np.ascontiguousarray(increments[MOTION].to_numpy(dtype=np.float64))

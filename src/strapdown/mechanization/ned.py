@@ -32,8 +32,8 @@ class NorthEastDown(Mechanization):
     """
 
     name: ClassVar[str] = "ned"
-    title: ClassVar[str] = "north-east-down, every term"
-    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+    summary: ClassVar[str] = "north-east-down with every term, to 89.9° of latitude"
+    source: ClassVar[str] = "Tadic (2016) (1)-(19)"
 
     def begin(self, start: NavState) -> Array:
         """Return the state of the kernel at a start.

@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from strapdown._kernels.ned import ROW
 from strapdown.exceptions import DataError, Finding
 from strapdown.increments import motion_increments
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-from strapdown.tables import check_motion_increments
+from strapdown.tables import MOTION, check_motion_increments
+from strapdown.tables.checks import values_of
+
+Array = NDArray[np.float64]
 
 # The longest step, in s, over which two samples say what happened between them. Longer holes
 # are for the user to judge.
@@ -26,19 +31,32 @@ class NavigationRun:
 
     Attributes
     ----------
-    trajectory : DataFrame
-        Trajectory table, the start included.
+    mechanization : Mechanization
     start, end : NavState
         The state that was given, and that at the other end: the last, or of a backward run the
         first.
+    time : ndarray, (n,), s
+        Stamps of the states: both sides of every step.
+    history : ndarray, (n, 10)
+        The states as the kernels have them: `Mechanization.advance`.
     findings : tuple of Finding
         What a person should know of the increments.
+    source : str, optional
+        Name of the log.
     """
 
-    trajectory: pd.DataFrame
+    mechanization: Mechanization
     start: NavState
     end: NavState
-    findings: tuple[Finding, ...] = field(default=())
+    time: Array
+    history: Array
+    findings: tuple[Finding, ...] = ()
+    source: str | None = None
+
+    @cached_property
+    def trajectory(self) -> pd.DataFrame:
+        """Trajectory table, the start included; made when it is first asked for."""
+        return self.mechanization.trajectory(self.time, self.history, self.source)
 
 
 def run_mechanization(
@@ -90,18 +108,20 @@ def run_mechanization(
     ends = increments.index.to_numpy(dtype=np.float64)
     begin = float(ends[0] - increments["dt"].iloc[0])
     _check_start(start, float(ends[-1]) if backward else begin, increments)
-    state, history = mechanization.advance(
-        mechanization.begin(start), increments, heights, backward=backward
-    )
-    first = mechanization.begin(start)[None, : history.shape[1]]
-    rows = np.concatenate([history, first] if backward else [first, history])
-    time = np.concatenate([[begin], ends])
-    source = increments.attrs.get("source")
+    state = mechanization.begin(start)
+    rows = values_of(increments, MOTION)
+    history = np.empty((len(rows) + 1, ROW))
+    history[-1 if backward else 0] = state[:ROW]
+    others = history[:-1] if backward else history[1:]
+    mechanization.advance_into(state, rows, increments, heights, others, backward=backward)
     return NavigationRun(
-        trajectory=mechanization.trajectory(time, rows, source),
+        mechanization=mechanization,
         start=start,
         end=mechanization.nav_state(state, begin if backward else float(ends[-1])),
+        time=np.concatenate([[begin], ends]),
+        history=history,
         findings=findings,
+        source=increments.attrs.get("source"),
     )
 
 
@@ -174,6 +194,9 @@ def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> Non
 
 def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...]:
     dt = increments["dt"].to_numpy(dtype=np.float64)
+    usual = float(dt.mean())
+    if dt.max() <= min(longest, 3.0 * usual):
+        return ()
     long = np.flatnonzero(dt > longest)
     source = increments.attrs.get("source")
     if long.size:
@@ -183,7 +206,6 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
             f"a gap of {dt[row]:.6g} s, from {end - dt[row]:.9g} s to {end:.9g} s: what the body "
             f"did in it is not known ({long.size} such)",
             file=source,
-            row=row + 1,
             quantity="dt",
             remedy=f"cut the log there, or pass longest_step={float(dt.max()):.3g} or more to join "
             "its sides by a line",
@@ -199,7 +221,6 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
             f"longest, {dt[row]:.6g} s, ends at {float(increments.index[row]):.9g} s: rate and "
             "force are taken as linear over it",
             file=source,
-            row=row + 1,
             quantity="dt",
             remedy="errors after it are larger than the sensors alone would make them",
         ),

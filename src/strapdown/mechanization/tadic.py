@@ -44,8 +44,8 @@ class Tadic(Mechanization):
     as_printed: bool = False
 
     name: ClassVar[str] = "tadic"
-    title: ClassVar[str] = "north-east-down, with a paper's simplifications"
-    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+    summary: ClassVar[str] = "the same without the terms that the paper leaves out"
+    source: ClassVar[str] = "Tadic (2016) (1)-(19)"
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +10,14 @@ import pandas as pd
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config import TrajectorySpec
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_trajectory_csv
+from strapdown.formats.log_writers import LOG_WRITERS, log_formats
+from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
 from strapdown.report.stated_errors import stated_errors
 from strapdown.simulation import TriadErrors
 from strapdown.systems.attitude_source import sensor_file
 from strapdown.systems.trajectory_source import simulate_trajectory
 
 __all__ = ["write_trajectory_simulation"]
-
-#: Suffix to the function that writes a Trajectory table, besides ``trajectory.csv``.
-TRAJECTORY_FORMATS: dict[str, Callable[[Path, pd.DataFrame], None]] = {}
 
 # Row of a Trajectory table to keys with units.
 _ROW = {
@@ -62,14 +59,12 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     check_destination(out, force)
     formats = log_formats(spec.formats)
     for name in spec.trajectory_formats:
-        if name not in TRAJECTORY_FORMATS:
+        if name not in TRAJECTORY_WRITERS:
             raise ConfigError(
                 f"there is no writer for '{name}'",
                 file=f"{spec.name}.toml",
                 quantity="trajectory_formats",
-                remedy=nearest(name, TRAJECTORY_FORMATS)
-                if TRAJECTORY_FORMATS
-                else "leave it out: trajectory.csv is written in any case",
+                remedy=nearest(name, TRAJECTORY_WRITERS),
             )
     motion, errors, imu, attitude, trajectory = simulate_trajectory(spec)
     configuration = spec.model_dump(mode="json", exclude_none=True)
@@ -84,9 +79,10 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     ) as folder:
         for name in formats:
             LOG_WRITERS[name](folder / f"log.{name}", imu, attitude)
-        write_trajectory_csv(folder / "trajectory.csv", trajectory)
-        for name in spec.trajectory_formats:
-            TRAJECTORY_FORMATS[name](folder / f"trajectory.{name}", trajectory)
+        options = TrajectoryFileOptions(ellipsoid=motion.ellipsoid)
+        for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
+            path = folder / f"trajectory.{name}"
+            TRAJECTORY_WRITERS[name](path, trajectory, name=spec.name, options=options)
         shape = motion.ellipsoid
         sensor = spec.sensor and Path(spec.sensor).name
         description: dict[str, Any] = {

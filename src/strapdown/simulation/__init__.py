@@ -10,6 +10,7 @@ from strapdown.simulation.minimum_jerk import Track
 from strapdown.simulation.motion import Motion, Pulse, PulseMotion
 from strapdown.simulation.path_motion import PathMotion, rocking_stand
 from strapdown.simulation.scenarios import SCENARIOS, Scenario, find_scenario
+from strapdown.simulation.sculling import Sculling
 from strapdown.simulation.sine_velocity import SineVelocityMotion
 from strapdown.simulation.smooth_random import SmoothRandom
 from strapdown.simulation.spline_motion import SplineMotion
@@ -31,6 +32,7 @@ __all__ = [
     "Pulse",
     "PulseMotion",
     "Scenario",
+    "Sculling",
     "SineVelocityMotion",
     "SmoothRandom",
     "SplineMotion",

@@ -88,6 +88,9 @@ class Kinematics:
         Body to local north-east-down.
     turning : ndarray, (n, 3), rad/s
         Rate of the body relative to local level, in body axes.
+    angles : ndarray, (n, 3), deg, optional
+        Roll, pitch, heading, where the motion is made of them: a truth without the rounding of
+        what is taken back from `q_nb`.
     """
 
     moved: Array
@@ -95,6 +98,7 @@ class Kinematics:
     acceleration: Array
     q_nb: Array
     turning: Array
+    angles: Array | None = None
 
 
 class EarthMotion(ABC):
@@ -181,9 +185,7 @@ class EarthMotion(ABC):
         place = k.moved.copy()
         place[:, :2] = np.degrees(place[:, :2])
         place += [self.origin.lat_deg, self.origin.lon_deg, self.origin.alt]
-        return trajectory_table(
-            t, place, k.velocity, rotation.euler_from_quaternion(k.q_nb), source=source
-        )
+        return trajectory_table(t, place, k.velocity, _euler(k), source=source)
 
     def _feel(self, time: ArrayLike) -> tuple[Array, Array]:
         from strapdown._kernels.earth_motion import feel
@@ -215,6 +217,17 @@ def check_duration(duration: float) -> None:
             quantity="duration",
             remedy="use a number above zero",
         )
+
+
+def _euler(k: Kinematics) -> Array:
+    """Roll, pitch and heading in deg, heading from 0 to 360."""
+    if k.angles is None or (np.abs(k.angles[:, :2]) >= (180.0, 90.0)).any():
+        return rotation.euler_from_quaternion(k.q_nb)
+    angles = k.angles.copy()
+    heading = np.mod(angles[:, 2], 360.0)
+    # What is just under zero rounds to a whole turn.
+    angles[:, 2] = np.where(heading < 360.0, heading, 0.0)
+    return angles
 
 
 def _instants(time: ArrayLike) -> Array:

@@ -1,16 +1,15 @@
-"""Manoeuvres, one after another, as tracks of speed, turn rate and climb."""
+"""What a vehicle can be told to do."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import ConfigError
+from strapdown.simulation.course import Course, check_length, unfit
 from strapdown.simulation.minimum_jerk import Track, minimum_jerk
 from strapdown.simulation.track_integral import integrate_track
 
@@ -18,86 +17,6 @@ from strapdown.simulation.track_integral import integrate_track
 _PEAK = 15.0 / 8.0
 # What a ramp covers is integrated with this many nodes.
 _NODES = 32
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What a vehicle can do.
-
-    Attributes
-    ----------
-    acceleration : float, m/s²
-        Of its speed.
-    lateral : float, m/s²
-        In a turn.
-    bank_deg : float, deg
-    climb_deg : float, deg
-        Up or down.
-    """
-
-    acceleration: float = 12.0
-    lateral: float = 12.0
-    bank_deg: float = 75.0
-    climb_deg: float = 75.0
-
-
-@dataclass
-class Course:
-    """Tracks that grow by one manoeuvre after another.
-
-    Attributes
-    ----------
-    time : float, s
-        Up to here it is laid.
-    limits : Limits
-    speed, turn_rate, climb : list of (time, value)
-        m/s, deg/s, deg.
-    """
-
-    limits: Limits
-    speed: list[tuple[float, float]]
-    turn_rate: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
-    climb: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
-    time: float = 0.0
-
-    def move(
-        self, points: list[tuple[float, float]], start: float, length: float, to: float
-    ) -> None:
-        """Let a coordinate hold until `start`, and come to a value with least jerk."""
-        if start > points[-1][0]:
-            points.append((start, points[-1][1]))
-        if length > 0.0:
-            points.append((start + length, to))
-
-    @property
-    def speed_now(self) -> float:
-        """Speed at the end of what is laid, m/s."""
-        return self.speed[-1][1]
-
-    @property
-    def climb_now(self) -> float:
-        """Angle of climb there, deg."""
-        return self.climb[-1][1]
-
-    def moving_speed(self, what: str) -> float:
-        """Speed there, which must not be zero."""
-        if self.speed_now <= 0.0:
-            raise _unfit(
-                f"{what} needs a speed, and the vehicle stands", "accelerate before it", "speed"
-            )
-        return self.speed_now
-
-    def level_speed(self, what: str) -> float:
-        """Horizontal part of it, m/s."""
-        return self.moving_speed(what) * math.cos(math.radians(self.climb_now))
-
-
-class Manoeuvre(Protocol):
-    """What a vehicle is told to do."""
-
-    def lay(self, course: Course) -> None:
-        """Add it to a course."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -110,12 +29,12 @@ class Accelerate:
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         if not 0.0 <= self.to < math.inf:
-            raise _unfit(f"a speed of {self.to:g} m/s", "use zero or more", "to")
-        _check_length(self.duration)
+            raise unfit(f"a speed of {self.to:g} m/s", "use zero or more", "to")
+        check_length(self.duration)
         greatest = _PEAK * abs(self.to - course.speed_now) / self.duration
         if greatest > course.limits.acceleration:
             least = self.duration * greatest / course.limits.acceleration
-            raise _unfit(
+            raise unfit(
                 f"from {course.speed_now:g} to {self.to:g} m/s in {self.duration:g} s takes up to "
                 f"{greatest:.3g} m/s², more than the {course.limits.acceleration:g} m/s² allowed",
                 f"take at least {least:.3g} s",
@@ -132,7 +51,7 @@ class Brake(Accelerate):
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         if self.to >= course.speed_now:
-            raise _unfit(
+            raise unfit(
                 f"to brake from {course.speed_now:g} to {self.to:g} m/s",
                 "let the vehicle move faster before, or accelerate",
                 "to",
@@ -151,7 +70,7 @@ class Stop:
         """Add it to a course."""
         Brake(0.0, self.braking).lay(course)
         if not 0.0 <= self.stay < math.inf:
-            raise _unfit(f"it is {self.stay:g}", "use zero or more", "stay")
+            raise unfit(f"it is {self.stay:g}", "use zero or more", "stay")
         course.time += self.stay
 
 
@@ -163,7 +82,7 @@ class Straight:
 
     def lay(self, course: Course) -> None:
         """Add it to a course."""
-        _check_length(self.duration)
+        check_length(self.duration)
         course.time += self.duration
 
 
@@ -175,7 +94,7 @@ class Along:
 
     def lay(self, course: Course) -> None:
         """Add it to a course."""
-        _check_length(self.distance, "distance")
+        check_length(self.distance, "distance")
         course.time += self.distance / course.moving_speed("a distance")
 
 
@@ -193,11 +112,11 @@ class Turn:
 
     def lay(self, course: Course) -> None:
         """Add it to a course."""
-        _check_length(self.radius, "radius")
+        check_length(self.radius, "radius")
         speed, most = course.level_speed("a turn"), course.limits.lateral
         lateral = speed * speed / self.radius
         if lateral > most:
-            raise _unfit(
+            raise unfit(
                 f"{speed:.4g} m/s on a radius of {self.radius:g} m take {lateral:.3g} m/s² to the "
                 f"side, more than the {most:g} m/s² allowed",
                 f"use a radius of at least {speed * speed / most:.3g} m, or at most "
@@ -219,7 +138,7 @@ class BankedTurn:
         """Add it to a course."""
         most = course.limits.bank_deg
         if not 0.0 < self.bank_deg <= most:
-            raise _unfit(
+            raise unfit(
                 f"a bank of {self.bank_deg:g} deg",
                 f"use more than zero and at most {most:g} deg; the sign of the angle says where",
                 "bank",
@@ -241,20 +160,20 @@ class Climb:
         """Add it to a course."""
         most = course.limits.climb_deg
         if not 0.0 < abs(self.angle_deg) <= most:
-            raise _unfit(
+            raise unfit(
                 f"a climb at {self.angle_deg:g} deg",
                 f"use more than zero and at most {most:g} deg",
                 "angle",
             )
         speed = course.moving_speed("a climb")
-        _check_length(self.ramp, "ramp")
+        check_length(self.ramp, "ramp")
         if self.height is None:
             course.move(course.climb, course.time, self.ramp, self.angle_deg)
             course.time += self.ramp
             return
-        _check_length(self.height, "height")
+        check_length(self.height, "height")
         if course.climb_now != 0.0:
-            raise _unfit(
+            raise unfit(
                 "a climb by a height begins level, and the vehicle climbs already",
                 "let `level` come before it",
                 "height",
@@ -265,7 +184,7 @@ class Climb:
         ramps = speed * self.ramp * float(w @ rising)
         hold = (self.height - ramps) / (speed * math.sin(math.radians(steep)))
         if hold < 0.0:
-            raise _unfit(
+            raise unfit(
                 f"the two ramps of {self.ramp:g} s alone gain {ramps:.4g} m, more than the "
                 f"{self.height:g} m wanted",
                 "use a smaller angle, a shorter ramp or a greater height",
@@ -284,7 +203,7 @@ class Level:
 
     def lay(self, course: Course) -> None:
         """Add it to a course."""
-        _check_length(self.ramp, "ramp")
+        check_length(self.ramp, "ramp")
         course.move(course.climb, course.time, self.ramp, 0.0)
         course.time += self.ramp
 
@@ -298,7 +217,7 @@ class LaneChange:
 
     def lay(self, course: Course) -> None:
         """Add it to a course."""
-        _check_length(self.duration)
+        check_length(self.duration)
         speed, most = course.level_speed("a lane change"), course.limits.lateral
         quarter = 0.25 * self.duration
         times = tuple(quarter * k for k in range(5))
@@ -315,7 +234,7 @@ class LaneChange:
         steepest = math.radians(60.0) / float(turned.max())
         rate = _solve(reached, abs(self.offset), steepest)
         if rate is None or speed * math.radians(rate) > most:
-            raise _unfit(
+            raise unfit(
                 f"{self.offset:g} m to the side in {self.duration:g} s at {speed:.4g} m/s take "
                 f"more than the {most:g} m/s² allowed to the side",
                 "give it more time",
@@ -327,54 +246,10 @@ class LaneChange:
         course.time += self.duration
 
 
-def lay_course(
-    manoeuvres: Sequence[tuple[str, Manoeuvre]], speed: float, limits: Limits
-) -> tuple[float, Track, Track, Track]:
-    """Lay manoeuvres one after another.
-
-    Parameters
-    ----------
-    manoeuvres : sequence of (str, Manoeuvre)
-        Each with its name for messages.
-    speed : float, m/s
-        At time zero, along the path.
-    limits : Limits
-
-    Returns
-    -------
-    duration : float, s
-    speed, turn_rate, climb : Track
-        m/s, deg/s, deg; from time zero.
-
-    Raises
-    ------
-    ConfigError
-        There is none, or one cannot be done; the message says which, counted from 1.
-    """
-    if not 0.0 <= speed < math.inf:
-        raise ConfigError(
-            f"a vehicle cannot begin with {speed:g} m/s",
-            quantity="speed",
-            remedy="use zero or more",
-        )
-    if not manoeuvres:
-        raise ConfigError("there is none", quantity="manoeuvres", remedy="name at least one")
-    course = Course(limits, [(0.0, speed)])
-    for number, (name, manoeuvre) in enumerate(manoeuvres, start=1):
-        try:
-            manoeuvre.lay(course)
-        except ConfigError as error:
-            f = error.finding
-            raise ConfigError(
-                f.what, quantity=f"manoeuvre {number}, {name}, {f.quantity}", remedy=f.remedy
-            ) from None
-    return course.time, _track(course.speed), _track(course.turn_rate), _track(course.climb)
-
-
 def _turn(course: Course, angle: float, rate: float, ramp: float) -> None:
     if not (math.isfinite(angle) and angle != 0.0):
-        raise _unfit(f"a turn by {angle:g} deg", "give an angle other than zero", "angle")
-    _check_length(ramp, "ramp")
+        raise unfit(f"a turn by {angle:g} deg", "give an angle other than zero", "angle")
+    check_length(ramp, "ramp")
     whole = abs(angle) / rate
     ramp = min(ramp, whole)
     side = math.copysign(rate, angle)
@@ -391,17 +266,3 @@ def _solve(reached: Callable[[float], float], wanted: float, highest: float) -> 
     if reached(highest) < wanted:
         return None
     return float(brentq(lambda r: reached(r) - wanted, 0.0, highest, xtol=1e-14))
-
-
-def _track(points: list[tuple[float, float]]) -> Track:
-    times, values = zip(*points, strict=True)
-    return Track(times, values)
-
-
-def _check_length(value: float, name: str = "duration") -> None:
-    if not 0.0 < value < math.inf:
-        raise _unfit(f"it is {value:g}", "use a number above zero", name)
-
-
-def _unfit(what: str, remedy: str, quantity: str) -> ConfigError:
-    return ConfigError(what, quantity=quantity, remedy=remedy)

@@ -106,17 +106,10 @@ class PathMotion(EarthMotion):
 
     def kinematics(self, time: Array) -> Kinematics:
         """State at instants; as `EarthMotion.kinematics`."""
-        speed, d_speed, dd_speed = self.speed.evaluate(time)
-        climb, d_climb, _ = self.climb.evaluate(time)
-        turn, d_turn, _ = self.turn_rate.evaluate(time)
-        course = self._course(time)
-        velocity, acceleration = self._moving(time)
-        slope, d_slope, swing = np.radians(climb), np.radians(d_climb), np.radians(turn)
-        d_swing = np.radians(d_turn)
+        path = self._path(time)
         # What is felt sideways, and how it changes.
-        level = speed * np.cos(slope)
-        d_level = d_speed * np.cos(slope) - speed * np.sin(slope) * d_slope
-        lateral, d_lateral = level * swing, d_level * swing + level * d_swing
+        lateral = path.level * path.swing
+        d_lateral = path.d_level * path.swing + path.level * path.d_swing
         roll, d_roll = self.roll_deg - self.sway_roll * lateral, -self.sway_roll * d_lateral
         if self.coordinated:
             part, d_part = lateral / STANDARD_GRAVITY, d_lateral / STANDARD_GRAVITY
@@ -126,54 +119,81 @@ class PathMotion(EarthMotion):
         yawing = sum_waves(self.heading_waves, time)
         angles = [
             roll + rolling[0],
-            climb + self.attack_deg + self.sway_pitch * d_speed + pitching[0],
-            course + yawing[0],
+            path.climb + self.attack_deg + self.sway_pitch * path.d_speed + pitching[0],
+            path.course + yawing[0],
         ]
         rates = [
             d_roll + rolling[1],
-            d_climb + self.sway_pitch * dd_speed + pitching[1],
-            turn + yawing[1],
+            path.d_climb + self.sway_pitch * path.dd_speed + pitching[1],
+            path.turn + yawing[1],
         ]
         turned, turning = np.column_stack(angles), np.column_stack(rates)
         return Kinematics(
             self._moved(time),
-            velocity,
-            acceleration,
+            path.velocity,
+            path.acceleration,
             euler_attitude(turned, (1.0, 0.0, 0.0, 0.0)),
             euler_body_rate(turned, turning),
+            turned,
         )
 
-    def _course(self, time: Array) -> Array:
-        return self.heading_deg + integrate_track(self.turn_rate, time)
-
-    def _moving(self, time: Array) -> tuple[Array, Array]:
-        """Velocity and its derivative, north-east-down."""
-        speed, d_speed, _ = self.speed.evaluate(time)
-        climb, d_climb, _ = (np.radians(x) for x in self.climb.evaluate(time))
-        d_course, course = np.radians(self.turn_rate.evaluate(time)[0]), self._course(time)
-        # Whole turns are taken away in degrees, where they have no rounding.
-        course = np.radians(course - 360.0 * np.rint(course / 360.0))
+    def _path(self, time: Array) -> _Path:
+        speed, d_speed, dd_speed = self.speed.evaluate(time)
+        climb, d_climb, _ = self.climb.evaluate(time)
+        turn, d_turn, _ = self.turn_rate.evaluate(time)
+        course = self.heading_deg + integrate_track(self.turn_rate, time)
         _, heave, d_heave = sum_waves(self.heave_waves, time)
-        north, east = np.cos(course), np.sin(course)
-        flat, up = speed * np.cos(climb), speed * np.sin(climb)
-        d_flat = d_speed * np.cos(climb) - up * d_climb
-        d_up = d_speed * np.sin(climb) + flat * d_climb
-        velocity = np.column_stack([flat * north, flat * east, heave - up])
-        acceleration = np.column_stack(
-            [
-                d_flat * north - flat * east * d_course,
-                d_flat * east + flat * north * d_course,
-                d_heave - d_up,
-            ]
+        slope, d_slope, swing = np.radians(climb), np.radians(d_climb), np.radians(turn)
+        # Whole turns are taken away in degrees, where they have no rounding.
+        angle = np.radians(course - 360.0 * np.rint(course / 360.0))
+        north, east, flat, steep = np.cos(angle), np.sin(angle), np.cos(slope), np.sin(slope)
+        level, up = speed * flat, speed * steep
+        d_level, d_up = d_speed * flat - up * d_slope, d_speed * steep + level * d_slope
+        velocity = [level * north, level * east, heave - up]
+        acceleration = [
+            d_level * north - level * east * swing,
+            d_level * east + level * north * swing,
+            d_heave - d_up,
+        ]
+        return _Path(
+            d_speed,
+            dd_speed,
+            climb,
+            d_climb,
+            turn,
+            course,
+            level,
+            d_level,
+            swing,
+            np.radians(d_turn),
+            np.column_stack(velocity),
+            np.column_stack(acceleration),
         )
-        return velocity, acceleration
 
     @cached_property
     def _moved(self) -> PlaceIntegral:
         def velocity(time: Array) -> Array:
-            return self._moving(time)[0]
+            return self._path(time).velocity
 
         return integrate_velocity(velocity, self.breaks, self.origin, self.ellipsoid)
+
+
+@dataclass(frozen=True)
+class _Path:
+    """What the tracks give: deg in climb, turn and course, rad/s in swing; level is a speed."""
+
+    d_speed: Array
+    dd_speed: Array
+    climb: Array
+    d_climb: Array
+    turn: Array
+    course: Array
+    level: Array
+    d_level: Array
+    swing: Array
+    d_swing: Array
+    velocity: Array
+    acceleration: Array
 
 
 def rocking_stand(

@@ -89,7 +89,7 @@ class SineVelocityMotion(EarthMotion):
         dv = omega * np.asarray(self.amplitude) * np.cos(self._phase(time))
         turned, turning = along_velocity(v, dv)
         q_nb = euler_attitude(turned, (1.0, 0.0, 0.0, 0.0))
-        return Kinematics(self._moved(time), v, dv, q_nb, euler_body_rate(turned, turning))
+        return Kinematics(self._moved(time), v, dv, q_nb, euler_body_rate(turned, turning), turned)
 
     def _phase(self, time: Array) -> Array:
         # Whole periods are taken away without rounding, so that late phases are as good as early.

@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.exceptions import ConfigError
@@ -17,64 +17,17 @@ from strapdown.simulation.earth_motion import MOST_NORTHERN, EarthMotion, Kinema
 from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_attitude import along_velocity
 from strapdown.simulation.path_motion import MOST_PITCH
+from strapdown.simulation.quintic_spline import Spline, quintic
 from strapdown.tables import EULER, GEODETIC, check_trajectory
 
 Array = NDArray[np.float64]
 
-_DEGREE = 5  # continuous to the fourth derivative
 # Looks between two knots for what a spline does there.
 _LOOKS = 16
 # Part of the greatest horizontal speed under which a path has no direction.
 _LEAST = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class Spline:
-    """Quintic spline of m coordinates: knots (p + 1,), coefficients (p, 6, m)."""
-
-    knots: Array
-    coefficients: Array
-
-    def __call__(self, time: Array) -> tuple[Array, Array, Array]:
-        """Value and first two derivatives, (n, m) each."""
-        from strapdown._kernels.piecewise import polynomials
-
-        shape = (time.size, self.coefficients.shape[2])
-        value, first, second = np.empty(shape), np.empty(shape), np.empty(shape)
-        polynomials(self.knots, self.coefficients, time, value, first, second)
-        return value, first, second
-
-
-def quintic(time: ArrayLike, values: ArrayLike) -> Spline:
-    """Spline of the fifth degree through values, whose third and fourth derivatives end at zero.
-
-    Parameters
-    ----------
-    time : array_like, (n,), s
-        Two or more, rising.
-    values : array_like, (n, m)
-
-    Returns
-    -------
-    Spline
-        With continuous fourth derivative: of all curves through the values the one of least mean
-        square third derivative. Two values give a straight line.
-    """
-    from scipy.interpolate import make_interp_spline
-
-    t, rows = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    zero = np.zeros(rows.shape[1])
-    if len(t) == 2:
-        slope = (rows[1] - rows[0]) / (t[1] - t[0])
-        coefficients = np.zeros((1, _DEGREE + 1, rows.shape[1]))
-        coefficients[0, -2], coefficients[0, -1] = slope, rows[0]
-        return Spline(t, coefficients)
-    ends = [(3, zero), (4, zero)]
-    spline = make_interp_spline(t, rows, k=_DEGREE, bc_type=(ends, ends))  # type: ignore[arg-type]
-    knots = np.unique(spline.t)
-    # Taylor coefficients at the left of each piece, highest power first.
-    powers = [spline(knots[:-1], nu=k) / math.factorial(k) for k in range(_DEGREE, -1, -1)]
-    return Spline(knots, np.ascontiguousarray(np.stack(powers, axis=1)))
+# Cosine of the turn from one look to the next over which a path turns back.
+_BEND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +135,8 @@ class SplineMotion(EarthMotion):
         else:
             angles, rates, _ = self._turn(time)
         q_nb = euler_attitude(angles, (1.0, 0.0, 0.0, 0.0))
-        return Kinematics(moved, velocity, acceleration, q_nb, euler_body_rate(angles, rates))
+        turning = euler_body_rate(angles, rates)
+        return Kinematics(moved, velocity, acceleration, q_nb, turning, angles)
 
     @cached_property
     def _course(self) -> Spline:
@@ -228,13 +182,17 @@ class SplineMotion(EarthMotion):
                 remedy="go slower there, or give more places around the bend",
             )
         level = np.hypot(velocity[:, 0], velocity[:, 1])
-        slowest = int(np.argmin(level))
-        if self.euler is None and level[slowest] <= _LEAST * level.max():
-            raise ConfigError(
-                f"the path stops or turns back at {looks[slowest]:.4g} s, and has no heading there",
-                quantity="place",
-                remedy="give places that lead round the bend",
-            )
+        if self.euler is None:
+            along = np.sum(velocity[:-1, :2] * velocity[1:, :2], axis=1)
+            lost = level <= _LEAST * level.max()
+            lost[:-1] |= along < _BEND * level[:-1] * level[1:]
+            if lost.any():
+                raise ConfigError(
+                    f"the path stops or turns back at {looks[np.argmax(lost)]:.4g} s, and has no "
+                    "heading there",
+                    quantity="place",
+                    remedy="give places that lead round the bend",
+                )
         if self.euler is None:
             pitch = np.degrees(np.arctan2(np.abs(velocity[:, 2]), level))
             _check_pitch(pitch, looks)

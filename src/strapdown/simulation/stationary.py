@@ -50,9 +50,9 @@ class StationaryMotion(EarthMotion):
     def kinematics(self, time: Array) -> Kinematics:
         """The same at every instant; as `EarthMotion.kinematics`."""
         still = np.zeros((time.size, 3))
-        angles = (self.roll_deg, self.pitch_deg, self.heading_deg)
+        angles = np.array([self.roll_deg, self.pitch_deg, self.heading_deg])
         q_nb = np.tile(rotation.quaternion_from_euler(angles), (time.size, 1))
-        return Kinematics(still, still, still, q_nb, still)
+        return Kinematics(still, still, still, q_nb, still, np.tile(angles, (time.size, 1)))
 
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero; (n, 3), rad: the constant rate, times time."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.simulation.course import Limits, Manoeuvre, lay_course
 from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.manoeuvres import Limits, Manoeuvre, lay_course
 from strapdown.simulation.path_motion import PathMotion
 from strapdown.simulation.waves import Wave
 
@@ -55,7 +55,7 @@ def car(
     Raises
     ------
     ConfigError
-        As `manoeuvres.lay_course` and `PathMotion`.
+        As `course.lay_course` and `PathMotion`.
     """
     return replace(
         _laid(origin, manoeuvres, heading_deg, speed, limits, ellipsoid),

@@ -58,7 +58,7 @@ def through_waypoints(
     if same.size:
         k = int(same[0])
         raise ConfigError(
-            f"it is where place {k + 1} is",
+            "it is where the one before it is",
             quantity=f"place {k + 2}",
             remedy="leave it out: a path through it has no heading there",
         )

@@ -27,6 +27,7 @@ from strapdown.simulation import (
     through_waypoints,
 )
 from strapdown.simulation import manoeuvres as steps
+from strapdown.simulation.course import Manoeuvre
 from strapdown.simulation.vehicles import LIMITS
 
 # How fast a turn or a climb comes and goes where nothing is said, s.
@@ -35,6 +36,8 @@ CLIMB_RAMP = 3.0
 
 # Quantities of the simulation, as a file has them.
 _KEYS = {
+    "acceleration": "most_acceleration_m_per_s2",
+    "place": "waypoints",
     "angle": "angle_deg",
     "bank": "bank_deg",
     "distance": "distance_m",
@@ -177,10 +180,10 @@ def _vehicle(
     )
 
 
-def _step(spec: motions.Step, ramp: float) -> tuple[str, steps.Manoeuvre]:
+def _step(spec: motions.Step, ramp: float) -> tuple[str, Manoeuvre]:
     """One manoeuvre with its name."""
     side = -1.0 if spec.do in ("turn_left", "descend") else 1.0
-    step: steps.Manoeuvre
+    step: Manoeuvre
     if isinstance(spec, motions.SpeedSpec):
         change = steps.Brake if spec.do == "brake" else steps.Accelerate
         step = change(spec.to_m_per_s, spec.duration_s)

@@ -10,12 +10,6 @@ import pytest
 
 from strapdown import rotation
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.evaluation.earth_centred import (
-    ecef_from_geodetic,
-    geodetic_from_ecef,
-    place_difference,
-    q_ne,
-)
 from strapdown.evaluation.trajectory_at import interpolation_cost, trajectory_at
 from strapdown.evaluation.trajectory_differences import (
     ROTATION_ERROR,
@@ -23,6 +17,12 @@ from strapdown.evaluation.trajectory_differences import (
 )
 from strapdown.evaluation.trajectory_summary import summarise_differences
 from strapdown.exceptions import DataError
+from strapdown.frames import (
+    ecef_from_geodetic,
+    geodetic_from_ecef,
+    place_difference,
+    q_ne,
+)
 from strapdown.tables import EULER, NED, TRAJECTORY_ERROR, VELOCITY, trajectory_table
 
 _spec = importlib.util.spec_from_file_location(

@@ -14,13 +14,13 @@ import pytest
 
 from strapdown import rotation
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.evaluation.earth_centred import ecef_from_geodetic
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats.date_line import cut_at_date_line
 from strapdown.formats.trajectory_csv import write_error_csv
 from strapdown.formats.trajectory_thinning import thin
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
+from strapdown.frames import ecef_from_geodetic
 from strapdown.tables import trajectory_table
 
 _spec = importlib.util.spec_from_file_location(

@@ -156,6 +156,16 @@ def test_rest_reads_the_earth(lat, ellipsoid):
     row = motion.trajectory([0.0]).iloc[0]
     assert (row[["lat", "lon", "alt"]] == [lat, 151.0, 20.0]).all()
     assert (row[["VN", "VE", "VD"]] == 0.0).all()
+    assert (row[["roll", "pitch", "heading"]] == [10.0, -20.0, 30.0]).all()
+
+
+def test_angles_over_their_range_are_those_of_the_attitude():
+    motion = StationaryMotion(1.0, Origin(10.0, 20.0), 200.0, 100.0, -30.0)
+    row = motion.trajectory([0.0]).iloc[0]
+    # Over the top: roll and heading by half a turn, pitch back from 100 to 80 deg.
+    assert np.allclose(row[["roll", "pitch", "heading"]], [20.0, 80.0, 150.0], atol=1e-12)
+    turned = StationaryMotion(1.0, Origin(10.0, 20.0), 0.0, 0.0, -1e-20)
+    assert turned.trajectory([0.0]).iloc[0]["heading"] == 0.0
 
 
 def test_a_stop_has_no_heading():
