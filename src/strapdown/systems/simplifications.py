@@ -20,9 +20,10 @@ from strapdown.mechanization import Mechanization, NorthEastDown, Tadic, run_mec
 from strapdown.nav_state import NavState
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
+from strapdown.simulation.course import Manoeuvre
 from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.imu import simulate_imu
-from strapdown.simulation.manoeuvres import Accelerate, Manoeuvre, Stop, Straight, Turn
+from strapdown.simulation.manoeuvres import Accelerate, Stop, Straight, Turn
 from strapdown.simulation.pulse_motion import PulseMotion
 from strapdown.simulation.sine_velocity import SineVelocityMotion
 from strapdown.simulation.vehicles import car
