@@ -83,8 +83,8 @@ def chart() -> Chart:
         "",
         "time, s",
         (
-            panel(crash, "a crash", np.geomspace(0.02, 0.75, POINTS), 1e-7),
-            panel(minute, "20 m/s, straight", np.geomspace(0.5, 120.0, POINTS), 1e-7),
+            panel(crash, "a crash", np.geomspace(0.02, 0.75, POINTS), 3e-6),
+            panel(minute, "20 m/s, straight", np.geomspace(0.05, 120.0, POINTS), 1e-7),
         ),
         log_x=True,
         beside=True,
