@@ -162,26 +162,30 @@ def ned_step(
     me = half * ve + 0.5 * se - twelfth * ue + sixth * (on * vd - od * vn)
     md = half * vd + 0.5 * sd - twelfth * ud + sixth * (gd - on * ve)
 
-    # Gravity at the mean place; the second term of the rise is the fall of the level's surface.
+    # Gravity at the mean place. Of the rise the first term is the fall of the level's surface, the
+    # last what the Earth turns while the body moves: height is that over the Earth.
     to_north = mn * curvature
     to_east = me * parallel * c
-    rise = 2.0 * THIRD * (mn * to_north + me * to_east) - md
-    gn += to_north * gn_lat + rise * gn_alt
-    gd += to_north * gd_lat + rise * (gd_alt + rise * gd_alt2)
+    rise = 2.0 * THIRD * (mn * to_north + me * to_east) - md + sixth * on * ve
+    more_n = to_north * gn_lat + rise * gn_alt
+    more_d = to_north * gd_lat + rise * (gd_alt + rise * gd_alt2)
+    gn += more_n
+    gd += more_d
     # Mean turn z of the level, and gravity turned by it: g + z x (g + 2/3 z x g), because the
-    # mean square of a turn at constant rate is 4/3 of the squared mean. Twice integrated the turn
-    # counts for a third instead of a half; and g changes with height.
+    # mean square of a turn at constant rate is 4/3 of the squared mean. Of the level's own turn
+    # about the vertical only north takes part: down, by which the rest is, stays where it is.
+    # Twice integrated, what grows with time counts for a third instead of a half.
     zn = half * on + to_east
     ze = -to_north
-    zd = half * od - me * parallel * s
+    zd = half * od
     two_thirds = 2.0 * THIRD * gd
     tn = ze * gd + two_thirds * zn * zd
-    te = zd * gn - zn * gd + two_thirds * ze * zd
+    te = (zd - me * parallel * s) * gn - zn * gd + two_thirds * ze * zd
     td = -ze * gn - two_thirds * (zn * zn + ze * ze)
     dt2 = dt * dt
-    rn = dt * (vn + od * me) + sn + dt2 * (0.5 * gn + THIRD * tn)
+    rn = dt * (vn + od * me) + sn + dt2 * (0.5 * gn - SIXTH * more_n + THIRD * tn)
     re = dt * (ve + on * md - od * mn) + se + dt2 * THIRD * te
-    rd = dt * (vd - on * me) + sd + dt2 * (0.5 * gd + THIRD * td + twelfth * gd_alt * vd)
+    rd = dt * (vd - on * me) + sd + dt2 * (0.5 * gd - SIXTH * more_d + THIRD * td)
     # The Earth's rate times the displacement.
     xn, xe, xd = -od * re, od * rn - on * rd, on * re
     wn = vn + un + dt * (gn + tn) - xn

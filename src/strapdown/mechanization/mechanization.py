@@ -84,6 +84,13 @@ class Mechanization(ABC):
                     quantity=name,
                     remedy="choose a value in that range",
                 )
+        lowest, highest = self.height_limits
+        if not lowest < highest:
+            raise ConfigError(
+                f"between {lowest:g} and {highest:g} there is no height",
+                quantity="height_limits",
+                remedy="give the lowest and then the highest",
+            )
 
     @abstractmethod
     def begin(self, start: NavState) -> Array:
@@ -170,7 +177,8 @@ class Mechanization(ABC):
             The state has left the range in which this mechanization means anything, or is too
             near a pole; the first step for which this is so is named.
         DataError
-            `heights` is missing where the height is damped, or has another length.
+            `heights` is missing where the height is damped, or given where it is not, or infinite, or
+            of another length.
         """
         rows = values_of(increments, MOTION)
         history = np.empty((len(rows), ROW))
@@ -235,7 +243,13 @@ class Mechanization(ABC):
 
     def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
         if self.height != "damped":
-            return np.empty(0)
+            if heights is None:
+                return np.empty(0)
+            raise DataError(
+                f"there are heights to damp by, and the height is '{self.height}'",
+                quantity="heights",
+                remedy="use height='damped', or leave them out",
+            )
         if heights is None:
             raise DataError(
                 "the height is to be damped, and there is no reference for it",
@@ -248,6 +262,13 @@ class Mechanization(ABC):
                 f"its shape is {reference.shape}, and there are {steps} steps",
                 quantity="heights",
                 remedy="give one height in m for every step, NaN where there is none",
+            )
+        if np.isinf(reference).any():
+            raise DataError(
+                "it is infinite",
+                row=int(np.argmax(np.isinf(reference))) + 1,
+                quantity="heights",
+                remedy="give heights in m, NaN where there is none",
             )
         return reference
 

@@ -159,7 +159,10 @@ def navigate_segments(
     """
     state = mechanization.begin(start)
     kept: pd.DataFrame | None = None
+    begun = False
     for segment in segments:
+        if segment.empty:
+            continue
         # Two samples back: the step before tells how a mean rate changes over the next.
         joined = segment
         if kept is not None:
@@ -169,10 +172,11 @@ def navigate_segments(
             kept = joined
             continue
         increments = motion_increments(joined)
-        if kept is None:
+        if not begun:
             begin = float(increments.index[0] - increments["dt"].iloc[0])
             _check_start(start, begin, increments)
-        elif len(kept) == 2:
+            begun = True
+        else:
             increments = increments.iloc[1:]
         _check_steps(increments, longest_step)
         state, history = mechanization.advance(state, increments)

@@ -1,0 +1,56 @@
+"""Motion increments of a motion on the Earth, exact to rounding, and how far a result is off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.nav_state import NavState
+from strapdown.tables import TRAJECTORY_ERROR, motion_increments_table
+
+
+def inertial_attitude(motion, time):
+    """Body to axes that do not turn, and are those of the Earth at time zero; (n, 4)."""
+    k = motion.kinematics(np.ascontiguousarray(time))
+    lat, lon, _ = motion.origin.place(k.moved).T
+    about_axis = 0.5 * (lon + motion.ellipsoid.rotation_rate * np.asarray(time))
+    tilt = -0.5 * (0.5 * np.pi + lat)
+    zero = np.zeros(len(lat))
+    turned = np.column_stack([np.cos(about_axis), zero, zero, np.sin(about_axis)])
+    level = np.column_stack([np.cos(tilt), zero, np.sin(tilt), zero])
+    return rotation.compose(rotation.compose(turned, level), k.q_nb)
+
+
+def exact_increments(motion, time, nodes=20):
+    """MotionIncrements table between the instants `time`.
+
+    The turn is that of the exact attitudes; velocity and distance are ``int C f dt`` and
+    ``int (end - t) C f dt``, by Gauss and Legendre, which is exact here: what is integrated
+    changes little within a step, and the error falls as the power 2 * nodes of that.
+    """
+    time = np.asarray(time, dtype=np.float64)
+    dt = np.diff(time)
+    at_stamps = inertial_attitude(motion, time)
+    back = rotation.conjugate(at_stamps[:-1])
+    phi = rotation.rotation_vector_from_quaternion(rotation.compose(back, at_stamps[1:]))
+    dv, dr = np.zeros((2, len(dt), 3))
+    for x, w in zip(*np.polynomial.legendre.leggauss(nodes), strict=True):
+        at = time[:-1] + 0.5 * (1.0 + x) * dt
+        turn = rotation.compose(back, inertial_attitude(motion, at))
+        force = rotation.rotate(turn, motion.specific_force(at))
+        dv += (0.5 * w * dt)[:, None] * force
+        dr += (0.5 * w * dt * (time[1:] - at))[:, None] * force
+    return motion_increments_table(time[1:], dt, phi, dv, dr)
+
+
+def start_of(motion):
+    """State of a motion at time zero."""
+    return NavState.from_trajectory(motion.trajectory(np.zeros(1)))
+
+
+def errors(run, motion) -> pd.DataFrame:
+    """Estimate minus truth at every state of a run: m, m/s, deg."""
+    truth = motion.trajectory(run.time)
+    return trajectory_differences(run.trajectory, truth, motion.ellipsoid)[TRAJECTORY_ERROR]
