@@ -21,18 +21,20 @@ from strapdown._kernels.rotation import dcm_from_quat, quat_from_rotvec, quat_mu
 
 # Places in the state: radians, m, m/s, quaternion body to level, sine and cosine of the latitude
 # (turned with the level from step to step, which spares computing them), the radius of the prime
-# vertical over a, and the sum of the vertical loop, m s.
-LAT, LON, ALT, V, Q, SINE, COSINE, PRIME, SUM = 0, 1, 2, 3, 6, 10, 11, 12, 13
-STATE = 14
+# vertical over a, the downward acceleration that the vertical loop has found, m/s², and the time
+# since its last reference, s.
+LAT, LON, ALT, V, Q, SINE, COSINE, PRIME, PULL, SINCE = 0, 1, 2, 3, 6, 10, 11, 12, 13, 14
+STATE = 15
 # The part of the state that is kept of every step.
 ROW = 10
 
-# What becomes of the height, and the places of the choice and its gains.
+# What becomes of the height, and the places of the choice, the time constant of its loop, and the
+# change of gravity with height, 1/s².
 FREE, HELD, DAMPED = 0.0, 1.0, 2.0
-MODE, GAIN_1, GAIN_2, GAIN_3 = 0, 1, 2, 3
+MODE, TAU, SPRING = 0, 1, 2
 # Limits: cosine of the latitude, turn of the level about the vertical in one step, speed, heights.
-COS_LATITUDE, SPEED, LOWEST, HIGHEST = 4, 5, 6, 7
-OPTIONS = 8
+COS_LATITUDE, SPEED, LOWEST, HIGHEST = 3, 4, 5, 6
+OPTIONS = 7
 # A step that takes a larger part of the way around the pole is beyond the series of `displace`.
 LARGEST_TURN = 0.01
 
@@ -237,16 +239,29 @@ def ned_step(
 
 
 @njit(cache=True, inline="always")
-def guide_height(alt, vd, total, before, reference, dt, mode, gain_1, gain_2, gain_3):
-    """Height, down velocity and the loop's sum after a step, as the height is guided."""
+def guide_height(alt, vd, pull, since, before, reference, dt, mode, tau, spring):
+    """Height, down velocity and the loop's memory after a step, as the height is guided.
+
+    The loop is closed over the time since the reference before, however many steps that was,
+    with the gains of the fading memory of second degree, whose three poles are at exp(-time/tau)
+    whatever that time is: `1 - q³, 3/2 (1 - q)² (1 + q), (1 - q)³` of height, velocity times
+    time, acceleration times its square (Morrison 1969, ch. 13). For short times these are 3/tau,
+    3/tau², 1/tau³ times it. `spring` holds what gravity gives away with height.
+    """
     if mode == HELD:
-        return before, 0.0, total
-    if mode == DAMPED and not math.isnan(reference):
-        ahead = alt - reference
-        total += ahead * dt
-        vd += (gain_2 * ahead + gain_3 * total) * dt
-        alt -= gain_1 * ahead * dt
-    return alt, vd, total
+        return before, 0.0, pull, since
+    if mode == DAMPED:
+        vd += pull * dt
+        since += dt
+        if not math.isnan(reference):
+            ahead = alt - reference
+            q = math.exp(-since / tau)
+            part = 1.0 - q
+            alt -= (1.0 - q * q * q) * ahead
+            vd += (1.5 * part * part * (1.0 + q) / since + spring * min(since, tau)) * ahead
+            pull += part * part * part / (since * since) * ahead
+            since = 0.0
+    return alt, vd, pull, since
 
 
 @njit(cache=True, inline="always")
@@ -275,11 +290,11 @@ def ned_advance(state, increments, reference, earth, options, history):
     lat, lon, alt, vn, ve, vd = state[0], state[1], state[2], state[3], state[4], state[5]
     qw, qx, qy, qz = state[6], state[7], state[8], state[9]
     s, c, w = state[SINE], state[COSINE], state[PRIME]
-    total = state[SUM]
+    pull, since = state[PULL], state[SINCE]
     a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
     rate, f, m = earth[4], earth[5], earth[6]
-    mode, gain_1, gain_2, gain_3 = options[0], options[1], options[2], options[3]
-    limit, speed, lowest, highest = options[4], options[5], options[6], options[7]
+    mode, tau, spring = options[0], options[1], options[2]
+    limit, speed, lowest, highest = options[3], options[4], options[5], options[6]
     steps = increments.shape[0]
     why = DONE
     made = steps
@@ -322,8 +337,8 @@ def ned_advance(state, increments, reference, earth, options, history):
             height = math.nan
             if reference.shape[0] > 0:
                 height = reference[i]
-            alt, vd, total = guide_height(
-                alt, vd, total, before, height, dt, mode, gain_1, gain_2, gain_3
+            alt, vd, pull, since = guide_height(
+                alt, vd, pull, since, before, height, dt, mode, tau, spring
             )
         why = verdict(alt, vn, ve, vd, qw, c, turn, limit, speed, lowest, highest)
         if why != DONE:
@@ -332,7 +347,8 @@ def ned_advance(state, increments, reference, earth, options, history):
         history[i, 0], history[i, 1], history[i, 2] = lat, lon, alt
         history[i, 3], history[i, 4], history[i, 5] = vn, ve, vd
         history[i, 6], history[i, 7], history[i, 8], history[i, 9] = qw, qx, qy, qz
-        state[SINE], state[COSINE], state[PRIME], state[SUM] = s, c, w, total
+        state[SINE], state[COSINE], state[PRIME] = s, c, w
+        state[PULL], state[SINCE] = pull, since
     if made > 0:
         for j in range(ROW):
             state[j] = history[made - 1, j]

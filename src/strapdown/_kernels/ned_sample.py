@@ -6,13 +6,13 @@ from numba import njit
 
 from strapdown._kernels.increments import LARGEST
 from strapdown._kernels.motion_increments import linear_motion, mean_motion
-from strapdown._kernels.ned import DONE, FREE, SUM, guide_height, ned_step, verdict
+from strapdown._kernels.ned import DONE, FREE, PULL, SINCE, guide_height, ned_step, verdict
 from strapdown._kernels.ned import STATE as WIDTH
 
 # One float64 array holds everything between calls, because every further argument of a compiled
 # function costs more than a part of the step: stamp, samples so far, whether samples are means,
 # length of the step before, the last sample, the Earth, the options, the state.
-TIME, SAMPLES, MEAN, BEFORE, RATE, FORCE, EARTH, OPTIONS, STATE = 0, 1, 2, 3, 4, 7, 10, 17, 25
+TIME, SAMPLES, MEAN, BEFORE, RATE, FORCE, EARTH, OPTIONS, STATE = 0, 1, 2, 3, 4, 7, 10, 17, 24
 SIZE = STATE + WIDTH
 
 # What an update answers besides `DONE`, `POLE` and `DIVERGED` of the step.
@@ -109,17 +109,18 @@ def ned_update(r, time, gyro, accel, reference):
             r[e + 5],
             r[e + 6],
         )
-        total = r[q + SUM]
+        pull, since = r[q + PULL], r[q + SINCE]
         if r[o] != FREE:
-            alt, vd, total = guide_height(
-                alt, vd, total, r[q + 2], reference, dt, r[o], r[o + 1], r[o + 2], r[o + 3]
+            alt, vd, pull, since = guide_height(
+                alt, vd, pull, since, r[q + 2], reference, dt, r[o], r[o + 1], r[o + 2]
             )
-        why = verdict(alt, vn, ve, vd, qw, c, turn, r[o + 4], r[o + 5], r[o + 6], r[o + 7])
+        why = verdict(alt, vn, ve, vd, qw, c, turn, r[o + 3], r[o + 4], r[o + 5], r[o + 6])
         if why != DONE:
             return why
         r[q], r[q + 1], r[q + 2], r[q + 3], r[q + 4], r[q + 5] = lat, lon, alt, vn, ve, vd
         r[q + 6], r[q + 7], r[q + 8], r[q + 9] = qw, qx, qy, qz
-        r[q + 10], r[q + 11], r[q + 12], r[q + SUM] = s, c, w, total
+        r[q + 10], r[q + 11], r[q + 12] = s, c, w
+        r[q + PULL], r[q + SINCE] = pull, since
     r[TIME], r[BEFORE] = time, dt
     r[RATE], r[RATE + 1], r[RATE + 2] = wx, wy, wz
     r[FORCE], r[FORCE + 1], r[FORCE + 2] = fx, fy, fz

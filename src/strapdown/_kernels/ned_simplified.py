@@ -20,9 +20,9 @@ from strapdown._kernels.rotation import (
     quat_normalise,
 )
 
-# Places of the state after the ten that are kept: the sum of the vertical loop.
-SUM = 10
-STATE = 11
+# Places of the state after the ten that are kept: the vertical loop's, as in `ned`.
+PULL, SINCE = 10, 11
+STATE = 12
 
 
 @njit(cache=True, error_model="numpy")
@@ -82,24 +82,24 @@ def simplified_advance(
         mw, mx, my, mz = quat_from_rotvec(-dt * (on + tn), -dt * te, -dt * (od + td))
         bw, bx, by, bz = quat_multiply(mw, mx, my, mz, bw, bx, by, bz)
         bw, bx, by, bz = quat_normalise(bw, bx, by, bz)
-        height, d1, total = alt - dt * mean_d, d1, state[SUM]
+        height, pull, since = alt - dt * mean_d, state[PULL], state[SINCE]
         if mode != FREE:
             wanted = math.nan
             if reference.shape[0] > 0:
                 wanted = reference[i]
-            height, d1, total = guide_height(
-                height, d1, total, alt, wanted, dt, mode, options[1], options[2], options[3]
+            height, d1, pull, since = guide_height(
+                height, d1, pull, since, alt, wanted, dt, mode, options[1], options[2]
             )
         cosine = math.cos(lat1)
         why = verdict(
-            height, n1, e1, d1, bw, cosine, turn, options[4], options[5], options[6], options[7]
+            height, n1, e1, d1, bw, cosine, turn, options[3], options[4], options[5], options[6]
         )
         if why != DONE:
             return i, why
         state[0], state[1], state[2] = lat1, lon + turn, height
         state[3], state[4], state[5] = n1, e1, d1
         state[6], state[7], state[8], state[9] = bw, bx, by, bz
-        state[SUM] = total
+        state[PULL], state[SINCE] = pull, since
         for j in range(ROW):
             history[i, j] = state[j]
     return steps, DONE

@@ -39,7 +39,7 @@ class Mechanization(ABC):
         kept where it is, and the vertical velocity at zero; or a loop of the third order draws
         it to the reference heights that `advance` is given.
     height_time_constant : float, s
-        Of each of the three poles of that loop, 1 to 1000.
+        Of each of the three poles of that loop, 1 to 1000, however often references come.
     latitude_limit_deg : float, deg
         Where north is no longer used: beyond it a run stops.
     largest_speed : float, m/s
@@ -125,16 +125,12 @@ class Mechanization(ABC):
 
     def kernel_options(self) -> Array:
         """Options and limits as the kernels take them."""
-        tau = self.height_time_constant
         earth = ELLIPSOIDS[self.ellipsoid.lower()]
-        # Three poles at -1/tau; the second gain also holds what gravity gives away with height.
-        spring = 2.0 * earth.gravity_at_equator / earth.semi_major_axis
         return np.array(
             [
                 float(HEIGHTS.index(self.height)),
-                3.0 / tau,
-                3.0 / tau**2 + spring,
-                1.0 / tau**3,
+                self.height_time_constant,
+                2.0 * earth.gravity_at_equator / earth.semi_major_axis,
                 np.cos(np.radians(self.latitude_limit_deg)),
                 self.largest_speed,
                 *self.height_limits,

@@ -45,7 +45,7 @@ class NorthEastDown(Mechanization):
 
         Returns
         -------
-        ndarray, (14,)
+        ndarray, (15,)
         """
         down = 0.0 if self.height == "held" else start.v_n[2]
         sine = math.sin(start.lat)
@@ -62,6 +62,7 @@ class NorthEastDown(Mechanization):
                 sine,
                 math.cos(start.lat),
                 1.0 / math.sqrt(1.0 - squared * sine * sine),
+                0.0,
                 0.0,
             ]
         )

@@ -57,11 +57,10 @@ class Tadic(Mechanization):
             )
 
     def begin(self, start: NavState) -> Array:
-        """Return the state of the kernel at a start, (11,)."""
+        """Return the state of the kernel at a start, (12,)."""
         down = 0.0 if self.height == "held" else start.v_n[2]
-        return np.array(
-            [start.lat, start.lon, start.alt, start.v_n[0], start.v_n[1], down, *start.q_nb, 0.0]
-        )
+        place = [start.lat, start.lon, start.alt]
+        return np.array([*place, start.v_n[0], start.v_n[1], down, *start.q_nb, 0.0, 0.0])
 
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
