@@ -177,8 +177,8 @@ class Mechanization(ABC):
             The state has left the range in which this mechanization means anything, or is too
             near a pole; the first step for which this is so is named.
         DataError
-            `heights` is missing where the height is damped, or given where it is not, or infinite, or
-            of another length.
+            `heights` is missing where the height is damped, or given where it is not; or it is
+            infinite, or of another length.
         """
         rows = values_of(increments, MOTION)
         history = np.empty((len(rows), ROW))
