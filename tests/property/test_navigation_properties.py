@@ -66,7 +66,9 @@ def test_north_and_south_are_mirror_images(place, velocity, angles, seed):
     along with the level ones.
     """
     log, state = increments(seed), start(place, velocity, angles)
-    one = navigate(state, log)
+    # Made as its image is made: to be made unit once more changes a last bit.
+    again = NavState(0.0, state.lat, state.lon, state.alt, state.v_n, state.q_nb)
+    one = navigate(again, log)
     mirrored = log.copy()
     mirrored[[PHI[1], PHI[2], DV[0], DR[0]]] *= -1.0
     w, x, y, z = state.q_nb
@@ -80,8 +82,7 @@ def test_north_and_south_are_mirror_images(place, velocity, angles, seed):
     )
     other = navigate(image, mirrored)
     signs = np.array([-1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, -1.0, -1.0])
-    # To the last bit but for the normalisation of the start, which is the same for both.
-    assert np.array_equal(one.history, other.history * signs)
+    assert (one.history == other.history * signs).all()
 
 
 @few
