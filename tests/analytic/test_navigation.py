@@ -388,8 +388,8 @@ def test_a_run_to_the_pole_stops_and_says_where(monkeypatch):
     truth = motion.trajectory(log.index)
     first = int(np.argmax(truth["lat"].to_numpy() > 89.9))
     finding = caught.value.finding
-    assert (finding.row, finding.quantity) == (first + 1, "lat")
-    assert f"step ending at {log.index[first]:.9g} s" in finding.what
+    assert finding.quantity == "lat"
+    assert f"the sample at {log.index[first]:.9g} s (step {first + 1})" in finding.what
     assert f"{truth['lat'].iloc[first - 1]:.6f} deg of latitude" in finding.what
     assert "end the run before it" in finding.remedy
     # Until then it errs as it does elsewhere.
@@ -451,7 +451,13 @@ def with_misprint(name, misprinted):
     class Misprinted(Tadic):
         def advance_rows(self, state, increments, heights, earth, history):
             return wrong(
-                state, increments, heights, earth, self.kernel_options(), 1.0, 1.0, 1.0, history
+                state,
+                increments,
+                heights,
+                earth,
+                self.kernel_options(),
+                *(1.0, 1.0, 1.0, 1.0, math.nan),
+                history,
             )
 
     return Misprinted(coriolis=True)

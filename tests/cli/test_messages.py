@@ -14,6 +14,9 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_inputs import CASES
+from bad_navigation import CALLS
+
+from strapdown.exceptions import StrapdownError
 
 PAGE = Path(__file__).parents[2] / "docs" / "messages.md"
 HEAD = """# What is said about bad input
@@ -22,6 +25,13 @@ Each message names the file, the row as an editor counts it, the quantity, and w
 a log cannot be used, nothing is written and the exit code is not 0; where it can, a note says what
 was done, and stands in the report too. This page is written by the tests, which hold every word
 of it.
+
+"""
+
+PYTHON = """## From Python: navigation
+
+Here `TIME` is a minute at 100 Hz, `STILL` and `LEVEL` what the sensors read at rest, and `HOME`
+a state at 55° north, 37° east.
 
 """
 
@@ -51,7 +61,19 @@ def page(tmp_path_factory, run_cli):
             + (f"With `{words}`:\n\n" if words else "")
             + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
         )
-    return HEAD + "".join(sections).rstrip("\n") + "\n"
+    return HEAD + "".join(sections) + _from_python()
+
+
+def _from_python() -> str:
+    parts = [PYTHON]
+    for case in CALLS:
+        with pytest.raises(StrapdownError) as caught:
+            case.call()
+        parts.append(
+            f"### {case.title}\n\n```python\n{case.source}\n```\n\n"
+            f"```text\n{type(caught.value).__name__}: {caught.value}\n```\n\n"
+        )
+    return "".join(parts).rstrip("\n") + "\n"
 
 
 def _without_usual(lines: list[str]) -> list[str]:

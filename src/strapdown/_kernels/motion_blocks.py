@@ -27,13 +27,11 @@ from strapdown._kernels.rotation_vector import (
     cross,
 )
 
-# Nodes of the longest window; rows of the scratch array, of which the first three hold the
-# weights of the samples at the three points of Gauss, and the others nodes and denominators.
-WIDEST = 5
-NODES, DENOMINATORS, ROWS = 3, 4, 5
+# The scratch array: Newton's coefficients of up to five samples of six numbers, and the nodes.
+NODES, ROWS, WIDEST = 5, 6, 6
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def bracket(
     w1x, w1y, w1z, a1x, a1y, a1z, p1x, p1y, p1z, t1, w2x, w2y, w2z, a2x, a2y, a2z, p2x, p2y, p2z, t2
 ):
@@ -56,7 +54,7 @@ def bracket(
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def sixth_order_motion(dt, low, mid, high):
     """Phi, dv, dr of a step from rate and force, six numbers each, at its points of Gauss."""
     o = 0.0
@@ -138,101 +136,78 @@ def sixth_order_motion(dt, low, mid, high):
     return wx, wy, wz, vx, vy, vz, rx, ry, rz
 
 
-@njit(cache=True)
-def place_nodes(dt, first, count, scratch):
-    """Nodes between the steps of a window in units of its length, and Lagrange's denominators."""
+@njit(cache=True, error_model="numpy")
+def fit_window(dt, rate, force, mean, first, count, scratch):
+    """Newton's polynomial of rate and force over the steps of a window.
+
+    Its nodes are the stamps, in units of the window's length. Means are the first divided
+    differences of their running sums, so that theirs begin one higher. Coefficient k of the
+    six numbers stands in row k of the scratch array.
+    """
     length = 0.0
     for i in range(count):
         length += dt[first + i]
     at = 0.0
-    for i in range(count + 1):
+    for i in range(count):
         scratch[NODES, i] = at / length
-        if i < count:
-            at += dt[first + i]
-    for j in range(count + 1):
-        product = 1.0
-        for i in range(count + 1):
-            if i != j:
-                product *= scratch[NODES, j] - scratch[NODES, i]
-        scratch[DENOMINATORS, j] = 1.0 / product
+        at += dt[first + i]
+    scratch[NODES, count] = 1.0
+    values, higher, start = count + 1, 0, first
+    if mean:
+        values, higher, start = count, 1, first + 1
+    for i in range(values):
+        for j in range(3):
+            scratch[i, j] = rate[start + i, j]
+            scratch[i, 3 + j] = force[start + i, j]
+    for k in range(1, values):
+        for i in range(values - 1, k - 1, -1):
+            m = 1.0 / (scratch[NODES, i + higher] - scratch[NODES, i - k])
+            for j in range(6):
+                scratch[i, j] = (scratch[i, j] - scratch[i - 1, j]) * m
+    return values
 
 
-@njit(cache=True)
-def weigh_samples(count, t, scratch, row):
-    """Weights of the count + 1 samples in their polynomial at t."""
-    for j in range(count + 1):
-        product = scratch[DENOMINATORS, j]
-        for i in range(count + 1):
-            if i != j:
-                product *= t - scratch[NODES, i]
-        scratch[row, j] = product
-
-
-@njit(cache=True)
-def weigh_means(count, t, scratch, row):
-    """Weights at t of the means over count steps, in the polynomial with these integrals.
-
-    It is the derivative of the polynomial through the running sums of the increments, in which
-    an increment counts at every node after it.
-    """
-    total = 0.0
-    for j in range(count, 0, -1):
-        slope = 0.0
-        for i in range(count + 1):
-            if i == j:
-                continue
-            product = scratch[DENOMINATORS, j]
-            for m in range(count + 1):
-                if m not in (i, j):
-                    product *= t - scratch[NODES, m]
-            slope += product
-        total += slope
-        scratch[row, j - 1] = total * (scratch[NODES, j] - scratch[NODES, j - 1])
-
-
-@njit(cache=True)
-def weighted(rate, force, start, count, scratch, row):
-    """Rate and force as the weights of a row of the scratch array say."""
+@njit(cache=True, error_model="numpy")
+def fitted_values(t, mean, values, scratch):
+    """Rate and force at t of the window's length."""
+    # Newton's products of distances to the nodes, and their derivatives.
+    product, slope = 1.0, 0.0
     wx, wy, wz, fx, fy, fz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(count):
-        k = scratch[row, j]
-        wx += k * rate[start + j, 0]
-        wy += k * rate[start + j, 1]
-        wz += k * rate[start + j, 2]
-        fx += k * force[start + j, 0]
-        fy += k * force[start + j, 1]
-        fz += k * force[start + j, 2]
+    for k in range(values):
+        d = t - scratch[NODES, k]
+        slope = slope * d + product
+        k_basis = product
+        if mean:
+            k_basis = slope
+        product *= d
+        wx += k_basis * scratch[k, 0]
+        wy += k_basis * scratch[k, 1]
+        wz += k_basis * scratch[k, 2]
+        fx += k_basis * scratch[k, 3]
+        fy += k_basis * scratch[k, 4]
+        fz += k_basis * scratch[k, 5]
     return wx, wy, wz, fx, fy, fz
 
 
-@njit(cache=True)
-def window_motion(dt, rate, force, mean, step, first, count, scratch):
-    """Phi, dv, dr of one step of a window whose nodes are placed."""
-    left = scratch[NODES, step - first]
-    length = scratch[NODES, step - first + 1] - left
-    start, values = first, count + 1
-    if mean:
-        start, values = first + 1, count
-    for row in range(3):
-        t = left + length * (0.5, GAUSS_FIRST, GAUSS_LAST)[row]
-        if mean:
-            weigh_means(count, t, scratch, row)
-        else:
-            weigh_samples(count, t, scratch, row)
+@njit(cache=True, error_model="numpy")
+def window_motion(dt, mean, step, values, scratch):
+    """Phi, dv, dr of one step of a window, counted from its first."""
+    left = scratch[NODES, step]
+    length = scratch[NODES, step + 1] - left
     return sixth_order_motion(
-        dt[step],
-        weighted(rate, force, start, values, scratch, 1),
-        weighted(rate, force, start, values, scratch, 0),
-        weighted(rate, force, start, values, scratch, 2),
+        dt,
+        fitted_values(left + length * GAUSS_FIRST, mean, values, scratch),
+        fitted_values(left + length * 0.5, mean, values, scratch),
+        fitted_values(left + length * GAUSS_LAST, mean, values, scratch),
     )
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def alike(a, b):
     return a <= ALIKE * b and b <= ALIKE * a
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def block_length(dt, start, samples):
     """Steps of the block that starts here: up to `samples` that are like its first."""
     count = 1
@@ -241,7 +216,7 @@ def block_length(dt, start, samples):
     return count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def motion_increments_blocks(dt, rate, force, mean, samples, scratch, out):
     """Fill out, (n-1, 10), each step with the polynomial of its block.
 
@@ -254,14 +229,14 @@ def motion_increments_blocks(dt, rate, force, mean, samples, scratch, out):
         first = start
         while first > 0 and start + count - first < samples and alike(dt[first - 1], dt[start]):
             first -= 1
-        place_nodes(dt, first, start + count - first, scratch)
+        values = fit_window(dt, rate, force, mean, first, start + count - first, scratch)
         for k in range(start, start + count):
-            motion = window_motion(dt, rate, force, mean, k, first, start + count - first, scratch)
+            motion = window_motion(dt[k], mean, k - first, values, scratch)
             put_motion(out, k, dt[k], motion)
         start += count
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def motion_increments_neighbours(dt, rate, force, mean, scratch, out):
     """Fill out, (n-1, 10), each step with the polynomial that its two neighbours share."""
     for k in range(dt.shape[0]):
@@ -270,11 +245,11 @@ def motion_increments_neighbours(dt, rate, force, mean, scratch, out):
             first, count = k - 1, 2
         if k + 1 < dt.shape[0] and neighbour(dt[k], dt[k + 1]) > 0.0:
             count += 1
-        place_nodes(dt, first, count, scratch)
-        put_motion(out, k, dt[k], window_motion(dt, rate, force, mean, k, first, count, scratch))
+        values = fit_window(dt, rate, force, mean, first, count, scratch)
+        put_motion(out, k, dt[k], window_motion(dt[k], mean, k - first, values, scratch))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def join_blocks(dt, samples, rows, last, out):
     """Put the rows of each block together into one row of out; return the number of blocks.
 

@@ -16,14 +16,14 @@ import math
 
 from numba import njit
 
-from strapdown._kernels.earth import gravity_around, radii
+from strapdown._kernels.earth import gravity_around
 from strapdown._kernels.rotation import dcm_from_quat, quat_from_rotvec, quat_multiply
 
 # Places in the state: radians, m, m/s, quaternion body to level, sine and cosine of the latitude
-# (turned with the level from step to step, which spares computing them), and the sum of the
-# vertical loop, m s.
-LAT, LON, ALT, V, Q, SINE, COSINE, SUM = 0, 1, 2, 3, 6, 10, 11, 12
-STATE = 13
+# (turned with the level from step to step, which spares computing them), the radius of the prime
+# vertical over a, and the sum of the vertical loop, m s.
+LAT, LON, ALT, V, Q, SINE, COSINE, PRIME, SUM = 0, 1, 2, 3, 6, 10, 11, 12, 13
+STATE = 14
 # The part of the state that is kept of every step.
 ROW = 10
 
@@ -122,6 +122,7 @@ def ned_step(
     qz,
     s,
     c,
+    w,
     dt,
     phi_x,
     phi_y,
@@ -141,8 +142,11 @@ def ned_step(
     m,
 ):
     """State after a step of motion increments; two-step quaternion of Tadic (11)-(19)."""
-    meridian, transverse = radii(s, a, e2)
-    w = transverse / a
+    # One Newton step from its value a step before; a root and a quotient would keep all else
+    # waiting.
+    w = w * (1.5 - 0.5 * (1.0 - e2 * s * s) * w * w)
+    transverse = a * w
+    meridian = transverse * (1.0 - e2) * w * w
     curvature = 1.0 / (meridian + alt)
     parallel = 1.0 / ((transverse + alt) * c)
     c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(qw, qx, qy, qz)
@@ -227,6 +231,7 @@ def ned_step(
         bz,
         s1,
         c1,
+        w,
         dlon,
     )
 
@@ -268,7 +273,8 @@ def ned_advance(state, increments, reference, earth, options, history):
     of the state after each step. A step whose end is not allowed is not made.
     """
     lat, lon, alt, vn, ve, vd = state[0], state[1], state[2], state[3], state[4], state[5]
-    qw, qx, qy, qz, s, c = state[6], state[7], state[8], state[9], state[10], state[11]
+    qw, qx, qy, qz = state[6], state[7], state[8], state[9]
+    s, c, w = state[SINE], state[COSINE], state[PRIME]
     total = state[SUM]
     a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
     rate, f, m = earth[4], earth[5], earth[6]
@@ -280,7 +286,7 @@ def ned_advance(state, increments, reference, earth, options, history):
     for i in range(steps):
         before = alt
         dt = increments[i, 0]
-        lat, lon, alt, vn, ve, vd, qw, qx, qy, qz, s, c, turn = ned_step(
+        lat, lon, alt, vn, ve, vd, qw, qx, qy, qz, s, c, w, turn = ned_step(
             lat,
             lon,
             alt,
@@ -293,6 +299,7 @@ def ned_advance(state, increments, reference, earth, options, history):
             qz,
             s,
             c,
+            w,
             dt,
             increments[i, 1],
             increments[i, 2],
@@ -325,7 +332,7 @@ def ned_advance(state, increments, reference, earth, options, history):
         history[i, 0], history[i, 1], history[i, 2] = lat, lon, alt
         history[i, 3], history[i, 4], history[i, 5] = vn, ve, vd
         history[i, 6], history[i, 7], history[i, 8], history[i, 9] = qw, qx, qy, qz
-        state[SINE], state[COSINE], state[SUM] = s, c, total
+        state[SINE], state[COSINE], state[PRIME], state[SUM] = s, c, w, total
     if made > 0:
         for j in range(ROW):
             state[j] = history[made - 1, j]

@@ -6,13 +6,14 @@ from numba import njit
 
 from strapdown._kernels.increments import LARGEST
 from strapdown._kernels.motion_increments import linear_motion, mean_motion
-from strapdown._kernels.ned import DONE, FREE, guide_height, ned_step, verdict
+from strapdown._kernels.ned import DONE, FREE, SUM, guide_height, ned_step, verdict
+from strapdown._kernels.ned import STATE as WIDTH
 
 # One float64 array holds everything between calls, because every further argument of a compiled
 # function costs more than a part of the step: stamp, samples so far, whether samples are means,
 # length of the step before, the last sample, the Earth, the options, the state.
 TIME, SAMPLES, MEAN, BEFORE, RATE, FORCE, EARTH, OPTIONS, STATE = 0, 1, 2, 3, 4, 7, 10, 17, 25
-SIZE = STATE + 13
+SIZE = STATE + WIDTH
 
 # What an update answers besides `DONE`, `POLE` and `DIVERGED` of the step.
 BAD_SAMPLE, BAD_TIME = -1, -2
@@ -76,7 +77,7 @@ def ned_update(r, time, gyro, accel, reference):
         e = EARTH
         q = STATE
         o = OPTIONS
-        lat, lon, alt, vn, ve, vd, qw, qx, qy, qz, s, c, turn = ned_step(
+        lat, lon, alt, vn, ve, vd, qw, qx, qy, qz, s, c, w, turn = ned_step(
             r[q],
             r[q + 1],
             r[q + 2],
@@ -89,6 +90,7 @@ def ned_update(r, time, gyro, accel, reference):
             r[q + 9],
             r[q + 10],
             r[q + 11],
+            r[q + 12],
             dt,
             px,
             py,
@@ -107,7 +109,7 @@ def ned_update(r, time, gyro, accel, reference):
             r[e + 5],
             r[e + 6],
         )
-        total = r[q + 12]
+        total = r[q + SUM]
         if r[o] != FREE:
             alt, vd, total = guide_height(
                 alt, vd, total, r[q + 2], reference, dt, r[o], r[o + 1], r[o + 2], r[o + 3]
@@ -117,7 +119,7 @@ def ned_update(r, time, gyro, accel, reference):
             return why
         r[q], r[q + 1], r[q + 2], r[q + 3], r[q + 4], r[q + 5] = lat, lon, alt, vn, ve, vd
         r[q + 6], r[q + 7], r[q + 8], r[q + 9] = qw, qx, qy, qz
-        r[q + 10], r[q + 11], r[q + 12] = s, c, total
+        r[q + 10], r[q + 11], r[q + 12], r[q + SUM] = s, c, w, total
     r[TIME], r[BEFORE] = time, dt
     r[RATE], r[RATE + 1], r[RATE + 2] = wx, wy, wz
     r[FORCE], r[FORCE + 1], r[FORCE + 2] = fx, fy, fz

@@ -27,12 +27,24 @@ STATE = 11
 
 @njit(cache=True, error_model="numpy")
 def simplified_advance(
-    state, increments, reference, earth, options, coriolis, turning, transport, history
+    state,
+    increments,
+    reference,
+    earth,
+    options,
+    coriolis,
+    turning,
+    transport,
+    azimuth,
+    fixed,
+    history,
 ):
     """As `ned.ned_advance`; three switches are 1 or 0.
 
     `coriolis` is the second term of (1); `turning` and `transport` are the Earth's rate (7) and
-    the transport rate (8), in the attitude and in that term.
+    the transport rate (8), in the attitude and in that term. `azimuth` is 1, or -1 for the sign
+    that the third component of (8) has in print; `fixed` is a gravity, or NaN for that of the
+    place.
     """
     a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
     rate, f, m = earth[4], earth[5], earth[6]
@@ -47,10 +59,12 @@ def simplified_advance(
         _, g, _, _, _, _, _ = gravity_around(
             s, c, alt, transverse / a, 1.0 / (meridian + alt), a, e2, gamma, k, f, m
         )
+        if not math.isnan(fixed):
+            g = fixed
         rm, rp = meridian + alt, transverse + alt
         on, od = earth_rate(s, c, turning * rate)
         tn, te, td = transport_rate(s, c, vn, ve, rm, rp)
-        tn, te, td = transport * tn, transport * te, transport * td
+        tn, te, td = transport * tn, transport * te, transport * azimuth * td
         # (3)-(6), the specific force of (1) integrated over the step.
         c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(qw, qx, qy, qz)
         ux, uy, uz = increments[i, 4], increments[i, 5], increments[i, 6]

@@ -6,13 +6,17 @@ EPILOG = "Example: strapdown modules"
 
 
 def modules() -> None:
-    """List what can stand in each slot: algorithms, scenarios, sensors, formats."""
+    """List what can stand in each slot: algorithms, mechanizations, motions, sensors, formats."""
     from dataclasses import fields
 
     from strapdown.attitude import ALGORITHMS
     from strapdown.cli.console import console, print_table
+    from strapdown.config.motions import KINDS
+    from strapdown.ellipsoids import ELLIPSOIDS
     from strapdown.formats import READERS
     from strapdown.formats.log_writers import LOG_WRITERS
+    from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+    from strapdown.mechanization import MECHANIZATIONS, Mechanization
     from strapdown.sensors.catalogue import SENSORS, load_sensor
     from strapdown.simulation import SCENARIOS
 
@@ -30,6 +34,28 @@ def modules() -> None:
             for name, cls in ALGORITHMS.items()
         ],
     )
+    out.print("Mechanizations", style="bold")
+    print_table(
+        ["name", "source", "own options", "what it does"],
+        [
+            [
+                name,
+                cls.source,
+                ", ".join(f.name for f in fields(cls)[len(fields(Mechanization)) :]) or "–",
+                cls.summary,
+            ]
+            for name, cls in MECHANIZATIONS.items()
+        ],
+    )
+    out.print("Ellipsoids", style="bold")
+    print_table(
+        ["name", "a, m", "1/f", "source"],
+        [
+            [name, f"{e.semi_major_axis:.10g}", f"{e.inverse_flattening:.12g}", e.source]
+            for name, e in ELLIPSOIDS.items()
+        ],
+    )
+    out.print(f"Motions of a trajectory's file: {', '.join(KINDS)}\n")
     out.print("Scenarios with exact attitude", style="bold")
     print_table(
         ["name", "s", "what it is"],
@@ -46,3 +72,4 @@ def modules() -> None:
     out.print("Formats that are read", style="bold")
     print_table(["name", "what it is"], [[name, r.title] for name, r in READERS.items()])
     out.print(f"Formats that logs are written in: {', '.join(LOG_WRITERS)}")
+    out.print(f"Formats that trajectories are written in: {', '.join(TRAJECTORY_WRITERS)}")

@@ -16,9 +16,13 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats import csv, hdf5, matlab, npz
-from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION, VELOCITY
+from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 
-__all__ = ["LOG_WRITERS", "log_formats", "write_attitude_csv", "write_trajectory_csv"]
+__all__ = [
+    "LOG_WRITERS",
+    "log_formats",
+    "write_attitude_csv",
+]
 
 _AXES = "forward-right-down"
 
@@ -118,31 +122,4 @@ def write_attitude_csv(path: Path, attitude: pd.DataFrame) -> None:
     columns |= {f"{e}_deg": attitude[e].to_numpy() for e in EULER}
     csv.write(
         path, columns, {"attitude": "body forward-right-down to north-east-down, scalar first"}
-    )
-
-
-def write_trajectory_csv(path: Path, trajectory: pd.DataFrame) -> None:
-    """Write a Trajectory table as text.
-
-    Parameters
-    ----------
-    path : Path
-    trajectory : DataFrame
-    """
-    columns = {"time_s": trajectory.index.to_numpy(dtype=np.float64)}
-    columns |= {
-        f"{name}{unit}": trajectory[name].to_numpy(dtype=np.float64)
-        for names, unit in ((["lat", "lon"], "_deg"), (["alt"], "_m"))
-        for name in names
-    }
-    columns |= {f"{v}_m_s": trajectory[v].to_numpy(dtype=np.float64) for v in VELOCITY}
-    columns |= {f"{e}_deg": trajectory[e].to_numpy(dtype=np.float64) for e in EULER}
-    csv.write(
-        path,
-        columns,
-        {
-            "place": "geodetic latitude and longitude, height over the ellipsoid",
-            "velocity": "relative to the Earth: north, east, down",
-            "attitude": "body forward-right-down to north-east-down",
-        },
     )

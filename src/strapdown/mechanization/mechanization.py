@@ -61,7 +61,7 @@ class Mechanization(ABC):
     height_limits: tuple[float, float] = (-15_000.0, 1_000_000.0)
 
     name: ClassVar[str]
-    title: ClassVar[str]
+    summary: ClassVar[str]
     source: ClassVar[str]
 
     def __post_init__(self) -> None:
@@ -177,8 +177,8 @@ class Mechanization(ABC):
             The state has left the range in which this mechanization means anything, or is too
             near a pole; the first step for which this is so is named.
         DataError
-            `heights` is missing where the height is damped, or given where it is not; or it is
-            infinite, or of another length.
+            `heights` is missing where the height is damped, given where it is not, infinite, or
+            of another length.
         """
         rows = values_of(increments, MOTION)
         history = np.empty((len(rows), ROW))
@@ -284,19 +284,18 @@ class Mechanization(ABC):
         source = increments.attrs.get("source")
         if why == POLE:
             raise DivergenceError(
-                f"the step ending at {time:.9g} s comes nearer to a pole than "
+                f"the sample at {time:.9g} s (step {step + 1}) comes nearer to a pole than "
                 f"{self.latitude_limit_deg:g} deg of latitude{before}: north, and every angle from "
                 "it, changes too fast there",
                 file=source,
-                row=step + 1,
                 quantity="lat",
                 remedy="end the run before it; north-east-down has no meaning at a pole",
             )
         given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
         raise DivergenceError(
-            f"the state has diverged in the step ending at {time:.9g} s ({given}){before}",
+            f"the state has diverged with the sample at {time:.9g} s (step {step + 1}: {given})"
+            f"{before}",
             file=source,
-            row=step + 1,
             quantity="state",
             remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
             "gravity (-9.8 on z at level rest), a burst; and at the start: an attitude in rad, "

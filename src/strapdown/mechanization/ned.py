@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels import ned as kernel
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
 
@@ -32,8 +33,8 @@ class NorthEastDown(Mechanization):
     """
 
     name: ClassVar[str] = "ned"
-    title: ClassVar[str] = "north-east-down, every term"
-    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+    summary: ClassVar[str] = "north-east-down with every term, to 89.9° of latitude"
+    source: ClassVar[str] = "Tadic (2016) (1)-(19)"
 
     def begin(self, start: NavState) -> Array:
         """Return the state of the kernel at a start.
@@ -44,9 +45,11 @@ class NorthEastDown(Mechanization):
 
         Returns
         -------
-        ndarray, (13,)
+        ndarray, (14,)
         """
         down = 0.0 if self.height == "held" else start.v_n[2]
+        sine = math.sin(start.lat)
+        squared = find_ellipsoid(self.ellipsoid).eccentricity_squared
         return np.array(
             [
                 start.lat,
@@ -56,8 +59,9 @@ class NorthEastDown(Mechanization):
                 start.v_n[1],
                 down,
                 *start.q_nb,
-                math.sin(start.lat),
+                sine,
                 math.cos(start.lat),
+                1.0 / math.sqrt(1.0 - squared * sine * sine),
                 0.0,
             ]
         )

@@ -210,7 +210,6 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
             f"a gap of {dt[row]:.6g} s, from {end - dt[row]:.9g} s to {end:.9g} s: what the body "
             f"did in it is not known ({long.size} such)",
             file=source,
-            row=row + 1,
             quantity="dt",
             remedy=f"cut the log there, or pass longest_step={float(dt.max()):.3g} or more to join "
             "its sides by a line",
@@ -226,7 +225,6 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
             f"longest, {dt[row]:.6g} s, ends at {float(increments.index[row]):.9g} s: rate and "
             "force are taken as linear over it",
             file=source,
-            row=row + 1,
             quantity="dt",
             remedy="errors after it are larger than the sensors alone would make them",
         ),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from strapdown._kernels import ned_simplified as kernel
+from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
 
@@ -27,6 +29,10 @@ class Tadic(Mechanization):
         Eq. (7), which "can be neglected for short navigation".
     transport_rate : bool
         Eq. (8), the turn of the local level with the place.
+    gravity : float, m/s², optional
+        One value, downward, everywhere; normal gravity of each place, if not given.
+    as_printed : bool
+        Take the third component of Eq. (8) with the sign that it has in print, which is wrong.
     ellipsoid, height, height_time_constant, latitude_limit_deg, largest_speed, height_limits
         As `Mechanization`.
     """
@@ -34,10 +40,21 @@ class Tadic(Mechanization):
     coriolis: bool = False
     earth_rate: bool = True
     transport_rate: bool = True
+    gravity: float | None = None
+    as_printed: bool = False
 
     name: ClassVar[str] = "tadic"
-    title: ClassVar[str] = "north-east-down, with a paper's simplifications"
-    source: ClassVar[str] = "Tadic and Vukajlovic (2016), (1)-(19), with (8) and (19) corrected"
+    summary: ClassVar[str] = "the same without the terms that the paper leaves out"
+    source: ClassVar[str] = "Tadic (2016) (1)-(19)"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.gravity is not None and not 0.0 < self.gravity < 20.0:
+            raise ConfigError(
+                f"{self.gravity:g} m/s² is no gravity of this Earth",
+                quantity="gravity",
+                remedy="give a positive number near 9.8, or leave it out",
+            )
 
     def begin(self, start: NavState) -> Array:
         """Return the state of the kernel at a start, (11,)."""
@@ -50,7 +67,13 @@ class Tadic(Mechanization):
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
         """Advance `state` over rows of increments; return the steps made, and why no more."""
-        switches = (float(self.coriolis), float(self.earth_rate), float(self.transport_rate))
+        switches = (
+            float(self.coriolis),
+            float(self.earth_rate),
+            float(self.transport_rate),
+            -1.0 if self.as_printed else 1.0,
+            math.nan if self.gravity is None else self.gravity,
+        )
         made, why = kernel.simplified_advance(
             state, increments, heights, earth, self.kernel_options(), *switches, history
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,17 +9,20 @@ import pandas as pd
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config import TrajectorySpec
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_trajectory_csv
+from strapdown.formats.log_writers import LOG_WRITERS, log_formats
+from strapdown.formats.trajectory_csv import one_line
+from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
+from strapdown.report.chart import Chart
 from strapdown.report.stated_errors import stated_errors
+from strapdown.report.svg_chart import draw
+from strapdown.report.trajectory_charts import trajectory_chart
 from strapdown.simulation import TriadErrors
 from strapdown.systems.attitude_source import sensor_file
 from strapdown.systems.trajectory_source import simulate_trajectory
 
-__all__ = ["write_trajectory_simulation"]
-
-#: Suffix to the function that writes a Trajectory table, besides ``trajectory.csv``.
-TRAJECTORY_FORMATS: dict[str, Callable[[Path, pd.DataFrame], None]] = {}
+__all__ = ["simulation_chart", "write_trajectory_simulation"]
 
 # Row of a Trajectory table to keys with units.
 _ROW = {
@@ -51,8 +53,8 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     -------
     Seal
         The folder holds ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude in
-        further columns), ``trajectory.csv`` and other forms of it, and ``scenario.json`` with the
-        resolved configuration.
+        further columns), ``trajectory.csv`` and other forms of it, ``trajectory.svg``, a picture
+        of it, and ``scenario.json`` with the resolved configuration.
 
     Raises
     ------
@@ -62,14 +64,12 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     check_destination(out, force)
     formats = log_formats(spec.formats)
     for name in spec.trajectory_formats:
-        if name not in TRAJECTORY_FORMATS:
+        if name not in TRAJECTORY_WRITERS:
             raise ConfigError(
                 f"there is no writer for '{name}'",
                 file=f"{spec.name}.toml",
                 quantity="trajectory_formats",
-                remedy=nearest(name, TRAJECTORY_FORMATS)
-                if TRAJECTORY_FORMATS
-                else "leave it out: trajectory.csv is written in any case",
+                remedy=nearest(name, TRAJECTORY_WRITERS),
             )
     motion, errors, imu, attitude, trajectory = simulate_trajectory(spec)
     configuration = spec.model_dump(mode="json", exclude_none=True)
@@ -84,9 +84,11 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     ) as folder:
         for name in formats:
             LOG_WRITERS[name](folder / f"log.{name}", imu, attitude)
-        write_trajectory_csv(folder / "trajectory.csv", trajectory)
-        for name in spec.trajectory_formats:
-            TRAJECTORY_FORMATS[name](folder / f"trajectory.{name}", trajectory)
+        options = TrajectoryFileOptions(ellipsoid=motion.ellipsoid)
+        for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
+            path = folder / f"trajectory.{name}"
+            TRAJECTORY_WRITERS[name](path, trajectory, name=spec.name, options=options)
+        draw(simulation_chart(spec, trajectory), folder / "trajectory.svg", caption=True)
         shape = motion.ellipsoid
         sensor = spec.sensor and Path(spec.sensor).name
         description: dict[str, Any] = {
@@ -113,6 +115,23 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
         }
         (folder / "scenario.json").write_text(to_json(description), encoding="utf-8", newline="\n")
     return seals[0]
+
+
+def simulation_chart(spec: TrajectorySpec, trajectory: pd.DataFrame) -> Chart:
+    """Return the chart of a simulated trajectory, titled as its file says.
+
+    Parameters
+    ----------
+    spec : TrajectorySpec
+    trajectory : DataFrame
+        A Trajectory table.
+
+    Returns
+    -------
+    Chart
+    """
+    title = one_line(spec.title) or one_line(spec.name)
+    return trajectory_chart(trajectory, title=title, ellipsoid=find_ellipsoid(spec.ellipsoid))
 
 
 def _state(trajectory: pd.DataFrame, row: int) -> dict[str, float]:

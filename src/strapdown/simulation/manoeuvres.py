@@ -21,7 +21,14 @@ _NODES = 32
 
 @dataclass(frozen=True)
 class Accelerate:
-    """Change the speed to `to` (m/s) in `duration` (s), with least jerk; it may fall too."""
+    """Come to another speed with least jerk; it may fall too.
+
+    Attributes
+    ----------
+    to : float, m/s
+    duration : float, s
+        The largest acceleration is 15/8 of the mean.
+    """
 
     to: float
     duration: float
@@ -46,7 +53,7 @@ class Accelerate:
 
 @dataclass(frozen=True)
 class Brake(Accelerate):
-    """Come down to the speed `to` (m/s) in `duration` (s), with least jerk."""
+    """Come down to another speed; as `Accelerate`, but it must be lower."""
 
     def lay(self, course: Course) -> None:
         """Add it to a course."""
@@ -61,7 +68,12 @@ class Brake(Accelerate):
 
 @dataclass(frozen=True)
 class Stop:
-    """Brake to a stop in `braking` (s), and stand for `stay` (s)."""
+    """Brake to a stop, and stand.
+
+    Attributes
+    ----------
+    braking, stay : float, s
+    """
 
     braking: float
     stay: float = 0.0
@@ -76,7 +88,12 @@ class Stop:
 
 @dataclass(frozen=True)
 class Straight:
-    """Go on as it is, or stand, for `duration` (s)."""
+    """Go on as it is, or stand, for a time.
+
+    Attributes
+    ----------
+    duration : float, s
+    """
 
     duration: float
 
@@ -88,7 +105,13 @@ class Straight:
 
 @dataclass(frozen=True)
 class Along:
-    """Go straight on for a `distance` (m)."""
+    """Go straight on for a distance.
+
+    Attributes
+    ----------
+    distance : float, m
+        Along the path.
+    """
 
     distance: float
 
@@ -100,10 +123,17 @@ class Along:
 
 @dataclass(frozen=True)
 class Turn:
-    """Turn by an angle (deg, positive to the right) on a `radius` (m).
+    """Turn on a radius.
 
-    The turn rate comes and goes in `ramp` (s) with least jerk; where the angle is too small for
-    two ramps at the full rate, in less.
+    Attributes
+    ----------
+    angle_deg : float, deg
+        Of the whole turn with its ramps, positive to the right.
+    radius : float, m
+        Between the ramps, level.
+    ramp : float, s
+        The turn rate comes and goes in this with least jerk; where the angle is too small for two
+        ramps at the full rate, in less.
     """
 
     angle_deg: float
@@ -128,7 +158,17 @@ class Turn:
 
 @dataclass(frozen=True)
 class BankedTurn:
-    """Turn by an angle (deg, positive to the right) at a bank (deg) that is felt straight down."""
+    """Turn at a bank, so that it is felt straight down.
+
+    Attributes
+    ----------
+    angle_deg : float, deg
+        Of the whole turn with its ramps, positive to the right.
+    bank_deg : float, deg
+        Between the ramps; the turn rate is ``g tan(bank)/(v cos climb)``.
+    ramp : float, s
+        As in `Turn`.
+    """
 
     angle_deg: float
     bank_deg: float
@@ -150,7 +190,17 @@ class BankedTurn:
 
 @dataclass(frozen=True)
 class Climb:
-    """Climb at an angle (deg, down if negative): on, or until `height` (m) is gained or lost."""
+    """Climb or descend.
+
+    Attributes
+    ----------
+    angle_deg : float, deg
+        Of the path over the horizon, down if negative.
+    height : float, m, optional
+        What is gained or lost until the path is level again; without it, on until `Level`.
+    ramp : float, s
+        In which the angle comes and goes.
+    """
 
     angle_deg: float
     height: float | None = None
@@ -197,7 +247,12 @@ class Climb:
 
 @dataclass(frozen=True)
 class Level:
-    """Leave a climb."""
+    """Leave a climb.
+
+    Attributes
+    ----------
+    ramp : float, s
+    """
 
     ramp: float = 3.0
 
@@ -210,7 +265,15 @@ class Level:
 
 @dataclass(frozen=True)
 class LaneChange:
-    """Go over to a lane `offset` (m, positive to the right) beside this one in `duration` (s)."""
+    """Go over to a lane beside this one.
+
+    Attributes
+    ----------
+    offset : float, m
+        To the right.
+    duration : float, s
+        The course leaves and comes back in it, each by two ramps of a quarter.
+    """
 
     offset: float
     duration: float

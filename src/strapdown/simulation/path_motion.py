@@ -24,6 +24,8 @@ Array = NDArray[np.float64]
 
 # Beyond this pitch, heading and roll turn about nearly one axis and mean nothing to a vehicle.
 MOST_PITCH = 80.0  # deg
+# What a few hundred megabytes hold of an integral's panels, one a wave's period.
+_MOST_WAVES = 100_000
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class PathMotion(EarthMotion):
     Raises
     ------
     ConfigError
-        The duration is not positive, or the pitch goes beyond 80 deg.
+        The duration is not positive, the pitch goes beyond 80 deg, or a wave is too short for it.
     """
 
     duration: float
@@ -95,11 +97,22 @@ class PathMotion(EarthMotion):
                 remedy=f"stay within {MOST_PITCH:g} deg",
             )
 
+        shortest = min([math.inf, *(w.period for w in self._waves)])
+        if self.duration / shortest > _MOST_WAVES:
+            raise ConfigError(
+                f"a wave of {shortest:.3g} s comes {self.duration / shortest:.3g} times",
+                quantity="period",
+                remedy=f"use {self.duration / _MOST_WAVES:.3g} s or more, or a shorter motion",
+            )
+
+    @property
+    def _waves(self) -> tuple[Wave, ...]:
+        return (*self.roll_waves, *self.pitch_waves, *self.heading_waves, *self.heave_waves)
+
     @property
     def breaks(self) -> Sequence[float]:
         """Where a track begins another move, and as often that no wave is overlooked, s."""
-        waves = (*self.roll_waves, *self.pitch_waves, *self.heading_waves, *self.heave_waves)
-        step = min([self.duration, *(w.period for w in waves)])
+        step = min([self.duration, *(w.period for w in self._waves)])
         inner = {*self.speed.times, *self.turn_rate.times, *self.climb.times}
         inner |= {step * k for k in range(math.ceil(self.duration / step))}
         return [0.0, *sorted(t for t in inner if 0.0 < t < self.duration), self.duration]

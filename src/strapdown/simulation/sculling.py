@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import ConfigError
+from strapdown.simulation.flat_motion import FlatMotion
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -19,7 +20,7 @@ HARMONICS = 28
 
 
 @dataclass(frozen=True)
-class Sculling:
+class Sculling(FlatMotion):
     """An angular vibration, and a linear one of the same frequency along a body axis across it.
 
     The body turns by ``α sin Ωt`` about n. Along the body axis e, which stands across n, it is

@@ -22,6 +22,8 @@ Triple = tuple[float, float, float]
 
 # Part of the greatest horizontal speed under which the path has no direction.
 _LEAST = 1e-3
+# Part of the duration: what a few hundred megabytes hold of an integral's panels.
+_LEAST_PERIOD = 1e-5
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,8 @@ class SineVelocityMotion(EarthMotion):
     Raises
     ------
     ConfigError
-        The duration or the period is not positive, or the vehicle comes to a stop, where its
-        path has no direction.
+        The duration is not positive, the period is under 1e-5 of it, or the vehicle comes to a
+        stop, where its path has no direction.
     """
 
     duration: float
@@ -61,11 +63,12 @@ class SineVelocityMotion(EarthMotion):
 
     def __post_init__(self) -> None:
         check_duration(self.duration)
-        if not 0.0 < self.period < math.inf:
+        least = self.duration * _LEAST_PERIOD
+        if not least <= self.period < math.inf:
             raise ConfigError(
-                f"a velocity cannot change with a period of {self.period:g} s",
+                f"the velocity is to change with a period of {self.period:g} s",
                 quantity="period",
-                remedy="use a number above zero",
+                remedy=f"use {least:.3g} s or more for a motion of {self.duration:g} s",
             )
         cycle = np.linspace(0.0, min(self.period, self.duration), 4097)
         speed = np.hypot(*self._velocity(cycle)[:, :2].T)

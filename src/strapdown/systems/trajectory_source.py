@@ -43,6 +43,7 @@ _KEYS = {
     "distance": "distance_m",
     "duration": "duration_s",
     "height": "height_m",
+    "latitude": "lat_deg",
     "offset": "offset_m",
     "period": "period_s",
     "radius": "radius_m",

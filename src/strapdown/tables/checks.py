@@ -52,8 +52,10 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
     bad = ~np.isfinite(values)
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
+        rows = np.flatnonzero(bad.any(axis=1))
+        more = f"; {rows.size} rows up to row {rows[-1] + 1} have such" if rows.size > 1 else ""
         raise DataError(
-            f"not a finite number ({values[row, column]})",
+            f"not a finite number ({values[row, column]}){more}",
             file=source,
             row=row + 1,
             quantity=columns[column],

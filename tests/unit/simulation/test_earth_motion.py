@@ -173,6 +173,11 @@ def test_a_stop_has_no_heading():
         sine(mean_velocity=(0.0, 0.0, 0.0), amplitude=(1.0, 0.0, 0.0))
 
 
+def test_a_period_is_checked():
+    with pytest.raises(ConfigError, match=r"period of 0.001 s\n.*use 0.006 s or more"):
+        sine(period=0.001)
+
+
 def test_a_pole_is_refused():
     motion = sine(duration=3600.0, origin=Origin(88.9, 0.0), mean_velocity=(9.0, 1.0, 0.0))
     with pytest.raises(ConfigError, match=r"comes to a latitude of 89\.\d+ deg"):

@@ -304,5 +304,7 @@ def test_waves_and_pitches_are_checked():
         Wave(math.inf, 1.0)
     with pytest.raises(ConfigError, match="pitch goes up to 85 deg"):
         rocking_stand(1.0, PLACE, pitch_deg=-80.0, pitch_waves=(Wave(5.0, 3.0),))
+    with pytest.raises(ConfigError, match="a wave of 1e-05 s comes 1e\\+07 times"):
+        rocking_stand(100.0, PLACE, roll_waves=(Wave(1.0, 1e-5),))
     with pytest.raises(ConfigError, match="cannot last 0 s"):
         rocking_stand(0.0, PLACE)
