@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 
@@ -54,3 +56,23 @@ def errors(run, motion) -> pd.DataFrame:
     """Estimate minus truth at every state of a run: m, m/s, deg."""
     truth = motion.trajectory(run.time)
     return trajectory_differences(run.trajectory, truth, motion.ellipsoid)[TRAJECTORY_ERROR]
+
+
+def rounding(steps, duration):
+    """What rounding alone may leave of a run, if it is always to the same side.
+
+    Attitude and place are rounded to half a unit in the last place of a number under one,
+    1.1e-16: the place by as much of the Earth's radius, 6.4e6 m, the tilt so, which gravity turns
+    into velocity with sqrt(R/g) = 806 s; heading is made of four such numbers. The vertical
+    channel multiplies what it gets: thirty roundings of a gravity of 9.8, 1.1e-16 of it each, in
+    gravity and in the force that meets it, by (cosh kT - 1)/k² with k² = 2g/R.
+    """
+    turn = steps * 1.1e-16
+    k = math.sqrt(2.0 * 9.8 / 6.378e6)
+    rise = 30.0 * 1.1e-16 * 9.8 * (math.cosh(k * duration) - 1.0) / k**2
+    # The height itself, up to 30 km, is rounded to 1.8e-12 m at most in every step.
+    rise += steps * 1.8e-12 * math.cosh(k * duration)
+    place, velocity = turn * 6.4e6, turn * 9.8 * 806.0
+    tilt, heading = math.degrees(turn), math.degrees(4.0 * turn)
+    bounds = [place, place, rise, velocity, velocity, rise * k, tilt, tilt, heading]
+    return pd.Series(bounds, TRAJECTORY_ERROR)

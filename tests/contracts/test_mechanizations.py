@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import sys
 from pathlib import Path
@@ -11,8 +12,6 @@ import pandas as pd
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-
-import itertools
 
 from exact_increments import exact_increments, start_of
 from strapdown.exceptions import ConfigError, DataError, DivergenceError
@@ -377,7 +376,7 @@ def test_a_tracker_stops_before_a_pole():
 
 @pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
 @pytest.mark.parametrize(
-    "cuts", [[1, 2, 3, 60, 61, 299], [2, 150], [150, 150, 151], list(range(1, 300)), [298]]
+    "cuts", [[1, 2, 3, 60, 61, 299], [2, 150], [150, 150, 151], list(range(1, 100)), [298]]
 )
 @pytest.mark.parametrize("name", NAMES)
 def test_pieces_give_the_bits_of_the_whole(name, cuts, sampling):

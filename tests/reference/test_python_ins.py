@@ -7,7 +7,6 @@ are alike, and their data are not. So each side navigates its own data and is he
 from __future__ import annotations
 
 import functools
-import math
 import sys
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from pyins.transform import compute_state_difference
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from exact_increments import errors, start_of
+from exact_increments import errors, rounding, start_of
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.simulation import (
@@ -82,25 +81,6 @@ def ours(name, sampling, interpolation):
     return errors(run_mechanization(NorthEastDown(), start_of(motion), increments), motion).abs()
 
 
-def rounding(steps):
-    """What rounding alone may leave, if it is always to the same side.
-
-    Attitude and place are rounded to half a unit in the last place of a number under one,
-    1.1e-16: the place by as much of the Earth's radius, 6.4e6 m, the tilt so, which gravity turns
-    into velocity with sqrt(R/g) = 806 s; heading is made of four such numbers. The vertical
-    channel multiplies what it gets: thirty roundings of a gravity of 9.8, 1.1e-16 of it each, in
-    gravity and in the force that meets it, by (cosh kT - 1)/k² with k² = 2g/R.
-    """
-    turn = steps * 1.1e-16
-    k = math.sqrt(2.0 * 9.8 / 6.378e6)
-    rise = 30.0 * 1.1e-16 * 9.8 * (math.cosh(k * HOUR) - 1.0) / k**2
-    place, velocity = turn * 6.4e6, turn * 9.8 * 806.0
-    tilt, heading = math.degrees(turn), math.degrees(4.0 * turn)
-    bounds = [place, place, rise, velocity, velocity, rise * k, tilt, tilt, heading]
-    names = ["north", "east", "down", "VN", "VE", "VD", "roll", "pitch", "heading"]
-    return pd.Series(bounds, names)
-
-
 @pytest.mark.parametrize(("name", "sampling"), CASES)
 def test_no_component_is_worse_than_that_of_python_ins(name, sampling):
     found = ours(name, sampling, "cubic").max()
@@ -108,7 +88,7 @@ def test_no_component_is_worse_than_that_of_python_ins(name, sampling):
     assert (found <= peer).all(), pd.DataFrame({"strapdown": found, "python-ins": peer})
     # And only rounding is left: of the sine the cubic errs by 11/720 (dt 2 pi/60 s)^4 = 2e-14 of
     # what it joins, which passes with every period.
-    assert (found <= rounding(HOUR * MOTIONS[name][1])).all(), found
+    assert (found <= rounding(HOUR * MOTIONS[name][1], HOUR)).all(), found
 
 
 def test_the_trapezoid_costs_both_the_same():

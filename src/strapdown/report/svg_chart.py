@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -89,7 +90,9 @@ def _own_style() -> Iterator[None]:
     """Not the style of whoever runs it: the picture belongs to the seal."""
     import matplotlib as mpl
 
-    with mpl.rc_context():
+    with mpl.rc_context(), warnings.catch_warnings():
+        # A letter that the font lacks, in a name of the user's, is a box.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
@@ -98,6 +101,8 @@ def _own_style() -> Iterator[None]:
 def _figure(chart: Chart, caption: bool = False) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+
+    from strapdown.report.picture_layout import RoundedLayout
 
     class Picture(Figure):
         """Shows itself where pyplot, which would do it otherwise, was never loaded."""
@@ -109,7 +114,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
                 self.savefig(stream, format="png", dpi=_DPI)
                 return stream.getvalue()
 
-    figure = Picture(figsize=(_WIDTH, _height(chart)), layout="constrained")
+    figure = Picture(figsize=(_WIDTH, _height(chart)), layout=RoundedLayout())
     FigureCanvasAgg(figure)
     axes = _axes(chart, figure)
     for panel, axis in zip(chart.panels, axes, strict=True):

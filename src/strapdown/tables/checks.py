@@ -41,6 +41,28 @@ def check_same_length(source: str | None, **arrays: Array) -> None:
         )
 
 
+def joined(
+    time: ArrayLike,
+    columns: Sequence[str],
+    source: str | None,
+    **blocks: tuple[ArrayLike, int | None],
+) -> pd.DataFrame:
+    """Blocks side by side, each of shape (n,) or (n, columns), over one index of stamps."""
+    stamps = as_array(time, None, "time", source)
+    arrays = {
+        name: as_array(values, width, name, source) for name, (values, width) in blocks.items()
+    }
+    check_same_length(source, time=stamps, **arrays)
+    table = pd.DataFrame(
+        np.column_stack(list(arrays.values())),
+        index=pd.Index(stamps, name="time"),
+        columns=list(columns),
+        copy=False,
+    )
+    table.attrs["source"] = source
+    return table
+
+
 def check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
     """Every value is finite; else the first that is not is named."""
     # A sum is finite only where everything in it is; it needs no memory, and is several times

@@ -7,16 +7,17 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.tables.checks import (
-    as_array,
     check_columns,
     check_rows,
-    check_same_length,
     check_steps,
     check_time,
     index_of,
+    joined,
     values_of,
 )
 from strapdown.tables.columns import DTHETA, THETA
+
+INCREMENTS = ["dt", *THETA, *DTHETA]
 
 
 def increments_table(
@@ -44,15 +45,8 @@ def increments_table(
     DataError
         Shapes disagree, a value is not finite, or a step has no positive length.
     """
-    ends, lengths = as_array(time, None, "time"), as_array(dt, None, "dt")
-    angles = as_array(theta, 3, "theta")
-    change = np.zeros_like(angles) if dtheta is None else as_array(dtheta, 3, "dtheta")
-    check_same_length(None, time=ends, dt=lengths, theta=angles, dtheta=change)
-    table = pd.DataFrame(
-        np.column_stack([lengths, angles, change]),
-        index=pd.Index(ends, name="time"),
-        columns=["dt", *THETA, *DTHETA],
-    )
+    change = np.zeros_like(theta, dtype=np.float64) if dtheta is None else dtheta
+    table = joined(time, INCREMENTS, None, dt=(dt, None), theta=(theta, 3), dtheta=(change, 3))
     check_increments(table)
     return table
 
@@ -71,8 +65,7 @@ def check_increments(table: pd.DataFrame) -> None:
         positive, or a step begins before the one before it has ended.
     """
     source = table.attrs.get("source")
-    columns = ["dt", *THETA, *DTHETA]
-    check_columns(table, columns, source)
+    check_columns(table, INCREMENTS, source)
     check_time(index_of(table), source)
-    check_rows(values_of(table, columns), columns, source)
+    check_rows(values_of(table, INCREMENTS), INCREMENTS, source)
     check_steps(table, source)

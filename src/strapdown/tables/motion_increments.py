@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.tables.checks import (
-    as_array,
     check_columns,
     check_rows,
-    check_same_length,
     check_steps,
     check_time,
     index_of,
+    joined,
     values_of,
 )
 from strapdown.tables.columns import DR, DV, PHI
@@ -60,16 +58,7 @@ def motion_increments_table(
     DataError
         As `check_motion_increments`.
     """
-    ends, lengths = as_array(time, None, "time", source), as_array(dt, None, "dt", source)
-    turn, velocity = as_array(phi, 3, "phi", source), as_array(dv, 3, "dv", source)
-    distance = as_array(dr, 3, "dr", source)
-    check_same_length(source, time=ends, dt=lengths, phi=turn, dv=velocity, dr=distance)
-    table = pd.DataFrame(
-        np.column_stack([lengths, turn, velocity, distance]),
-        index=pd.Index(ends, name="time"),
-        columns=MOTION,
-    )
-    table.attrs["source"] = source
+    table = joined(time, MOTION, source, dt=(dt, None), phi=(phi, 3), dv=(dv, 3), dr=(dr, 3))
     check_motion_increments(table)
     return table
 

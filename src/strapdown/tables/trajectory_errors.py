@@ -8,12 +8,11 @@ from numpy.typing import ArrayLike
 
 from strapdown.exceptions import DataError
 from strapdown.tables.checks import (
-    as_array,
     check_columns,
     check_rows,
-    check_same_length,
     check_time,
     index_of,
+    joined,
     values_of,
 )
 from strapdown.tables.columns import EULER, NED, VELOCITY
@@ -52,16 +51,8 @@ def trajectory_error_table(
     DataError
         Shapes disagree, a value is not finite, or time does not advance.
     """
-    stamps = as_array(time, None, "time", source)
-    places, speeds = as_array(place, 3, "place", source), as_array(velocity, 3, "velocity", source)
-    angles = as_array(euler, 3, "euler", source)
-    check_same_length(source, time=stamps, place=places, velocity=speeds, euler=angles)
-    table = pd.DataFrame(
-        np.hstack([places, speeds, angles]),
-        index=pd.Index(stamps, name="time"),
-        columns=TRAJECTORY_ERROR,
-    )
-    table.attrs["source"] = source
+    blocks = {"place": (place, 3), "velocity": (velocity, 3), "euler": (euler, 3)}
+    table = joined(time, TRAJECTORY_ERROR, source, **blocks)
     check_trajectory_error(table)
     return table
 

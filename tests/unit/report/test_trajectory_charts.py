@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -138,7 +140,7 @@ def test_one_that_only_rises_has_a_height_and_no_plan():
     assert chart.panels[0].lines[0].y.max() == pytest.approx(199.0)
 
 
-def test_rounding_does_not_look_like_a_signal(tmp_path):
+def test_rounding_does_not_look_like_a_signal():
     table = trajectory(leg(300.0, 400.0))
     table["alt"] += 1e-9 * np.arange(len(table))
     chart = trajectory_chart(table, title="t")
@@ -195,15 +197,15 @@ def test_a_long_one_is_thinned_and_says_so():
 @pytest.mark.parametrize(
     "ned", [leg(500.0, 0.0), leg(0.0, 500.0), leg(300.0, -400.0), leg(1e-2, 0.0), leg(9e6, 1e5)]
 )
-def test_a_plan_has_equal_scales_in_both_drawings_and_holds_its_path(ned, tmp_path):
+def test_a_plan_has_equal_scales_in_both_drawings_and_holds_its_path(ned):
     chart = trajectory_chart(trajectory(ned), title="t")
     drawn = notebook_figure(chart)
-    drawn.savefig(tmp_path / "a.png")
+    drawn.canvas.draw()
     axis = drawn.axes[0]
     box = axis.get_window_extent()
     (left, right), (low, high) = axis.get_xlim(), axis.get_ylim()
-    # Layout is found to a tenth of a pixel or so of some hundreds.
-    assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=1e-3)
+    # Matplotlib leaves scales alone that differ by less than 0.5 %.
+    assert box.width / (right - left) == pytest.approx(box.height / (high - low), rel=5e-3)
     path = line(chart.panels[0], "trajectory")
     assert left < path.x.min() <= path.x.max() < right
     assert low < path.y.min() <= path.y.max() < high
@@ -220,7 +222,7 @@ def test_panels_over_time_share_an_axis_below_the_plan():
     domains = [layout[f"yaxis{k}"]["domain"] for k in ("", 2, 3, 4, 5, 6)]
     assert domains[0][1] == 1.0
     assert domains[-1][0] == pytest.approx(0.0, abs=1e-12)
-    for above, below in zip(domains, domains[1:], strict=False):
+    for above, below in pairwise(domains):
         assert above[0] > below[1]
     heights = [b - a for a, b in domains]
     assert heights[0] > 2 * heights[1]
@@ -247,3 +249,16 @@ def test_pictures_have_the_same_bytes_and_hold_the_caption(tmp_path):
     assert a == b
     assert b"level plane at the start" in a
     assert b"level plane" not in c
+
+
+def test_places_of_panels_are_rounded_as_the_solver_is_not_reproducible():
+    drawn = notebook_figure(trajectory_chart(trajectory(leg(300.0, 400.0)), title="t"))
+    for _ in range(2):
+        drawn.canvas.draw()
+        for axis in drawn.axes:
+            bounds = axis.get_position(original=True).bounds
+            assert bounds == pytest.approx(np.round(bounds, 6), abs=1e-15)
+    # They lie below each other still.
+    tops = [axis.get_position(original=True).bounds for axis in drawn.axes]
+    for above, below in pairwise(tops):
+        assert above[1] > below[1] + below[3]
