@@ -169,9 +169,12 @@ def find_ellipsoid(name: str) -> Ellipsoid:
     """
     try:
         return ELLIPSOIDS[name.lower()]
-    except KeyError:
+    except (AttributeError, KeyError):
+        given = name.name if isinstance(name, Ellipsoid) else str(name)
         raise ConfigError(
             f"there is no ellipsoid '{name}'",
             quantity="ellipsoid",
-            remedy=nearest(name, ELLIPSOIDS),
+            remedy=f"Give a name. {nearest(given, ELLIPSOIDS)}"
+            if not isinstance(name, str)
+            else nearest(given, ELLIPSOIDS),
         ) from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import DataError
-from strapdown.tables import trajectory_table
+from strapdown.tables import EULER, check_trajectory, trajectory_table
 
 __all__ = ["NavState"]
 
@@ -50,7 +51,14 @@ class NavState:
     q_nb: Array
 
     def __post_init__(self) -> None:
-        v_n = np.array(self.v_n, dtype=np.float64)
+        for name in ("time", "lat", "lon", "alt"):
+            if not isinstance(getattr(self, name), Real):
+                raise DataError(
+                    f"not a number ({getattr(self, name)!r})",
+                    quantity=name,
+                    remedy="a navigation state needs a number for each of its parts",
+                )
+        v_n = _numbers(self.v_n, "v_n")
         if v_n.shape != (3,):
             raise DataError(
                 f"its shape is {v_n.shape}",
@@ -79,7 +87,14 @@ class NavState:
                 remedy="this looks like degrees: use NavState.from_degrees",
             )
         v_n.flags.writeable = False
-        q_nb = rotation.normalise(self.q_nb)
+        q_nb = _numbers(self.q_nb, "q_nb")
+        if q_nb.shape != (4,):
+            raise DataError(
+                f"its shape is {q_nb.shape}",
+                quantity="q_nb",
+                remedy="give one quaternion, scalar first, or angles to NavState.from_degrees",
+            )
+        q_nb = rotation.normalise(q_nb)
         q_nb.flags.writeable = False
         object.__setattr__(self, "v_n", v_n)
         object.__setattr__(self, "q_nb", q_nb)
@@ -119,6 +134,12 @@ class NavState:
         DataError
             As the class; a latitude over 90 deg says so.
         """
+        angles = (lat_deg, lon_deg, roll_deg, pitch_deg, heading_deg)
+        for name, value in zip(("lat_deg", "lon_deg", *EULER), angles, strict=True):
+            if not isinstance(value, Real) or not math.isfinite(value):
+                raise DataError(
+                    f"not a finite number ({value!r})", quantity=name, remedy="give it in degrees"
+                )
         if abs(lat_deg) > 90.0:
             raise DataError(
                 f"a latitude of {lat_deg:.9g} deg is beyond the pole",
@@ -138,7 +159,7 @@ class NavState:
             lat=math.radians(lat_deg),
             lon=math.radians(lon_deg),
             alt=alt,
-            v_n=np.asarray(v_n, dtype=np.float64),
+            v_n=_numbers(v_n, "v_n"),
             q_nb=rotation.quaternion_from_euler([roll_deg, pitch_deg, heading_deg]),
         )
 
@@ -155,7 +176,21 @@ class NavState:
         Returns
         -------
         NavState
+
+        Raises
+        ------
+        DataError
+            As `tables.check_trajectory`; there is no such row.
         """
+        check_trajectory(trajectory)
+        rows = len(trajectory)
+        if not -rows <= row < rows:
+            raise DataError(
+                f"there is no row {row} among {rows}",
+                file=trajectory.attrs.get("source"),
+                quantity="row",
+                remedy="count from 0, or from the end with -1",
+            )
         at = trajectory.iloc[row]
         return cls.from_degrees(
             float(at["lat"]),
@@ -179,6 +214,17 @@ class NavState:
         return trajectory_table(
             [self.time], [place], [self.v_n], [self.roll_pitch_heading], source=None
         )
+
+
+def _numbers(values: ArrayLike, name: str) -> Array:
+    try:
+        return np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError(
+            f"these are no numbers ({values!r})",
+            quantity=name,
+            remedy="give north, east, down in m/s" if name == "v_n" else "give four numbers",
+        ) from None
 
 
 def _beyond_in_radians(lat: float, lon: float) -> str:

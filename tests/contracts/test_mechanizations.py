@@ -240,7 +240,7 @@ def test_a_divergence_leaves_the_caller_with_the_state_it_had(name):
     mechanization, log = MECHANIZATIONS[name](largest_speed=60.0), flight()
     state = mechanization.begin(start_of(FLIGHT))
     kept = state.copy()
-    with pytest.raises(DivergenceError, match=r"\(step 1:"):
+    with pytest.raises(DivergenceError, match="to begin with"):
         mechanization.advance(state, log)
     assert np.array_equal(state, kept)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from numbers import Real
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.earth import RATE
-from strapdown._kernels.ned import POLE, ROW, V, reverse_increments
+from strapdown._kernels.ned import ALT, POLE, ROW, V, reverse_increments
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import ELLIPSOIDS, find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
@@ -70,7 +71,7 @@ class Mechanization(ABC):
             raise ConfigError(
                 f"'{self.height}' is nothing that the height can be",
                 quantity="height",
-                remedy=nearest(self.height, HEIGHTS),
+                remedy=nearest(str(self.height), HEIGHTS),
             )
         for name, low, high in (
             ("height_time_constant", 1.0, 1000.0),
@@ -78,18 +79,23 @@ class Mechanization(ABC):
             ("largest_speed", 1.0, 30_000.0),
         ):
             value = getattr(self, name)
-            if not low <= value <= high:
+            if not isinstance(value, Real) or not low <= value <= high:
                 raise ConfigError(
-                    f"{value:g} is outside {low:g} to {high:g}",
+                    f"{value} is outside {low:g} to {high:g}",
                     quantity=name,
                     remedy="choose a value in that range",
                 )
-        lowest, highest = self.height_limits
-        if not lowest < highest:
+        limits = self.height_limits
+        if (
+            not isinstance(limits, tuple | list)
+            or len(limits) != 2
+            or not all(isinstance(x, Real) for x in limits)
+            or not limits[0] < limits[1]
+        ):
             raise ConfigError(
-                f"between {lowest:g} and {highest:g} there is no height",
+                f"{limits} are no two heights",
                 quantity="height_limits",
-                remedy="give the lowest and then the highest",
+                remedy="give the lowest and then the highest, in m",
             )
 
     @abstractmethod
@@ -206,6 +212,8 @@ class Mechanization(ABC):
         made, why = self.advance_rows(state, rows, reference, earth, history)
         if why:
             at = len(rows) - 1 - made if backward else made
+            if not made:
+                self._refuse_start(state, increments)
             self._refuse(why, at, increments, history[made - 1] if made else None)
         if backward:
             state[V : V + 3] *= -1.0
@@ -252,7 +260,14 @@ class Mechanization(ABC):
                 quantity="heights",
                 remedy="give a height for every step, or use height='held' or 'free'",
             )
-        reference = np.ascontiguousarray(heights, dtype=np.float64)
+        try:
+            reference = np.ascontiguousarray(heights, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise DataError(
+                "these are no numbers",
+                quantity="heights",
+                remedy="give one height in m for every step, NaN where there is none",
+            ) from None
         if reference.shape != (steps,):
             raise DataError(
                 f"its shape is {reference.shape}, and there are {steps} steps",
@@ -267,6 +282,19 @@ class Mechanization(ABC):
                 remedy="give heights in m, NaN where there is none",
             )
         return reference
+
+    def _refuse_start(self, state: Array, increments: pd.DataFrame) -> None:
+        """Refuse a state that was outside of the limits before any step."""
+        speed, (lowest, highest) = float(np.linalg.norm(state[V : V + 3])), self.height_limits
+        if speed > self.largest_speed or not lowest <= state[ALT] <= highest:
+            raise DivergenceError(
+                f"the state to begin with, {state[ALT]:.6g} m high and at {speed:.6g} m/s, is "
+                f"outside of {lowest:g} to {highest:g} m, or above {self.largest_speed:g} m/s",
+                file=increments.attrs.get("source"),
+                quantity="state",
+                remedy="give the height over the ellipsoid in m and the velocity in m/s, or other "
+                "height_limits or largest_speed",
+            )
 
     def _refuse(self, why: int, step: int, increments: pd.DataFrame, last: Array | None) -> None:
         time = float(increments.index[step])

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.ned import ROW
-from strapdown.exceptions import DataError, Finding
+from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import motion_increments
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 # The longest step, in s, over which two samples say what happened between them. Longer holes
 # are for the user to judge.
 LONGEST_STEP = 1.0
+# Share of a step by which the next may begin later: stamps are rounded, a lost step is a whole one.
+LOST = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +94,10 @@ def run_mechanization(
     Raises
     ------
     DataError
-        The table is not valid, a step is too long, or `start` is not at the time where the
-        increments begin.
+        The table is not valid, a step is too long, there is a hole between two steps, or `start`
+        is not at the time where the increments begin.
+    ConfigError
+        `longest_step` is no time.
     DivergenceError
         As `Mechanization.advance`.
     """
@@ -185,6 +190,16 @@ def navigate_segments(
         kept = joined.iloc[-2:]
 
 
+def check_longest_step(longest: float) -> None:
+    """Refuse what is no length of time."""
+    if not isinstance(longest, Real) or not longest > 0.0:
+        raise ConfigError(
+            f"a longest step of {longest} is none",
+            quantity="longest_step",
+            remedy="give a time in s above zero; inf allows every step",
+        )
+
+
 def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> None:
     slack = 0.5 * float(increments["dt"].iloc[0])
     if abs(start.time - begin) > slack:
@@ -196,8 +211,29 @@ def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> Non
         )
 
 
+def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
+    """Refuse time between two steps over which there is no increment."""
+    ends = increments.index.to_numpy(dtype=np.float64)
+    between = np.diff(ends) - dt[1:]
+    if between.size and between.max() > LOST * dt.min():
+        holes = np.flatnonzero(between > LOST * dt[1:])
+        if holes.size:
+            at = int(holes[0])
+            raise DataError(
+                f"no increment from {ends[at]:.9g} s to {ends[at] + between[at]:.9g} s: what the "
+                f"body did then is not known ({holes.size} such)",
+                file=increments.attrs.get("source"),
+                row=at + 2,
+                quantity="dt",
+                remedy="keep every row of the table that was made of the log, and cut it at its "
+                "ends alone; or go on from there with a state that is known",
+            )
+
+
 def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...]:
+    check_longest_step(longest)
     dt = increments["dt"].to_numpy(dtype=np.float64)
+    _check_joints(increments, dt)
     # The usual step is no shorter than the shortest: with this most logs are done.
     if dt.max() <= min(longest, 3.0 * float(dt.min())):
         return ()

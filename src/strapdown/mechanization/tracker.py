@@ -15,6 +15,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError
 from strapdown.mechanization.mechanization import Array
 from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.run import LONGEST_STEP, check_longest_step
 from strapdown.nav_state import NavState
 from strapdown.tables import SAMPLINGS
 
@@ -31,15 +32,18 @@ class NavTracker:
     Parameters
     ----------
     start : NavState
-        At the first sample.
+        At the first sample, within `longest_step` of its time.
     mechanization : NorthEastDown, optional
     sampling : {'instantaneous', 'mean'}
         What a sample is: the value at its stamp, or its mean over the interval that ends there.
+    longest_step : float, s
+        A sample that comes later than this after the one before is refused: what happened in
+        between is not known.
 
     Raises
     ------
     ConfigError
-        `sampling` is unknown.
+        `sampling` is unknown, `longest_step` is no time, or the mechanization is another.
     """
 
     __slots__ = ("_mechanization", "_record", "_update")
@@ -49,16 +53,26 @@ class NavTracker:
         start: NavState,
         mechanization: NorthEastDown | None = None,
         sampling: str = "instantaneous",
+        longest_step: float = LONGEST_STEP,
     ) -> None:
+        check_longest_step(longest_step)
         if sampling not in SAMPLINGS:
             raise ConfigError(
                 f"'{sampling}' is no kind of sampling",
                 quantity="sampling",
                 remedy=f"use {' or '.join(SAMPLINGS)}",
             )
-        used = mechanization or NorthEastDown()
+        used = NorthEastDown() if mechanization is None else mechanization
+        if not isinstance(used, NorthEastDown):
+            raise ConfigError(
+                f"a tracker steps with NorthEastDown, and not with {used!r}",
+                quantity="mechanization",
+                remedy="leave it out, or give NorthEastDown with its options; others navigate a "
+                "whole log with run_mechanization",
+            )
         record = np.zeros(kernel.SIZE)
         record[kernel.TIME] = start.time
+        record[kernel.LONGEST] = longest_step
         record[kernel.MEAN] = float(sampling == "mean")
         record[kernel.EARTH : kernel.OPTIONS] = find_ellipsoid(used.ellipsoid).parameters()
         record[kernel.OPTIONS : kernel.STATE] = used.kernel_options()
@@ -90,7 +104,8 @@ class NavTracker:
         Raises
         ------
         DataError
-            Time does not advance, or rate and force are not three finite numbers each.
+            Time does not advance or leaves a gap, or rate and force are not three finite numbers
+            each.
         DivergenceError
             The state would diverge, or come too near to a pole.
 
@@ -120,7 +135,23 @@ class NavTracker:
                 quantity="time",
                 remedy="leave the sample out; the state is as before it",
             )
-        given = f"time {time}, rate {np.asarray(gyro).tolist()}, force {np.asarray(accel).tolist()}"
+        if why == kernel.GAP:
+            first = row == 1
+            begin = float(self._record[kernel.TIME])
+            raise DataError(
+                f"the state is at {begin:.9g} s, and the first sample at {time:.9g} s"
+                if first
+                else f"a gap of {time - begin:.6g} s, from {begin:.9g} s to {time:.9g} s: what the "
+                "body did in it is not known",
+                row=row,
+                quantity="time",
+                remedy="give the state of that instant"
+                if first
+                else "begin anew with a state that is known, or pass a longest_step of so many "
+                "seconds to join the sides by a line",
+            )
+        rate, force = (v.tolist() if isinstance(v, np.ndarray) else v for v in (gyro, accel))
+        given = f"time {time}, rate {rate}, force {force}"
         if why == kernel.BAD_SAMPLE:
             raise DataError(
                 f"{given}: a time, three finite rates and three finite forces are needed",
