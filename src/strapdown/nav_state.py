@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.exceptions import DataError
 from strapdown.tables import EULER, check_trajectory, trajectory_table
+from strapdown.tables.checks import is_number
 
 __all__ = ["NavState"]
 
@@ -52,7 +52,7 @@ class NavState:
 
     def __post_init__(self) -> None:
         for name in ("time", "lat", "lon", "alt"):
-            if not isinstance(getattr(self, name), Real):
+            if not is_number(getattr(self, name)):
                 raise DataError(
                     f"not a number ({getattr(self, name)!r})",
                     quantity=name,
@@ -136,7 +136,7 @@ class NavState:
         """
         angles = (lat_deg, lon_deg, roll_deg, pitch_deg, heading_deg)
         for name, value in zip(("lat_deg", "lon_deg", *EULER), angles, strict=True):
-            if not isinstance(value, Real) or not math.isfinite(value):
+            if not is_number(value) or not math.isfinite(value):
                 raise DataError(
                     f"not a finite number ({value!r})", quantity=name, remedy="give it in degrees"
                 )

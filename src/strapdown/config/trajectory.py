@@ -28,7 +28,7 @@ class TrajectorySpec(TableSpec):
     sampling: str = "instantaneous"
     seed: int = Field(default=0, ge=0)
     sensor: str | None = None
-    formats: tuple[str, ...] = ("csv",)
+    formats: tuple[str, ...] = Field(default=("csv",), min_length=1)
     trajectory_formats: tuple[str, ...] = ()
     motion: MotionSpec
 
@@ -58,9 +58,19 @@ def read_trajectory_spec(path: Path, **instead: Any) -> TrajectorySpec:
         There is no such file, it is no TOML, or a value does not fit; the message names the key.
     """
     if not path.is_file():
-        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+        what = "it is no file" if path.exists() else "there is no such file"
+        raise ConfigError(what, file=str(path), remedy="check the path")
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        # With the mark that some editors on Windows begin a file with, or without.
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except RecursionError:
+        raise ConfigError(
+            "it is nested too deep", file=path.name, remedy="a trajectory has three levels"
+        ) from None
+    except OSError as error:
+        raise ConfigError(
+            f"it cannot be read: {error.strerror}", file=str(path), remedy="check its permissions"
+        ) from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ConfigError(
             f"it is no TOML: {error}", file=path.name, remedy="mend it where it says"
@@ -91,6 +101,8 @@ def _explained(error: Any, file: str) -> ConfigError:
         place.append(context["key"])
     elif error["type"] == "missing":
         what, remedy = "it is missing", f"write {place[-1]} = …; its name tells its unit"
+        if isinstance(place[-1], int):
+            remedy = "give a number for each component"
     elif error["type"] == "union_tag_not_found":
         key = context["discriminator"].strip("'")
         place.append(key)
@@ -111,7 +123,9 @@ def _place(parts: list[str | int]) -> str:
     words: list[str] = []
     for k, part in enumerate(parts):
         if isinstance(part, int):
-            words[-1] = f"{words[-1].removesuffix('s')} {part + 1}"
+            # Of lists one is named, of vectors a component.
+            of = words[-1] if words[-1].endswith("_s") else words[-1].removesuffix("s")
+            words[-1] = f"{of} {part + 1}"
         elif not (part == "motion" and k == 0 and len(parts) > 1) and not (
             part in KINDS and k == 1 and parts[0] == "motion" and len(parts) > 2
         ):

@@ -50,6 +50,18 @@ class TrajectoryFileOptions:
     tum_frame: str = "enu"
 
     def __post_init__(self) -> None:
+        if not isinstance(self.ellipsoid, Ellipsoid):
+            raise ConfigError(
+                f"{self.ellipsoid!r} is no Ellipsoid",
+                quantity="ellipsoid",
+                remedy="give one, as ellipsoids.find_ellipsoid makes of a name",
+            )
+        if self.epoch is not None and not isinstance(self.epoch, datetime):
+            raise ConfigError(
+                f"{self.epoch!r} is no datetime",
+                quantity="epoch",
+                remedy="give one, as in datetime(2026, 3, 1, 12, tzinfo=UTC)",
+            )
         if self.epoch is not None and self.epoch.utcoffset() is None:
             raise ConfigError(
                 f"{self.epoch.isoformat()} has no time zone",
@@ -63,7 +75,7 @@ class TrajectoryFileOptions:
                 quantity="geoid_undulation",
                 remedy="give height over the ellipsoid minus height over the sea, -110 to 90 m",
             )
-        if self.most_points < 2:
+        if not isinstance(self.most_points, int) or self.most_points < 2:
             raise ConfigError(
                 f"a line cannot be drawn through {self.most_points} points",
                 quantity="most_points",
@@ -73,7 +85,7 @@ class TrajectoryFileOptions:
             raise ConfigError(
                 f"'{self.tum_frame}' is no frame of a TUM file",
                 quantity="tum_frame",
-                remedy=nearest(self.tum_frame, TUM_FRAMES),
+                remedy=nearest(str(self.tum_frame), TUM_FRAMES),
             )
 
     def require_wgs84(self, form: str) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from numbers import Real
 from typing import ClassVar
 
 import numpy as np
@@ -19,7 +18,7 @@ from strapdown.ellipsoids import ELLIPSOIDS, find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
-from strapdown.tables.checks import values_of
+from strapdown.tables.checks import is_number, values_of
 
 Array = NDArray[np.float64]
 
@@ -79,7 +78,7 @@ class Mechanization(ABC):
             ("largest_speed", 1.0, 30_000.0),
         ):
             value = getattr(self, name)
-            if not isinstance(value, Real) or not low <= value <= high:
+            if not is_number(value) or not low <= value <= high:
                 raise ConfigError(
                     f"{value} is outside {low:g} to {high:g}",
                     quantity=name,
@@ -89,7 +88,7 @@ class Mechanization(ABC):
         if (
             not isinstance(limits, tuple | list)
             or len(limits) != 2
-            or not all(isinstance(x, Real) for x in limits)
+            or not all(is_number(x) for x in limits)
             or not limits[0] < limits[1]
         ):
             raise ConfigError(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,7 @@ from strapdown.increments import motion_increments
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, check_motion_increments
-from strapdown.tables.checks import values_of
+from strapdown.tables.checks import is_number, values_of
 
 Array = NDArray[np.float64]
 
@@ -192,7 +191,7 @@ def navigate_segments(
 
 def check_longest_step(longest: float) -> None:
     """Refuse what is no length of time."""
-    if not isinstance(longest, Real) or not longest > 0.0:
+    if not is_number(longest) or not longest > 0.0:
         raise ConfigError(
             f"a longest step of {longest} is none",
             quantity="longest_step",

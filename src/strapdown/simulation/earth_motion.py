@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 
 # Nearer to a pole than this, heading and longitude turn faster than a vehicle does.
 MOST_NORTHERN = 89.0  # deg
+# Normal gravity is continued so far.
+FARTHEST = 1e6  # m
 
 
 @dataclass(frozen=True)
@@ -191,9 +193,17 @@ class EarthMotion(ABC):
         from strapdown._kernels.earth_motion import feel
 
         k = self.kinematics(_instants(time))
+        place = self.origin.place(k.moved)
+        far = ~(np.abs(place[:, 2]) <= FARTHEST)
+        if far.any():
+            raise ConfigError(
+                f"the motion comes to a height of {place[far, 2][0]:.6g} m",
+                quantity="alt",
+                remedy="stay within 1000 km of the ellipsoid: gravity is not known farther",
+            )
         rate, force = np.empty((len(k.moved), 3)), np.empty((len(k.moved), 3))
         feel(
-            self.origin.place(k.moved),
+            place,
             k.velocity,
             k.acceleration,
             k.q_nb,

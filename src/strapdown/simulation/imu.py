@@ -116,14 +116,14 @@ def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
             remedy=f"use at least {1.0 / motion.duration:.3g} Hz",
         )
     # The last sample still belongs where rounding puts the product just under a whole number.
-    count = int(np.floor(rate * motion.duration * (1.0 + 1e-12))) + 1
-    if count > MOST_SAMPLES:
+    samples = np.floor(rate * motion.duration * (1.0 + 1e-12)) + 1.0
+    if samples > MOST_SAMPLES:
         raise ConfigError(
-            f"{rate:g} Hz gives {count} samples in {motion.duration:g} s",
+            f"{rate:g} Hz gives {samples:.8g} samples in {motion.duration:g} s",
             quantity="rate",
             remedy=f"use at most {MOST_SAMPLES / motion.duration:.3g} Hz",
         )
-    return np.arange(count) / rate
+    return np.arange(int(samples)) / rate
 
 
 def _instants(

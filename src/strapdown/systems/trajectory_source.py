@@ -38,6 +38,7 @@ CLIMB_RAMP = 3.0
 _KEYS = {
     "acceleration": "most_acceleration_m_per_s2",
     "place": "waypoints",
+    "alt": "alt_m",
     "angle": "angle_deg",
     "bank": "bank_deg",
     "distance": "distance_m",
@@ -77,7 +78,7 @@ def simulate_trajectory(
         The sensor, the ellipsoid or the sampling is unknown, or the motion cannot be; the message
         names the key.
     """
-    errors = load_sensor(spec.sensor).draw(spec.seed) if spec.sensor else ImuErrors()
+    errors = ImuErrors() if spec.sensor is None else load_sensor(spec.sensor).draw(spec.seed)
     try:
         motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
         imu, attitude = simulate_imu(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 import pandas as pd
@@ -109,6 +110,11 @@ def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | Non
             file=source,
             remedy=f"a table of this kind needs {', '.join(columns)}",
         )
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is one real number, of Python or of numpy."""
+    return isinstance(value, Real)
 
 
 def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:

@@ -441,3 +441,18 @@ def test_differences_are_written_with_their_sign(tmp_path):
         "phi_N_deg,phi_E_deg,phi_D_deg"
     )
     assert float(lines[4].split(",")[3]) == pytest.approx(1.0, abs=5e-9)
+
+
+@pytest.mark.parametrize(
+    ("options", "quantity"),
+    [
+        ({"ellipsoid": "wgs84"}, "ellipsoid"),
+        ({"epoch": "2026-03-01"}, "epoch"),
+        ({"most_points": "many"}, "most_points"),
+        ({"tum_frame": None}, "tum_frame"),
+    ],
+)
+def test_options_of_a_wrong_kind_are_refused(options, quantity):
+    with pytest.raises(ConfigError) as caught:
+        TrajectoryFileOptions(**options)
+    assert caught.value.finding.quantity == quantity
