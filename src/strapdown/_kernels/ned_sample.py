@@ -11,12 +11,13 @@ from strapdown._kernels.ned import STATE as WIDTH
 
 # One float64 array holds everything between calls, because every further argument of a compiled
 # function costs more than a part of the step: stamp, samples so far, whether samples are means,
-# length of the step before, the last sample, the Earth, the options, the state.
-TIME, SAMPLES, MEAN, BEFORE, RATE, FORCE, EARTH, OPTIONS, STATE = 0, 1, 2, 3, 4, 7, 10, 17, 25
+# length of the step before, the longest step, the last sample, the Earth, the options, the state.
+TIME, SAMPLES, MEAN, BEFORE, LONGEST, RATE, FORCE = 0, 1, 2, 3, 4, 5, 8
+EARTH, OPTIONS, STATE = 11, 18, 26
 SIZE = STATE + WIDTH
 
 # What an update answers besides `DONE`, `POLE` and `DIVERGED` of the step.
-BAD_SAMPLE, BAD_TIME = -1, -2
+BAD_SAMPLE, BAD_TIME, BAD_START, GAP = -1, -2, -3, -4
 
 
 @njit(cache=True)
@@ -34,10 +35,15 @@ def ned_update(r, time, gyro, accel, reference):
     if not (usable(wx, wy, wz) and usable(fx, fy, fz)):
         return BAD_SAMPLE
     dt = 0.0
-    if r[SAMPLES] > 0.0:
+    if r[SAMPLES] == 0.0:
+        if not abs(time - r[TIME]) <= r[LONGEST]:
+            return BAD_START
+    else:
         dt = time - r[TIME]
         if dt <= 0.0:
             return BAD_TIME
+        if dt > r[LONGEST]:
+            return GAP
         if r[MEAN] != 0.0:
             before = r[BEFORE]
             if before == 0.0:

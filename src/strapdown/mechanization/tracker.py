@@ -15,6 +15,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError
 from strapdown.mechanization.mechanization import Array
 from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.run import LONGEST_STEP
 from strapdown.nav_state import NavState
 from strapdown.tables import SAMPLINGS
 
@@ -35,6 +36,9 @@ class NavTracker:
     mechanization : NorthEastDown, optional
     sampling : {'instantaneous', 'mean'}
         What a sample is: the value at its stamp, or its mean over the interval that ends there.
+    longest_step : float, s
+        A longer step is a hole over which nothing is known, and refused; so is a first sample
+        that is farther than this from the time of `start`.
 
     Raises
     ------
@@ -49,6 +53,7 @@ class NavTracker:
         start: NavState,
         mechanization: NorthEastDown | None = None,
         sampling: str = "instantaneous",
+        longest_step: float = LONGEST_STEP,
     ) -> None:
         if sampling not in SAMPLINGS:
             raise ConfigError(
@@ -59,6 +64,7 @@ class NavTracker:
         used = mechanization or NorthEastDown()
         record = np.zeros(kernel.SIZE)
         record[kernel.TIME] = start.time
+        record[kernel.LONGEST] = longest_step
         record[kernel.MEAN] = float(sampling == "mean")
         record[kernel.EARTH : kernel.OPTIONS] = find_ellipsoid(used.ellipsoid).parameters()
         record[kernel.OPTIONS : kernel.STATE] = used.kernel_options()
@@ -90,7 +96,7 @@ class NavTracker:
         Raises
         ------
         DataError
-            Time does not advance, or rate and force are not three finite numbers each.
+            Time does not advance, or leaps; or rate and force are not three finite numbers each.
         DivergenceError
             The state would diverge, or come too near to a pole.
 
@@ -119,6 +125,22 @@ class NavTracker:
                 row=row,
                 quantity="time",
                 remedy="leave the sample out; the state is as before it",
+            )
+        if why == kernel.BAD_START:
+            raise DataError(
+                f"the state is at {self._record[kernel.TIME]:.9g} s, and the first sample at "
+                f"{time:.9g} s",
+                row=row,
+                quantity="time",
+                remedy="give the state of that instant",
+            )
+        if why == kernel.GAP:
+            raise DataError(
+                f"a gap of {time - self._record[kernel.TIME]:.6g} s before {time:.9g} s: what the "
+                "body did in it is not known",
+                row=row,
+                quantity="time",
+                remedy="begin again from a known state, or pass a longer longest_step",
             )
         given = f"time {time}, rate {np.asarray(gyro).tolist()}, force {np.asarray(accel).tolist()}"
         if why == kernel.BAD_SAMPLE:
