@@ -7,7 +7,7 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds check format bench docs messages statements clean
+.PHONY: demo test test-slow test-bounds check format bench docs messages statements pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -63,6 +63,9 @@ messages: $(VENV)/.test
 
 statements: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py
+
+pictures: $(VENV)/.test
+	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) tests/cli/test_pictures.py
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

@@ -75,7 +75,8 @@ def test_the_examples_show_the_kinds_that_need_more_than_a_line():
 def test_a_file_becomes_a_sealed_folder(here, run_cli):
     done = run_cli("simulate", "rest.toml")
     assert done.code == 0, done.err
-    assert done.out.startswith("rest: log.csv, manifest.json, scenario.json, trajectory.csv")
+    assert done.out.startswith("rest: log.csv, manifest.json, scenario.json, trajectory.csv,")
+    assert (here / "rest-simulated" / "trajectory.svg").is_file()
     imu = read_log(here / "rest-simulated" / "log.csv").imu
     place = Origin(-33.9, 151.2, 20.0)
     motion = StationaryMotion(4.0, place, 1.0, 2.0, 3.0, ELLIPSOIDS["pz90.11"])

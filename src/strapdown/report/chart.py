@@ -123,6 +123,14 @@ class Panel:
     levels : tuple of Level
     categories : tuple of str
         Names on the vertical axis at 0, 1, …, from the top.
+    x_label : str
+        With its unit, of a plane: both axes have one scale, and the horizontal one is the panel's
+        own, without marks and bands. Empty where the panel shares the chart's horizontal axis.
+    height : float
+        In ordinary panels.
+    steady : float
+        Values that span less are drawn as a constant, on an axis that spans one unit: rounding
+        should not look like a signal.
     """
 
     y_label: str
@@ -131,11 +139,16 @@ class Panel:
     title: str = ""
     levels: tuple[Level, ...] = ()
     categories: tuple[str, ...] = ()
+    x_label: str = ""
+    height: float = 1.0
+    steady: float = 0.0
 
 
 @dataclass(frozen=True)
 class Chart:
     """Panels above each other that share the horizontal axis, or beside each other.
+
+    Planes come first, above what shares the axis.
 
     Attributes
     ----------
@@ -162,6 +175,18 @@ class Chart:
     bands: tuple[Band, ...] = field(default=())
     log_x: bool = False
     beside: bool = False
+
+
+def steady_range(panel: Panel) -> tuple[float, float] | None:
+    """Ends of the vertical axis where the values are steady; else None."""
+    if not panel.steady:
+        return None
+    found = np.concatenate([line.y for line in panel.lines])
+    found = found[np.isfinite(found)]
+    if not found.size or np.ptp(found) >= panel.steady:
+        return None
+    middle = 0.5 * float(found.min() + found.max())
+    return middle - 0.5, middle + 0.5
 
 
 def look(k: int) -> dict[str, str]:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span
+from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span, steady_range
 
 _GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
 FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
 _ROW = 30  # pixels a category
+_UNDER_PLANE = 58  # pixels
 _SPACE = {False: 0.06, True: 0.09}  # between panels, above or beside each other
 
 
@@ -29,13 +30,15 @@ def figure(chart: Chart) -> dict[str, Any]:
         For ``Plotly.newPlot``. Names are escaped, because plotly reads some HTML in them.
     """
     count = len(chart.panels)
+    # Planes, which come first, have a horizontal axis of their own; the others share one.
+    planes = sum(bool(panel.x_label) for panel in chart.panels)
     layout: dict[str, Any] = {
         "font": FONT,
         "paper_bgcolor": "#ffffff",
         "plot_bgcolor": "#ffffff",
         "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
         "height": _height(chart),
-        "hovermode": "closest" if chart.log_x else "x unified",
+        "hovermode": "closest" if chart.log_x or planes else "x unified",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
         "shapes": [],
         "annotations": [],
@@ -45,24 +48,25 @@ def figure(chart: Chart) -> dict[str, Any]:
         layout["legend"] |= {"y": -60.0 / layout["height"] - 0.06, "yanchor": "top"}
     traces: list[dict[str, Any]] = []
     named: set[str] = set()
-    length = (1.0 - _SPACE[chart.beside] * (count - 1)) / count
+    domains = _domains(chart)
     for number, panel in enumerate(chart.panels):
-        suffix = "" if number == 0 else str(number + 1)
-        start = number * (length + _SPACE[chart.beside])
-        x_suffix = suffix if chart.beside else ""
-        whole = chart.beside or count == 1
-        domain = (0.0, 1.0) if whole else (max(0.0, 1.0 - start - length), 1.0 - start)
+        suffix = _suffix(number)
+        own = chart.beside or number < planes
+        x_suffix = suffix if own else _suffix(planes)
+        across, domain = domains[number]
         layout[f"yaxis{suffix}"] = _y_axis(panel, domain) | {"anchor": f"x{x_suffix}"}
-        if chart.beside or number == 0:
-            across = (start, min(1.0, start + length)) if chart.beside else (0.0, 1.0)
-            anchor = f"y{suffix}" if chart.beside or count == 1 else f"y{count}"
-            layout[f"xaxis{x_suffix}"] = _x_axis(chart, across) | {"anchor": anchor}
-            if x_suffix:
+        if own or number == planes:
+            anchor = f"y{suffix if own else _suffix(count - 1)}"
+            layout[f"xaxis{x_suffix}"] = _x_axis(chart, across, panel) | {"anchor": anchor}
+            if chart.beside and number:
                 # What stands beside each other is to be compared.
                 layout[f"xaxis{x_suffix}"]["matches"] = "x"
                 if not panel.categories:
                     layout[f"yaxis{suffix}"]["matches"] = "y"
-            _mark(layout, chart, x_suffix)
+            if not panel.x_label:
+                _mark(layout, chart, x_suffix, domain[1])
+        if panel.x_label:
+            layout[f"yaxis{suffix}"] |= {"scaleanchor": f"x{x_suffix}", "scaleratio": 1}
         _decorate(layout, panel, f"x{x_suffix}", f"y{suffix}", chart.log_x)
         traces += _traces(panel, f"x{x_suffix}", f"y{suffix}", named)
     layout["showlegend"] = any(trace["showlegend"] for trace in traces)
@@ -75,8 +79,34 @@ def _height(chart: Chart) -> int:
         return 150 + _ROW * rows
     if chart.beside:
         return 440
-    count = len(chart.panels)
-    return 150 + 190 * count if count > 1 else 400
+    if len(chart.panels) == 1:
+        return 400
+    return 150 + round(190 * sum(panel.height for panel in chart.panels))
+
+
+def _suffix(number: int) -> str:
+    """What plotly adds to the names of the axes of a panel."""
+    return str(number + 1) if number else ""
+
+
+def _domains(chart: Chart) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """Where each panel lies across and up, as shares of the whole."""
+    count, space = len(chart.panels), _SPACE[chart.beside]
+    if chart.beside or count == 1:
+        width = (1.0 - space * (count - 1)) / count
+        starts = [number * (width + space) for number in range(count)]
+        return [((start, min(1.0, start + width)), (0.0, 1.0)) for start in starts]
+    planes = [bool(panel.x_label) for panel in chart.panels]
+    # Low panels stand closer; under a plane there is its own axis with its title.
+    least = min(panel.height for panel in chart.panels)
+    gaps = [_UNDER_PLANE / _height(chart) if own else space * least for own in planes[:-1]]
+    length = (1.0 - sum(gaps)) / sum(panel.height for panel in chart.panels)
+    found, top = [], 1.0
+    for panel, gap in zip(chart.panels, [*gaps, 0.0], strict=True):
+        bottom = max(0.0, top - length * panel.height)
+        found.append(((0.0, 1.0), (bottom, top)))
+        top = bottom - gap
+    return found
 
 
 def _log_ticks(values: Array) -> dict[str, Any]:
@@ -93,14 +123,15 @@ def _all(lines: tuple[Line, ...], what: str) -> Array:
     return np.concatenate([v for v in found if v is not None] or [np.empty(0)])
 
 
-def _x_axis(chart: Chart, domain: tuple[float, float]) -> dict[str, Any]:
+def _x_axis(chart: Chart, domain: tuple[float, float], panel: Panel) -> dict[str, Any]:
+    label = html.escape(panel.x_label or chart.x_label)
     axis: dict[str, Any] = {
-        "title": {"text": html.escape(chart.x_label), "font": {"size": 13}, "standoff": 8},
+        "title": {"text": label, "font": {"size": 13}, "standoff": 8},
         "gridcolor": _GRID,
         "zeroline": False,
         "domain": list(domain),
     }
-    if not chart.log_x:
+    if panel.x_label or not chart.log_x:
         return axis
     values = [_all(p.lines, what) for p in chart.panels for what in ("x", "low", "high")]
     marks = np.array([mark.x for mark in chart.marks])
@@ -126,36 +157,38 @@ def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
     if panel.log:
         levels = np.array([level.y for level in panel.levels])
         return axis | _log_ticks(np.concatenate([_all(panel.lines, "y"), levels]))
+    if (ends := steady_range(panel)) is not None:
+        return axis | {"range": list(ends)}
     return axis
 
 
-def _mark(layout: dict[str, Any], chart: Chart, suffix: str) -> None:
+def _mark(layout: dict[str, Any], chart: Chart, suffix: str, top: float) -> None:
     """Draw what stands at one value, or between two, of a horizontal axis."""
     axis = f"x{suffix}"
     for band in chart.bands:
         layout["shapes"].append(
-            _upright("rect", axis, band.start, band.end)
+            _upright("rect", axis, band.start, band.end, top)
             | {"fillcolor": "#0072B2", "opacity": 0.07, "line": {"width": 0}}
         )
     for mark in chart.marks:
         layout["shapes"].append(
-            _upright("line", axis, mark.x, mark.x)
+            _upright("line", axis, mark.x, mark.x, top)
             | {"line": {"width": 1.4, "color": _RED, "dash": "dot"}}
         )
-        layout["annotations"].append(_mark_label(mark, axis, chart.log_x))
+        layout["annotations"].append(_mark_label(mark, axis, chart.log_x, top))
 
 
-def _upright(kind: str, axis: str, x0: float, x1: float) -> dict[str, Any]:
-    edges = {"x0": x0, "x1": x1, "y0": 0, "y1": 1}
+def _upright(kind: str, axis: str, x0: float, x1: float, top: float) -> dict[str, Any]:
+    edges = {"x0": x0, "x1": x1, "y0": 0, "y1": top}
     return {"type": kind, "xref": axis, "yref": "paper", "layer": "below"} | edges
 
 
-def _mark_label(mark: Mark, axis: str, log: bool) -> dict[str, Any]:
+def _mark_label(mark: Mark, axis: str, log: bool, top: float) -> dict[str, Any]:
     # Plotly wants an annotation's place on a logarithmic axis as a logarithm, a shape's not.
     return {
         "x": math.log10(mark.x) if log else mark.x,
         "xref": axis,
-        "y": 1.0,
+        "y": top,
         "yref": "paper",
         "yanchor": "top",
         "xanchor": "left",

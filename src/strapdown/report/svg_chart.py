@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
-from strapdown.report.chart import Chart, Line, Panel
+from strapdown.report.chart import Chart, Line, Panel, steady_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
-_RED, _FAINT = "#b42318", "#8a939e"
+_RED, _FAINT, _TEXT = "#b42318", "#8a939e", "#4a525c"
 _DASH: dict[str, Any] = {
     "solid": "-",
     "dash": "--",
@@ -46,18 +48,21 @@ _STYLE: Any = {
 }
 _WIDTH = 9.0  # inches
 _DPI = 160
+_TITLE, _CAPTION = 90, 155  # characters a line
 
 
-def draw(chart: Chart, path: Path) -> None:
+def draw(chart: Chart, path: Path, *, caption: bool = False) -> None:
     """Draw a chart into an SVG or a PNG file, as its ending says.
 
     Parameters
     ----------
     chart : Chart
     path : Path
+    caption : bool
+        Whether the caption stands in the picture: where no page says it.
     """
     with _own_style():
-        figure = _figure(chart)
+        figure = _figure(chart, caption)
         if path.suffix == ".png":
             figure.savefig(path, format="png", dpi=_DPI, metadata={"Software": None})
         else:
@@ -85,13 +90,15 @@ def _own_style() -> Iterator[None]:
     """Not the style of whoever runs it: the picture belongs to the seal."""
     import matplotlib as mpl
 
-    with mpl.rc_context():
+    with mpl.rc_context(), warnings.catch_warnings():
+        # A letter that the font lacks, in a name of the user's, is a box.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield
 
 
-def _figure(chart: Chart) -> Figure:
+def _figure(chart: Chart, caption: bool = False) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -105,18 +112,17 @@ def _figure(chart: Chart) -> Figure:
                 self.savefig(stream, format="png", dpi=_DPI)
                 return stream.getvalue()
 
-    count = len(chart.panels)
     figure = Picture(figsize=(_WIDTH, _height(chart)), layout="constrained")
     FigureCanvasAgg(figure)
-    shape = (1, count) if chart.beside else (count, 1)
-    share_y = chart.beside and not any(panel.categories for panel in chart.panels)
-    axes = figure.subplots(*shape, sharex=True, sharey=share_y, squeeze=False).ravel()
+    axes = _axes(chart, figure)
     for panel, axis in zip(chart.panels, axes, strict=True):
         _draw_panel(panel, axis, chart)
     for axis in axes if chart.beside else axes[-1:]:
-        axis.set_xlabel(chart.x_label)
-    for mark in chart.marks:
-        axes[0].annotate(
+        if not chart.panels[-1].x_label:
+            axis.set_xlabel(chart.x_label)
+    timed = [a for p, a in zip(chart.panels, axes, strict=True) if not p.x_label]
+    for mark in chart.marks if timed else ():
+        timed[0].annotate(
             mark.label,
             (mark.x, 1.0),
             xycoords=("data", "axes fraction"),
@@ -126,28 +132,56 @@ def _figure(chart: Chart) -> Figure:
             rotation=90,
             ha="right",
         )
-    figure.suptitle(chart.title, x=0.01, ha="left", fontweight="bold")
+    figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
     entries: dict[str, Any] = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    if entries:
-        widest = max(len(name) for name in entries)
-        figure.legend(
+    if entries or caption:
+        widest = max(map(len, entries), default=0)
+        legend = figure.legend(
             list(entries.values()),
             list(entries),
             loc="outside lower left",
             ncols=max(1, min(6, 110 // (widest + 6))),
             frameon=False,
+            # Nothing else below the panels gives way to a legend.
+            title=fill(chart.caption, _CAPTION) if caption else None,
+            title_fontsize=8,
+            alignment="left" if caption else "center",
         )
+        legend.get_title().set_color(_TEXT)
     return figure
+
+
+def _axes(chart: Chart, figure: Figure) -> list[Axes]:
+    count = len(chart.panels)
+    if chart.beside:
+        share_y = not any(panel.categories for panel in chart.panels)
+        return list(figure.subplots(1, count, sharex=True, sharey=share_y, squeeze=False).ravel())
+    planes = sum(bool(panel.x_label) for panel in chart.panels)
+    if not planes:
+        heights = [panel.height for panel in chart.panels]
+        return list(
+            figure.subplots(count, 1, sharex=True, squeeze=False, height_ratios=heights).ravel()
+        )
+    grid = figure.add_gridspec(count, 1, height_ratios=[panel.height for panel in chart.panels])
+    axes: list[Axes] = []
+    for row in range(count):
+        axes.append(figure.add_subplot(grid[row], sharex=axes[planes] if row > planes else None))
+        if planes <= row < count - 1:
+            axes[row].tick_params(labelbottom=False)
+    figure.align_ylabels(axes)
+    return axes
 
 
 def _height(chart: Chart) -> float:
     rows = max(len(panel.categories) for panel in chart.panels)
     if rows:
         return 1.5 + 0.3 * rows
-    return 4.6 if chart.beside else 1.4 + 2.0 * len(chart.panels) + (len(chart.panels) == 1)
+    if chart.beside:
+        return 4.6
+    return 1.4 + 2.0 * sum(panel.height for panel in chart.panels) + (len(chart.panels) == 1)
 
 
 def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
@@ -177,6 +211,14 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
             fontsize=7,
             ha="right",
         )
+    if (ends := steady_range(panel)) is not None:
+        axis.set_ylim(*ends)
+    if panel.steady:
+        axis.ticklabel_format(axis="y", useOffset=False)
+    if panel.x_label:
+        axis.set_xlabel(panel.x_label)
+        axis.set_aspect("equal", adjustable="datalim")
+        return
     for band in chart.bands:
         axis.axvspan(band.start, band.end, color="#0072B2", alpha=0.07, lw=0)
     for mark in chart.marks:

@@ -9,15 +9,20 @@ import pandas as pd
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config import TrajectorySpec
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats
+from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
+from strapdown.report.chart import Chart
 from strapdown.report.stated_errors import stated_errors
+from strapdown.report.svg_chart import draw
+from strapdown.report.trajectory_charts import trajectory_chart
 from strapdown.simulation import TriadErrors
 from strapdown.systems.attitude_source import sensor_file
 from strapdown.systems.trajectory_source import simulate_trajectory
 
-__all__ = ["write_trajectory_simulation"]
+__all__ = ["simulation_chart", "write_trajectory_simulation"]
 
 # Row of a Trajectory table to keys with units.
 _ROW = {
@@ -48,8 +53,8 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     -------
     Seal
         The folder holds ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude in
-        further columns), ``trajectory.csv`` and other forms of it, and ``scenario.json`` with the
-        resolved configuration.
+        further columns), ``trajectory.csv`` and other forms of it, ``trajectory.svg``, a picture
+        of it, and ``scenario.json`` with the resolved configuration.
 
     Raises
     ------
@@ -83,6 +88,7 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
         for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
             path = folder / f"trajectory.{name}"
             TRAJECTORY_WRITERS[name](path, trajectory, name=spec.name, options=options)
+        draw(simulation_chart(spec, trajectory), folder / "trajectory.svg", caption=True)
         shape = motion.ellipsoid
         sensor = spec.sensor and Path(spec.sensor).name
         description: dict[str, Any] = {
@@ -109,6 +115,23 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
         }
         (folder / "scenario.json").write_text(to_json(description), encoding="utf-8", newline="\n")
     return seals[0]
+
+
+def simulation_chart(spec: TrajectorySpec, trajectory: pd.DataFrame) -> Chart:
+    """Return the chart of a simulated trajectory, titled as its file says.
+
+    Parameters
+    ----------
+    spec : TrajectorySpec
+    trajectory : DataFrame
+        A Trajectory table.
+
+    Returns
+    -------
+    Chart
+    """
+    title = one_line(spec.title) or one_line(spec.name)
+    return trajectory_chart(trajectory, title=title, ellipsoid=find_ellipsoid(spec.ellipsoid))
 
 
 def _state(trajectory: pd.DataFrame, row: int) -> dict[str, float]:

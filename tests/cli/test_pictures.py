@@ -1,0 +1,65 @@
+"""The pictures of the manual are those that the commands draw now.
+
+``make pictures`` writes them anew.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from importlib.metadata import version
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from strapdown import simulate
+from strapdown.config import read_trajectory_spec
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.report.svg_chart import draw
+from strapdown.report.trajectory_simulation import simulation_chart
+from strapdown.systems.trajectory_source import make_motion
+
+ROOT = Path(__file__).parents[2]
+EXAMPLES, IMAGES = ROOT / "docs" / "examples", ROOT / "docs" / "images"
+NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
+# Matplotlib names clips and markers by what is in them.
+NAMES = re.compile(r"\b[pmC](?=[0-9a-f]{10}\b)[0-9a-f]+")
+PINNED = re.search(r"^matplotlib==(\S+)", (ROOT / "constraints.txt").read_text(), re.M)
+
+
+def redraw(name, path):
+    """The picture without the log, which takes seconds to make."""
+    spec = read_trajectory_spec(EXAMPLES / f"{name}.toml")
+    motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
+    time = np.arange(int(motion.duration * spec.rate_hz + 1e-6) + 1) / spec.rate_hz
+    draw(simulation_chart(spec, motion.trajectory(time)), path, caption=True)
+
+
+def same_picture(a, b):
+    """Whether nothing differs but numbers, by less than can be seen: 0.01 of a point."""
+    texts = [NAMES.sub("", path.read_text(encoding="utf-8")) for path in (a, b)]
+    if NUMBER.sub("", texts[0]) != NUMBER.sub("", texts[1]):
+        return False
+    x, y = (np.array(NUMBER.findall(text), dtype=np.float64) for text in texts)
+    return x.shape == y.shape and bool((np.abs(x - y) < 0.01).all())
+
+
+@pytest.mark.skipif(
+    PINNED is not None and version("matplotlib") != PINNED[1],
+    reason=f"another matplotlib ({mpl.__version__}) than that of constraints.txt draws otherwise",
+)
+@pytest.mark.parametrize("name", ["car", "aircraft"])
+def test_a_picture_of_the_manual_is_what_is_drawn_now(name, tmp_path):
+    shown = IMAGES / f"trajectory_{name}.svg"
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        redraw(name, shown)
+    redraw(name, tmp_path / "now.svg")
+    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+
+
+def test_the_picture_in_a_bundle_is_that_of_the_manual(tmp_path):
+    seal = simulate(str(EXAMPLES / "car.toml"), tmp_path / "car")
+    redraw("car", tmp_path / "now.svg")
+    assert (seal.path / "trajectory.svg").read_bytes() == (tmp_path / "now.svg").read_bytes()
