@@ -102,6 +102,8 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    from strapdown.report.picture_layout import RoundedLayout
+
     class Picture(Figure):
         """Shows itself where pyplot, which would do it otherwise, was never loaded."""
 
@@ -112,7 +114,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
                 self.savefig(stream, format="png", dpi=_DPI)
                 return stream.getvalue()
 
-    figure = Picture(figsize=(_WIDTH, _height(chart)), layout="constrained")
+    figure = Picture(figsize=(_WIDTH, _height(chart)), layout=RoundedLayout())
     FigureCanvasAgg(figure)
     axes = _axes(chart, figure)
     for panel, axis in zip(chart.panels, axes, strict=True):

@@ -249,3 +249,16 @@ def test_pictures_have_the_same_bytes_and_hold_the_caption(tmp_path):
     assert a == b
     assert b"level plane at the start" in a
     assert b"level plane" not in c
+
+
+def test_places_of_panels_are_rounded_as_the_solver_is_not_reproducible():
+    drawn = notebook_figure(trajectory_chart(trajectory(leg(300.0, 400.0)), title="t"))
+    for _ in range(2):
+        drawn.canvas.draw()
+        for axis in drawn.axes:
+            bounds = axis.get_position(original=True).bounds
+            assert bounds == pytest.approx(np.round(bounds, 6), abs=1e-15)
+    # They lie below each other still.
+    tops = [axis.get_position(original=True).bounds for axis in drawn.axes]
+    for above, below in pairwise(tops):
+        assert above[1] > below[1] + below[3]
