@@ -29,11 +29,13 @@ def test_the_output_shown_is_the_output(command, shown, run_cli, recordings, tmp
         assert line in printed or line in ("", "…")
 
 
-def test_the_python_shown_runs():
+def test_the_python_shown_runs(tmp_path, monkeypatch):
     import doctest
 
-    (block,) = re.findall(r"```python\n(.*?)```", README, re.S)
-    test = doctest.DocTestParser().get_doctest(block, {}, "README", "README.md", 0)
+    (tmp_path / "docs").symlink_to(Path(__file__).parent.parent / "docs")
+    monkeypatch.chdir(tmp_path)
+    shown = "\n".join(re.findall(r"```python\n(.*?)```", README, re.S))
+    test = doctest.DocTestParser().get_doctest(shown, {}, "README", "README.md", 0)
     said: list[str] = []
     failures, _ = doctest.DocTestRunner().run(test, out=said.append)
     assert failures == 0, "".join(said)

@@ -23,7 +23,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from strapdown.evaluation.trajectory_differences import trajectory_differences
+    from strapdown.evaluation.trajectory_summary import summarise_differences
     from strapdown.formats import read_log
+    from strapdown.formats.trajectory_readers import read_trajectory
+    from strapdown.increments import motion_increments
+    from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
+    from strapdown.nav_state import NavState
     from strapdown.report.attitude import write_attitude
     from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
@@ -33,21 +39,37 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "NavState",
+    "NavTracker",
+    "NorthEastDown",
     "__version__",
     "bench_attitude",
+    "motion_increments",
     "read_log",
+    "read_trajectory",
     "reproduce",
+    "run_mechanization",
     "simulate",
+    "summarise_differences",
+    "trajectory_differences",
     "verify",
     "write_attitude",
 ]
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
+    "NavState": "strapdown.nav_state",
+    "NavTracker": "strapdown.mechanization",
+    "NorthEastDown": "strapdown.mechanization",
     "bench_attitude": "strapdown.systems.attitude_bench",
+    "motion_increments": "strapdown.increments",
     "read_log": "strapdown.formats",
+    "read_trajectory": "strapdown.formats.trajectory_readers",
     "reproduce": "strapdown.report.reproduction",
+    "run_mechanization": "strapdown.mechanization",
     "simulate": "strapdown.report.simulation",
+    "summarise_differences": "strapdown.evaluation.trajectory_summary",
+    "trajectory_differences": "strapdown.evaluation.trajectory_differences",
     "verify": "strapdown.report.verify",
     "write_attitude": "strapdown.report.attitude",
 }

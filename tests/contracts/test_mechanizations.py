@@ -417,3 +417,19 @@ def test_of_no_pieces_nothing_comes():
     log = shaken_log()
     assert list(navigate_segments(NorthEastDown(), START, [])) == []
     assert list(navigate_segments(NorthEastDown(), START, [log.iloc[:0], log.iloc[:1]])) == []
+
+
+def test_a_tracker_refuses_a_leap_and_a_start_at_another_time():
+    still, level = np.zeros(3), np.array([0.0, 0.0, -9.8])
+    tracker = NavTracker(START)
+    with pytest.raises(DataError, match=r"the state is at .* and the first sample at"):
+        tracker.update(START.time + 1.5, still, level)
+    tracker.update(START.time, still, level)
+    before = tracker.state
+    with pytest.raises(DataError, match=r"a gap of 1\.01 s"):
+        tracker.update(START.time + 1.01, still, level)
+    assert tracker.state.time == before.time
+    tracker.update(START.time + 1.0, still, level)
+    patient = NavTracker(START, longest_step=5.0)
+    patient.update(START.time, still, level)
+    patient.update(START.time + 4.0, still, level)

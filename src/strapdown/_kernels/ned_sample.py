@@ -17,7 +17,7 @@ EARTH, OPTIONS, STATE = 11, 18, 25
 SIZE = STATE + WIDTH
 
 # What an update answers besides `DONE`, `POLE` and `DIVERGED` of the step.
-BAD_SAMPLE, BAD_TIME, GAP = -1, -2, -3
+BAD_SAMPLE, BAD_TIME, BAD_START, GAP = -1, -2, -3, -4
 
 
 @njit(cache=True)
@@ -34,16 +34,16 @@ def ned_update(r, time, gyro, accel, reference):
     fx, fy, fz = accel[0], accel[1], accel[2]
     if not (usable(wx, wy, wz) and usable(fx, fy, fz)):
         return BAD_SAMPLE
-    dt = time - r[TIME]
-    if abs(dt) > r[LONGEST]:
-        if dt < 0.0 and r[SAMPLES] > 0.0:
-            return BAD_TIME
-        return GAP
+    dt = 0.0
     if r[SAMPLES] == 0.0:
-        dt = 0.0
+        if not abs(time - r[TIME]) <= r[LONGEST]:
+            return BAD_START
     else:
+        dt = time - r[TIME]
         if dt <= 0.0:
             return BAD_TIME
+        if dt > r[LONGEST]:
+            return GAP
         if r[MEAN] != 0.0:
             before = r[BEFORE]
             if before == 0.0:

@@ -32,13 +32,13 @@ class NavTracker:
     Parameters
     ----------
     start : NavState
-        At the first sample, within `longest_step` of its time.
+        At the first sample.
     mechanization : NorthEastDown, optional
     sampling : {'instantaneous', 'mean'}
         What a sample is: the value at its stamp, or its mean over the interval that ends there.
     longest_step : float, s
-        A sample that comes later than this after the one before is refused: what happened in
-        between is not known.
+        A longer step is a hole over which nothing is known, and refused; so is a first sample
+        that is farther than this from the time of `start`.
 
     Raises
     ------
@@ -62,7 +62,7 @@ class NavTracker:
                 quantity="sampling",
                 remedy=f"use {' or '.join(SAMPLINGS)}",
             )
-        used = NorthEastDown() if mechanization is None else mechanization
+        used: object = NorthEastDown() if mechanization is None else mechanization
         if not isinstance(used, NorthEastDown):
             raise ConfigError(
                 f"a tracker steps with NorthEastDown, and not with {used!r}",
@@ -104,8 +104,7 @@ class NavTracker:
         Raises
         ------
         DataError
-            Time does not advance or leaves a gap, or rate and force are not three finite numbers
-            each.
+            Time does not advance, or leaps; or rate and force are not three finite numbers each.
         DivergenceError
             The state would diverge, or come too near to a pole.
 
@@ -135,20 +134,21 @@ class NavTracker:
                 quantity="time",
                 remedy="leave the sample out; the state is as before it",
             )
-        if why == kernel.GAP:
-            first = row == 1
-            begin = float(self._record[kernel.TIME])
+        if why == kernel.BAD_START:
             raise DataError(
-                f"the state is at {begin:.9g} s, and the first sample at {time:.9g} s"
-                if first
-                else f"a gap of {time - begin:.6g} s, from {begin:.9g} s to {time:.9g} s: what the "
+                f"the state is at {self._record[kernel.TIME]:.9g} s, and the first sample at "
+                f"{time:.9g} s",
+                row=row,
+                quantity="time",
+                remedy="give the state of that instant",
+            )
+        if why == kernel.GAP:
+            raise DataError(
+                f"a gap of {time - self._record[kernel.TIME]:.6g} s before {time:.9g} s: what the "
                 "body did in it is not known",
                 row=row,
                 quantity="time",
-                remedy="give the state of that instant"
-                if first
-                else "begin anew with a state that is known, or pass a longest_step of so many "
-                "seconds to join the sides by a line",
+                remedy="begin again from a known state, or pass a longer longest_step",
             )
         rate, force = (v.tolist() if isinstance(v, np.ndarray) else v for v in (gyro, accel))
         given = f"time {time}, rate {rate}, force {force}"

@@ -102,9 +102,10 @@ def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[
         ["start", "end", *labels],
         np.vstack([view.corners, *map(_along, paths)]),
     )
+    # The end is the smaller, so that both show where a path comes back.
     marks = [
-        ("start", points[:1], GREEN, "circle", 12.0, ("start",), places[:1]),
-        ("end", points[1:2], VERMILLION, "square", 11.0, ("end",), places[1:2]),
+        ("start", points[:1], GREEN, "circle", 15.0, ("start",), places[:1]),
+        ("end", points[1:2], VERMILLION, "square", 9.0, ("end",), places[1:2]),
         ("time", points[2:], BLACK, "circle", 6.0, tuple(labels), places[2:]),
     ]
     tips = _between(np.array([*lengths, way[-1]]), view.width)

@@ -74,7 +74,7 @@ def trajectory_chart(
         Without the plan where nothing moves by 1 mm over the ground, and then without height and
         speed, too, unless the height changes by that. The plan is the projection along the
         vertical of the start onto its level plane, in which a straight path is straight: 0.1 % of
-        a distance is lost 285 km away.
+        a distance is lost 490 km away.
 
     Raises
     ------
