@@ -18,10 +18,10 @@ from strapdown.exceptions import DataError, Finding
 from strapdown.frames import ecef_from_geodetic, place_difference
 from strapdown.tables import (
     EULER,
-    GEODETIC,
     VELOCITY,
     check_trajectory,
     find_gaps,
+    places_of,
     trajectory_error_table,
 )
 
@@ -82,7 +82,7 @@ def trajectory_differences(
     inside = _within(estimate, reference)
     stamps = inside.index.to_numpy(dtype=np.float64)
     known = trajectory_at(reference, stamps, ellipsoid)
-    place, truth = (t[GEODETIC].to_numpy(dtype=np.float64) for t in (inside, known))
+    place, truth = (places_of(t) for t in (inside, known))
     findings = _far_apart(place[0], truth[0], ellipsoid, estimate, reference)
     angles = [t[EULER].to_numpy(dtype=np.float64) for t in (inside, known)]
     q_est, q_ref = (rotation.quaternion_from_euler(a) for a in angles)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import DataError
 from strapdown.tables.checks import (
@@ -16,6 +16,8 @@ from strapdown.tables.checks import (
     values_of,
 )
 from strapdown.tables.columns import EULER, GEODETIC, VELOCITY
+
+Array = NDArray[np.float64]
 
 TRAJECTORY = [*GEODETIC, *VELOCITY, *EULER]
 
@@ -54,6 +56,26 @@ def trajectory_table(
     table = joined(time, TRAJECTORY, source, **blocks)
     check_trajectory(table)
     return table
+
+
+def places_of(trajectory: pd.DataFrame) -> Array:
+    """Latitude and longitude in deg and height in m, of a longitude that went on over a turn too.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        A Trajectory table: its longitude may go on where a vehicle goes round.
+
+    Returns
+    -------
+    ndarray, (n, 3)
+        Longitudes of more than a full turn are brought within half a turn; others keep their
+        digits.
+    """
+    place = trajectory[GEODETIC].to_numpy(dtype=np.float64, copy=True)
+    over = np.abs(place[:, 1]) > 360.0
+    place[over, 1] = np.remainder(place[over, 1] + 180.0, 360.0) - 180.0
+    return place
 
 
 def check_trajectory(table: pd.DataFrame) -> None:
