@@ -95,7 +95,7 @@ def trajectory_differences(
         stamps,
         place_difference(place, truth, ellipsoid=ellipsoid),
         inside[VELOCITY].to_numpy(dtype=np.float64) - known[VELOCITY].to_numpy(dtype=np.float64),
-        _wrapped(angles[0] - angles[1]),
+        rotation.within_half_turn(angles[0] - angles[1]),
         source=estimate.attrs.get("source"),
     )
     table[ROTATION_ERROR] = np.degrees(phi)
@@ -104,12 +104,6 @@ def trajectory_differences(
     table.attrs["interpolated"] = int((~same).sum())
     table.attrs["findings"] = (*findings, *_interpolated(stamps[~same], reference, ellipsoid))
     return table
-
-
-def _wrapped(angles: Array) -> Array:
-    """Within -180 to 180 deg; what is within already is left to the bit."""
-    wrapped = np.where(np.abs(angles) <= 180.0, angles, np.remainder(angles + 180.0, 360.0) - 180.0)
-    return np.asarray(wrapped)
 
 
 def _within(estimate: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:

@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import DataError
+from strapdown.rotation import within_half_turn
 from strapdown.tables.checks import (
     check_columns,
     check_rows,
@@ -74,7 +75,7 @@ def places_of(trajectory: pd.DataFrame) -> Array:
     """
     place = trajectory[GEODETIC].to_numpy(dtype=np.float64, copy=True)
     over = np.abs(place[:, 1]) > 360.0
-    place[over, 1] = np.remainder(place[over, 1] + 180.0, 360.0) - 180.0
+    place[over, 1] = within_half_turn(place[over, 1])
     return place
 
 
