@@ -14,6 +14,7 @@ from strapdown.tables.checks import (
     check_time,
     index_of,
     joined,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import EULER, GEODETIC, VELOCITY
@@ -92,7 +93,7 @@ def check_trajectory(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, or a latitude is
         beyond 90 deg.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, TRAJECTORY, source)
     check_time(index_of(table), source)
     check_rows(values_of(table, TRAJECTORY), TRAJECTORY, source)
