@@ -79,7 +79,11 @@ def ratios() -> Iterator[Ratio]:
         )
 
     imu = imu_table(np.arange(SAMPLES) * STEP, gyro, accel)
-    yield from against_python_ins(imu, start, batch)
+
+    def from_table() -> Any:
+        return run_mechanization(mechanization, start, motion_increments(imu)).trajectory
+
+    yield from against_python_ins(imu, start, batch, from_table)
 
     part = 20_000
     stamps = (np.arange(part) * STEP).tolist()
@@ -100,22 +104,10 @@ def ratios() -> Iterator[Ratio]:
         60.0,
     )
 
-    def from_table() -> Any:
-        return run_mechanization(mechanization, start, motion_increments(imu)).trajectory
-
-    ours, theirs = by_turns(from_table, batch, rounds=7)
-    yield Ratio(
-        "from Imu table to Trajectory table, a sample",
-        ours / SAMPLES * 1e9,
-        "the kernels alone",
-        theirs / SAMPLES * 1e9,
-        "ns",
-        None,
-    )
     yield segments(NorthEastDown(height="held", **LIMITS), start)
 
 
-def against_python_ins(imu: Any, start: Any, batch: Any) -> Iterator[Ratio]:
+def against_python_ins(imu: Any, start: Any, batch: Any, from_table: Any) -> Iterator[Ratio]:
     try:
         from pyins.strapdown import Integrator, compute_increments_from_imu
     except ImportError:
@@ -126,15 +118,19 @@ def against_python_ins(imu: Any, start: Any, batch: Any) -> Iterator[Ratio]:
     def theirs_all() -> None:
         Integrator(initial).integrate(compute_increments_from_imu(imu, "rate"))
 
-    ours, theirs = by_turns(batch, theirs_all, rounds=7)
-    yield Ratio(
-        "rates to states, batch, a sample",
-        ours / SAMPLES * 1e9,
-        "python-ins, its public functions",
-        theirs / SAMPLES * 1e9,
-        "ns",
-        1 / 10,
-    )
+    for what, job, limit in (
+        ("rates to states, batch, a sample", batch, 1 / 10),
+        ("from Imu table to Trajectory table, a sample", from_table, None),
+    ):
+        ours, theirs = by_turns(job, theirs_all, rounds=7)
+        yield Ratio(
+            what,
+            ours / SAMPLES * 1e9,
+            "python-ins, its public functions",
+            theirs / SAMPLES * 1e9,
+            "ns",
+            limit,
+        )
 
 
 def segments(mechanization: Any, start: Any) -> Ratio:

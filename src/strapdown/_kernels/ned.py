@@ -6,8 +6,10 @@ In them the Earth's rate is constant, and the velocity relative to the Earth, w,
 integral of w, the displacement r, integrates the Coriolis term; gravity is slow, and is taken at
 the mean place of the step and turned as the local level turns. The displacement, turned back by
 the Earth's rate, gives the new place by geometry, and the old and the new place give the turn of
-the local level in closed form: a transport rate is never integrated, and what the step leaves out
-is of the fifth order of its length (third in numbers too small to matter: tests say how small).
+the local level in closed form: a transport rate is never integrated. The error of a run is of the
+fourth order of the step, but for what the change of the radii within a step, with climb and
+latitude, does to the turn of gravity: at most 1/2 g (omega_ie + v/R) (v_d + e2 v)/R dt², which
+for steps of a second at 230 m/s and a climb of 10 m/s is 1e-9 m/s².
 """
 
 from __future__ import annotations
