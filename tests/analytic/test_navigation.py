@@ -486,7 +486,9 @@ def test_the_papers_misprints_would_be_seen(name, misprinted):
         motion = StationaryMotion(60.0, Origin(60.0, 20.0, 0.0), 20.0, 10.0, 40.0)
     right = errors(navigate(motion, 0.1, Tadic(**EVERY_TERM)), motion).abs().max()
     same = (
-        errors(navigate(motion, 0.1, with_misprint("SUM", ned_simplified.SUM)), motion).abs().max()
+        errors(navigate(motion, 0.1, with_misprint("PULL", ned_simplified.PULL)), motion)
+        .abs()
+        .max()
     )
     assert same.to_numpy() == pytest.approx(right.to_numpy(), rel=1e-3, abs=1e-7)
     wrong = errors(navigate(motion, 0.1, with_misprint(name, misprinted)), motion).abs().max()

@@ -55,7 +55,7 @@ def test_a_row_of_a_trajectory_by_its_position():
     table = pd.concat(rows)
     assert NavState.from_trajectory(table).time == 1.0
     assert NavState.from_trajectory(table, -1).lat == pytest.approx(math.radians(2.0))
-    with pytest.raises(IndexError):
+    with pytest.raises(DataError, match="there is no row"):
         NavState.from_trajectory(table, 5)
 
 
@@ -127,7 +127,7 @@ def test_degrees_that_are_none(lat, lon, quantity, remedy):
 
 
 def test_nan_in_degrees_is_named():
-    with pytest.raises(DataError, match="lat: not a finite number"):
+    with pytest.raises(DataError, match="lat_deg: not a finite number"):
         NavState.from_degrees(math.nan, 0.0)
 
 
