@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from strapdown.evaluation.trajectory_summary import summarise_differences
     from strapdown.formats import read_log
     from strapdown.formats.trajectory_readers import read_trajectory
+    from strapdown.formats.trajectory_writers import write_trajectory
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
     from strapdown.nav_state import NavState
@@ -54,6 +55,7 @@ __all__ = [
     "trajectory_differences",
     "verify",
     "write_attitude",
+    "write_trajectory",
 ]
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
@@ -72,6 +74,7 @@ _HOMES = {
     "trajectory_differences": "strapdown.evaluation.trajectory_differences",
     "verify": "strapdown.report.verify",
     "write_attitude": "strapdown.report.attitude",
+    "write_trajectory": "strapdown.formats.trajectory_writers",
 }
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import DataError
-from strapdown.tables import EULER, check_trajectory, trajectory_table
+from strapdown.tables import EULER, check_trajectory, places_of, trajectory_table
 from strapdown.tables.checks import is_number
 
 __all__ = ["NavState"]
@@ -192,10 +192,11 @@ class NavState:
                 remedy="count from 0, or from the end with -1",
             )
         at = trajectory.iloc[row]
+        lat, lon, alt = places_of(trajectory.iloc[[row]])[0].tolist()
         return cls.from_degrees(
-            float(at["lat"]),
-            float(at["lon"]),
-            float(at["alt"]),
+            lat,
+            lon,
+            alt,
             v_n=at[["VN", "VE", "VD"]].to_numpy(dtype=np.float64),
             roll_deg=float(at["roll"]),
             pitch_deg=float(at["pitch"]),

@@ -53,6 +53,7 @@ __all__ = [
     "rotation_vector_from_euler",
     "rotation_vector_from_quaternion",
     "to_scipy",
+    "within_half_turn",
 ]
 
 # How far a norm or C^T C may lie from one before an input is refused as no rotation. Hand
@@ -586,3 +587,19 @@ def from_scipy(rotation: Rotation) -> Array:
     """
     q: Array = np.ascontiguousarray(rotation.as_quat()[..., [3, 0, 1, 2]], dtype=np.float64)
     return q
+
+
+def within_half_turn(angles_deg: Array) -> Array:
+    """Bring angles within half a turn.
+
+    Parameters
+    ----------
+    angles_deg : ndarray, (...), deg
+
+    Returns
+    -------
+    ndarray, (...), deg
+        From -180 to 180; what is within already keeps every digit.
+    """
+    wrapped = np.remainder(angles_deg + 180.0, 360.0) - 180.0
+    return np.where(np.abs(angles_deg) <= 180.0, angles_deg, wrapped)

@@ -110,3 +110,10 @@ def test_errors_and_standard_deviations_of_a_trajectory():
         tables.trajectory_error_table(TIME, spoiled(RATE, (2, 1), np.nan), RATE, RATE)
     with pytest.raises(DataError, match="different lengths"):
         tables.trajectory_error_table(TIME, RATE[:2], RATE, RATE)
+
+
+@pytest.mark.parametrize("given", [None, "log.csv", np.zeros((3, 6))])
+@pytest.mark.parametrize("check", [tables.check_imu, tables.check_trajectory])
+def test_what_is_no_table_is_told_where_one_is(check, given):
+    with pytest.raises(DataError, match=r"a table is needed(.|\n)*\.imu"):
+        check(given)

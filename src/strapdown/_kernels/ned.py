@@ -295,8 +295,9 @@ def ned_advance(state, increments, reference, earth, options, history):
     pull, since = state[PULL], state[SINCE]
     a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
     rate, f, m = earth[4], earth[5], earth[6]
-    mode, tau, spring = options[0], options[1], options[2]
-    limit, speed, lowest, highest = options[3], options[4], options[5], options[6]
+    mode, tau, spring = options[MODE], options[TAU], options[SPRING]
+    limit, speed = options[COS_LATITUDE], options[SPEED]
+    lowest, highest = options[LOWEST], options[HIGHEST]
     steps = increments.shape[0]
     why = DONE
     made = steps

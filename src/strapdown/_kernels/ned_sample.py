@@ -6,7 +6,22 @@ from numba import njit
 
 from strapdown._kernels.increments import LARGEST
 from strapdown._kernels.motion_increments import linear_motion, mean_motion
-from strapdown._kernels.ned import DONE, FREE, PULL, SINCE, guide_height, ned_step, verdict
+from strapdown._kernels.ned import (
+    COS_LATITUDE,
+    DONE,
+    FREE,
+    HIGHEST,
+    LOWEST,
+    MODE,
+    PULL,
+    SINCE,
+    SPEED,
+    SPRING,
+    TAU,
+    guide_height,
+    ned_step,
+    verdict,
+)
 from strapdown._kernels.ned import STATE as WIDTH
 
 # One float64 array holds everything between calls, because every further argument of a compiled
@@ -116,11 +131,13 @@ def ned_update(r, time, gyro, accel, reference):
             r[e + 6],
         )
         pull, since = r[q + PULL], r[q + SINCE]
-        if r[o] != FREE:
+        mode, tau, spring = r[o + MODE], r[o + TAU], r[o + SPRING]
+        limit, speed = r[o + COS_LATITUDE], r[o + SPEED]
+        if mode != FREE:
             alt, vd, pull, since = guide_height(
-                alt, vd, pull, since, r[q + 2], reference, dt, r[o], r[o + 1], r[o + 2]
+                alt, vd, pull, since, r[q + 2], reference, dt, mode, tau, spring
             )
-        why = verdict(alt, vn, ve, vd, qw, c, turn, r[o + 3], r[o + 4], r[o + 5], r[o + 6])
+        why = verdict(alt, vn, ve, vd, qw, c, turn, limit, speed, r[o + LOWEST], r[o + HIGHEST])
         if why != DONE:
             return why
         r[q], r[q + 1], r[q + 2], r[q + 3], r[q + 4], r[q + 5] = lat, lon, alt, vn, ve, vd

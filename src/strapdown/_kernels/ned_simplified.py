@@ -12,7 +12,20 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import earth_rate, gravity_around, radii, transport_rate
-from strapdown._kernels.ned import DONE, FREE, ROW, guide_height, verdict
+from strapdown._kernels.ned import (
+    COS_LATITUDE,
+    DONE,
+    FREE,
+    HIGHEST,
+    LOWEST,
+    MODE,
+    ROW,
+    SPEED,
+    SPRING,
+    TAU,
+    guide_height,
+    verdict,
+)
 from strapdown._kernels.rotation import (
     dcm_from_quat,
     quat_from_rotvec,
@@ -48,7 +61,9 @@ def simplified_advance(
     """
     a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
     rate, f, m = earth[4], earth[5], earth[6]
-    mode = options[0]
+    mode, tau, spring = options[MODE], options[TAU], options[SPRING]
+    limit, speed = options[COS_LATITUDE], options[SPEED]
+    lowest, highest = options[LOWEST], options[HIGHEST]
     steps = increments.shape[0]
     for i in range(steps):
         lat, lon, alt, vn, ve, vd = state[0], state[1], state[2], state[3], state[4], state[5]
@@ -88,12 +103,10 @@ def simplified_advance(
             if reference.shape[0] > 0:
                 wanted = reference[i]
             height, d1, pull, since = guide_height(
-                height, d1, pull, since, alt, wanted, dt, mode, options[1], options[2]
+                height, d1, pull, since, alt, wanted, dt, mode, tau, spring
             )
         cosine = math.cos(lat1)
-        why = verdict(
-            height, n1, e1, d1, bw, cosine, turn, options[3], options[4], options[5], options[6]
-        )
+        why = verdict(height, n1, e1, d1, bw, cosine, turn, limit, speed, lowest, highest)
         if why != DONE:
             return i, why
         state[0], state[1], state[2] = lat1, lon + turn, height

@@ -16,7 +16,14 @@ from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.exceptions import DataError
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
-from strapdown.tables import EULER, GEODETIC, VELOCITY, check_trajectory, trajectory_table
+from strapdown.tables import (
+    EULER,
+    GEODETIC,
+    VELOCITY,
+    check_trajectory,
+    places_of,
+    trajectory_table,
+)
 
 Array = NDArray[np.float64]
 
@@ -54,7 +61,7 @@ class _Nodes:
 
 
 def _nodes(trajectory: pd.DataFrame, ellipsoid: Ellipsoid) -> _Nodes:
-    place = trajectory[GEODETIC].to_numpy(dtype=np.float64)
+    place = places_of(trajectory)
     to_earth = rotation.conjugate(q_ne(place[:, 0], place[:, 1]))
     q_nb = rotation.quaternion_from_euler(trajectory[EULER].to_numpy(dtype=np.float64))
     return _Nodes(

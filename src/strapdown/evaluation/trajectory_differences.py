@@ -18,10 +18,10 @@ from strapdown.exceptions import DataError, Finding
 from strapdown.frames import ecef_from_geodetic, place_difference
 from strapdown.tables import (
     EULER,
-    GEODETIC,
     VELOCITY,
     check_trajectory,
     find_gaps,
+    places_of,
     trajectory_error_table,
 )
 
@@ -82,7 +82,7 @@ def trajectory_differences(
     inside = _within(estimate, reference)
     stamps = inside.index.to_numpy(dtype=np.float64)
     known = trajectory_at(reference, stamps, ellipsoid)
-    place, truth = (t[GEODETIC].to_numpy(dtype=np.float64) for t in (inside, known))
+    place, truth = (places_of(t) for t in (inside, known))
     findings = _far_apart(place[0], truth[0], ellipsoid, estimate, reference)
     angles = [t[EULER].to_numpy(dtype=np.float64) for t in (inside, known)]
     q_est, q_ref = (rotation.quaternion_from_euler(a) for a in angles)
@@ -95,7 +95,7 @@ def trajectory_differences(
         stamps,
         place_difference(place, truth, ellipsoid=ellipsoid),
         inside[VELOCITY].to_numpy(dtype=np.float64) - known[VELOCITY].to_numpy(dtype=np.float64),
-        _wrapped(angles[0] - angles[1]),
+        rotation.within_half_turn(angles[0] - angles[1]),
         source=estimate.attrs.get("source"),
     )
     table[ROTATION_ERROR] = np.degrees(phi)
@@ -104,12 +104,6 @@ def trajectory_differences(
     table.attrs["interpolated"] = int((~same).sum())
     table.attrs["findings"] = (*findings, *_interpolated(stamps[~same], reference, ellipsoid))
     return table
-
-
-def _wrapped(angles: Array) -> Array:
-    """Within -180 to 180 deg; what is within already is left to the bit."""
-    wrapped = np.where(np.abs(angles) <= 180.0, angles, np.remainder(angles + 180.0, 360.0) - 180.0)
-    return np.asarray(wrapped)
 
 
 def _within(estimate: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:

@@ -9,21 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-__all__ = ["cut_at_date_line", "within_half_turn"]
-
-
-def within_half_turn(lon: Array) -> Array:
-    """Longitudes within -180 to 180 deg; those that are already keep every digit.
-
-    Parameters
-    ----------
-    lon : ndarray, (n,), deg
-
-    Returns
-    -------
-    ndarray, (n,), deg
-    """
-    return np.where(np.abs(lon) <= 180.0, lon, np.remainder(lon + 180.0, 360.0) - 180.0)
+__all__ = ["cut_at_date_line"]
 
 
 def cut_at_date_line(points: Array) -> list[Array]:

@@ -10,10 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
-from strapdown.formats.date_line import cut_at_date_line, within_half_turn
+from strapdown.formats.date_line import cut_at_date_line
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.formats.trajectory_thinning import Thinned, thin
+from strapdown.rotation import within_half_turn
 from strapdown.tables import check_trajectory
 
 Array = NDArray[np.float64]

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
+from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY
 
 Array = NDArray[np.float64]
@@ -113,7 +114,7 @@ def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None)
     course = np.degrees(np.arctan2(velocity[fast, 1], velocity[fast, 0]))
 
     def apart(heading_deg: Array) -> float:
-        return float(np.median(np.abs(np.remainder(course - heading_deg + 180.0, 360.0) - 180.0)))
+        return float(np.median(np.abs(within_half_turn(course - heading_deg))))
 
     heading = euler[fast, 2]
     plain, radians = apart(heading), apart(np.degrees(heading))

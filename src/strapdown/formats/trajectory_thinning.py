@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.frames import ecef_from_geodetic
-from strapdown.tables import GEODETIC
+from strapdown.tables import places_of
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
     if n <= most:
         return Thinned(np.arange(n), n, 0.0)
     time = trajectory.index.to_numpy(dtype=np.float64)
-    place = ecef_from_geodetic(trajectory[GEODETIC].to_numpy(dtype=np.float64), ellipsoid=ellipsoid)
+    place = ecef_from_geodetic(places_of(trajectory), ellipsoid=ellipsoid)
     pieces = max(1, min(-(-n // LONGEST_PIECE), (most - 1) // 2))
     kept = sorted({int(k) for k in np.linspace(0, n - 1, pieces + 1).round()})
     heap: list[tuple[float, int, int, int]] = []

@@ -14,7 +14,7 @@ from strapdown.exceptions import DataError
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
 from strapdown.frames import ecef_from_geodetic, q_ne
-from strapdown.tables import EULER, GEODETIC, check_trajectory
+from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ def poses(
         does not: both are told apart here.
     """
     chosen = options or TrajectoryFileOptions()
-    place = trajectory[GEODETIC].to_numpy(dtype=np.float64)
+    place = places_of(trajectory)
     position = ecef_from_geodetic(place, ellipsoid=chosen.ellipsoid)
     to_level = q_ne(place[:, 0], place[:, 1])
     q_wb = rotation.compose(
@@ -101,7 +101,7 @@ def write_tum(
         raise DataError("the trajectory has no rows", remedy="write one that has")
     position, q_wb = poses(trajectory, chosen)
     world, body = TUM_FRAMES[chosen.tum_frame]
-    lat, lon, alt = (float(v) for v in trajectory[GEODETIC].iloc[0])
+    lat, lon, alt = (float(v) for v in places_of(trajectory.iloc[:1])[0])
     head = [
         f"# trajectory: {one_line(name)}",
         f"# ellipsoid: {chosen.ellipsoid.name}",

@@ -7,13 +7,19 @@ from typing import Protocol
 
 import pandas as pd
 
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_csv import write_csv
 from strapdown.formats.trajectory_geojson import write_geojson
 from strapdown.formats.trajectory_kml import write_kml
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.formats.trajectory_tum import write_tum
 
-__all__ = ["TRAJECTORY_WRITERS", "TrajectoryFileOptions", "TrajectoryWriter"]
+__all__ = [
+    "TRAJECTORY_WRITERS",
+    "TrajectoryFileOptions",
+    "TrajectoryWriter",
+    "write_trajectory",
+]
 
 
 class TrajectoryWriter(Protocol):
@@ -46,3 +52,52 @@ TRAJECTORY_WRITERS: dict[str, TrajectoryWriter] = {
     "kml": write_kml,
     "geojson": write_geojson,
 }
+
+
+def write_trajectory(
+    path: str | Path,
+    trajectory: pd.DataFrame,
+    *,
+    name: str | None = None,
+    options: TrajectoryFileOptions | None = None,
+) -> None:
+    """Write a trajectory in the form that the file's ending names.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ends in one of `TRAJECTORY_WRITERS`. A file that is there is replaced, once the new one
+        is whole.
+    trajectory : DataFrame
+        A Trajectory table.
+    name : str, optional
+        For people who open the file; that of the file without it.
+    options : TrajectoryFileOptions, optional
+
+    Raises
+    ------
+    ConfigError
+        The ending is unknown, the folder is not there or may not be written to, or as the writer.
+    DataError
+        As the writer.
+    """
+    path = Path(path)
+    form = path.suffix.lower().removeprefix(".")
+    if form not in TRAJECTORY_WRITERS:
+        raise ConfigError(
+            f"there is no writer for files that end in '{path.suffix}'",
+            file=str(path),
+            remedy=nearest(form, TRAJECTORY_WRITERS),
+        )
+    part = path.with_name(f".{path.name}.part")
+    try:
+        TRAJECTORY_WRITERS[form](part, trajectory, name=name or path.stem, options=options)
+        part.replace(path)
+    except OSError as error:
+        raise ConfigError(
+            f"it cannot be written: {error.strerror}",
+            file=str(path),
+            remedy="make its folder, or give another",
+        ) from None
+    finally:
+        part.unlink(missing_ok=True)

@@ -321,6 +321,7 @@ class Mechanization(ABC):
             file=source,
             quantity="state",
             remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-            "gravity (-9.8 on z at level rest), a burst; and at the start: an attitude in rad, "
-            "an over-long run with a free height",
+            "gravity (-9.8 on z at level rest), a burst; at the start: an attitude in rad; or a "
+            "sensor too poor for so long a run, whose bias is best taken off at a rest, or a free "
+            "height over an hour",
         )

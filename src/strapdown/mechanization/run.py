@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -50,8 +50,8 @@ class NavigationRun:
     mechanization: Mechanization
     start: NavState
     end: NavState
-    time: Array
-    history: Array
+    time: Array = field(repr=False)
+    history: Array = field(repr=False)
     findings: tuple[Finding, ...] = ()
     source: str | None = None
 

@@ -12,7 +12,7 @@ from strapdown.formats.trajectory_thinning import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve
 from strapdown.report.path_marks import View, path_marks
-from strapdown.tables import EULER, GEODETIC
+from strapdown.tables import EULER, places_of
 
 __all__ = ["trajectory_chart"]
 
@@ -81,7 +81,7 @@ def trajectory_chart(
     DataError
         A place cannot be, as `frames.ned_from_geodetic`.
     """
-    origin = trajectory[GEODETIC].to_numpy(dtype=np.float64)[0]
+    origin = places_of(trajectory.iloc[:1])[0]
     drawn = [_drawn(trajectory, origin, ellipsoid, names[0], other is not None)]
     if other is not None:
         second = _drawn(other, origin, ellipsoid, names[1], True)
@@ -122,7 +122,7 @@ def _drawn(
 ) -> _Drawn:
     thinned = thin(table, MOST_POINTS, ellipsoid)
     kept = table.iloc[thinned.rows]
-    ned = ned_from_geodetic(kept[GEODETIC].to_numpy(dtype=np.float64), origin, ellipsoid=ellipsoid)
+    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=ellipsoid)
     left_out = ""
     if len(kept) < len(table):
         left_out = f"Plan{f', {name}' if legend else ''}: {thinned.sentence}"

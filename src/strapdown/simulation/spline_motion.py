@@ -18,7 +18,7 @@ from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_attitude import along_velocity
 from strapdown.simulation.path_motion import MOST_PITCH
 from strapdown.simulation.quintic_spline import Spline, quintic
-from strapdown.tables import EULER, GEODETIC, check_trajectory
+from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ class SplineMotion(EarthMotion):
         stamps = np.asarray(trajectory.index, dtype=np.float64)
         return cls(
             stamps - stamps[0],
-            trajectory[GEODETIC].to_numpy(dtype=np.float64),
+            places_of(trajectory),
             trajectory[EULER].to_numpy(dtype=np.float64),
             ellipsoid,
         )

@@ -59,7 +59,7 @@ from strapdown.tables.motion_increments import (
     motion_increments_table,
 )
 from strapdown.tables.references import REFERENCE_KINDS, check_references, references_table
-from strapdown.tables.trajectory import TRAJECTORY, check_trajectory, trajectory_table
+from strapdown.tables.trajectory import TRAJECTORY, check_trajectory, places_of, trajectory_table
 from strapdown.tables.trajectory_errors import (
     TRAJECTORY_ERROR,
     check_trajectory_error,
@@ -101,6 +101,7 @@ __all__ = [
     "imu_table",
     "increments_table",
     "motion_increments_table",
+    "places_of",
     "references_table",
     "trajectory_error_table",
     "trajectory_table",

@@ -14,6 +14,7 @@ from strapdown.tables.checks import (
     check_same_length,
     check_time,
     index_of,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import EULER, QUATERNION
@@ -66,7 +67,7 @@ def check_attitude(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, or a quaternion's
         norm is not 1 within 1 %.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, QUATERNION + EULER, source)
     check_time(index_of(table), source)
     check_rows(values_of(table, QUATERNION + EULER), QUATERNION + EULER, source)

@@ -112,6 +112,24 @@ def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | Non
         )
 
 
+def source_of(table: object) -> str | None:
+    """Name of a table's source for messages.
+
+    Raises
+    ------
+    DataError
+        It is no table.
+    """
+    if not isinstance(table, pd.DataFrame):
+        raise DataError(
+            f"a table is needed, and this is of kind {type(table).__name__}",
+            quantity="table",
+            remedy="a log that was read has its table as .imu, a run as .trajectory",
+        )
+    source = table.attrs.get("source")
+    return None if source is None else str(source)
+
+
 def is_number(value: object) -> bool:
     """Whether a value is one real number, of Python or of numpy."""
     return isinstance(value, Real)

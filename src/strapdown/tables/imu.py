@@ -14,6 +14,7 @@ from strapdown.tables.checks import (
     check_same_length,
     check_time,
     index_of,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import ACCEL, GYRO, MAG
@@ -88,7 +89,7 @@ def check_imu(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, there are fewer
         than two samples, or ``attrs["sampling"]`` does not say how the rows were sampled.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, GYRO, source)
     if table.attrs.get("sampling") not in SAMPLINGS:
         raise DataError(

@@ -13,6 +13,7 @@ from strapdown.tables.checks import (
     check_time,
     index_of,
     joined,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import DTHETA, THETA
@@ -64,7 +65,7 @@ def check_increments(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a step is not
         positive, or a step begins before the one before it has ended.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, INCREMENTS, source)
     check_time(index_of(table), source)
     check_rows(values_of(table, INCREMENTS), INCREMENTS, source)

@@ -12,6 +12,7 @@ from strapdown.tables.checks import (
     check_time,
     index_of,
     joined,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import DR, DV, PHI
@@ -76,7 +77,7 @@ def check_motion_increments(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a step is not
         positive, or a step begins before the one before it has ended.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, MOTION, source)
     check_time(index_of(table), source)
     check_rows(values_of(table, MOTION), MOTION, source)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.exceptions import DataError
-from strapdown.tables.checks import as_array, check_columns
+from strapdown.tables.checks import as_array, check_columns, source_of
 from strapdown.tables.columns import EULER, REFERENCE
 
 REFERENCE_KINDS = ("known", "tilt", "same", "turns")
@@ -58,7 +58,7 @@ def check_references(table: pd.DataFrame) -> None:
     DataError
         A column is missing, the kind is unknown, or a kind lacks what it needs.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, REFERENCE, source)
     needs = {
         "known": ["time", *EULER],

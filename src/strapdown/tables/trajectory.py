@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import DataError
+from strapdown.rotation import within_half_turn
 from strapdown.tables.checks import (
     check_columns,
     check_rows,
     check_time,
     index_of,
     joined,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import EULER, GEODETIC, VELOCITY
+
+Array = NDArray[np.float64]
 
 TRAJECTORY = [*GEODETIC, *VELOCITY, *EULER]
 
@@ -56,6 +60,26 @@ def trajectory_table(
     return table
 
 
+def places_of(trajectory: pd.DataFrame) -> Array:
+    """Latitude and longitude in deg and height in m, of a longitude that went on over a turn too.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        A Trajectory table: its longitude may go on where a vehicle goes round.
+
+    Returns
+    -------
+    ndarray, (n, 3)
+        Longitudes of more than a full turn are brought within half a turn; others keep their
+        digits.
+    """
+    place = trajectory[GEODETIC].to_numpy(dtype=np.float64, copy=True)
+    over = np.abs(place[:, 1]) > 360.0
+    place[over, 1] = within_half_turn(place[over, 1])
+    return place
+
+
 def check_trajectory(table: pd.DataFrame) -> None:
     """Check a Trajectory table.
 
@@ -69,7 +93,7 @@ def check_trajectory(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, or a latitude is
         beyond 90 deg.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, TRAJECTORY, source)
     check_time(index_of(table), source)
     check_rows(values_of(table, TRAJECTORY), TRAJECTORY, source)

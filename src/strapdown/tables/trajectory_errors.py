@@ -13,6 +13,7 @@ from strapdown.tables.checks import (
     check_time,
     index_of,
     joined,
+    source_of,
     values_of,
 )
 from strapdown.tables.columns import EULER, NED, VELOCITY
@@ -70,7 +71,7 @@ def check_trajectory_error(table: pd.DataFrame) -> None:
     DataError
         A column is missing, a value is not finite, or time does not advance.
     """
-    source = table.attrs.get("source")
+    source = source_of(table)
     check_columns(table, TRAJECTORY_ERROR, source)
     check_time(index_of(table), source)
     check_rows(values_of(table, TRAJECTORY_ERROR), TRAJECTORY_ERROR, source)

@@ -19,7 +19,11 @@ from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats.date_line import cut_at_date_line
 from strapdown.formats.trajectory_csv import write_error_csv
 from strapdown.formats.trajectory_thinning import thin
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
+from strapdown.formats.trajectory_writers import (
+    TRAJECTORY_WRITERS,
+    TrajectoryFileOptions,
+    write_trajectory,
+)
 from strapdown.frames import ecef_from_geodetic
 from strapdown.tables import trajectory_table
 
@@ -456,3 +460,34 @@ def test_options_of_a_wrong_kind_are_refused(options, quantity):
     with pytest.raises(ConfigError) as caught:
         TrajectoryFileOptions(**options)
     assert caught.value.finding.quantity == quantity
+
+
+def level(count=3):
+    place = np.column_stack([np.full(count, 10.0), 20.0 + 1e-5 * np.arange(count), np.zeros(count)])
+    return trajectory_table(
+        np.arange(float(count)), place, np.zeros((count, 3)), np.zeros((count, 3))
+    )
+
+
+@pytest.mark.parametrize("form", sorted(TRAJECTORY_WRITERS))
+def test_the_ending_says_the_form(form, tmp_path):
+    TRAJECTORY_WRITERS[form](tmp_path / "by_name", level(), name="drive")
+    write_trajectory(str(tmp_path / f"drive.{form.upper()}"), level())
+    written = (tmp_path / f"drive.{form.upper()}").read_bytes()
+    assert written == (tmp_path / "by_name").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["drive.kmz", "drive", "none/drive.kml"])
+def test_a_file_that_cannot_be_is_refused(name, tmp_path):
+    with pytest.raises(ConfigError, match="drive"):
+        write_trajectory(tmp_path / name, level())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_table_that_is_refused_leaves_the_old_file(tmp_path):
+    write_trajectory(tmp_path / "drive.kml", level())
+    before = (tmp_path / "drive.kml").read_bytes()
+    with pytest.raises(DataError):
+        write_trajectory(tmp_path / "drive.kml", level().iloc[:0])
+    assert [p.name for p in tmp_path.iterdir()] == ["drive.kml"]
+    assert (tmp_path / "drive.kml").read_bytes() == before
