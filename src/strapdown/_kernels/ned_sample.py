@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 from strapdown._kernels.increments import LARGEST
 from strapdown._kernels.motion_increments import linear_motion, mean_motion
 from strapdown._kernels.ned import (
     COS_LATITUDE,
+    DAMPED,
     DONE,
     FREE,
     HIGHEST,
@@ -32,7 +35,7 @@ EARTH, OPTIONS, STATE = 11, 18, 25
 SIZE = STATE + WIDTH
 
 # What an update answers besides `DONE`, `POLE` and `DIVERGED` of the step.
-BAD_SAMPLE, BAD_TIME, BAD_START, GAP = -1, -2, -3, -4
+BAD_SAMPLE, BAD_TIME, BAD_START, GAP, BAD_HEIGHT = -1, -2, -3, -4, -5
 
 
 @njit(cache=True)
@@ -45,6 +48,9 @@ def ned_update(r, time, gyro, accel, reference):
     """Take one sample; a sample that is refused leaves the record as it was."""
     if gyro.shape[0] != 3 or accel.shape[0] != 3 or not abs(time) < LARGEST:
         return BAD_SAMPLE
+    # NaN is no reference; a reference is a number, and for a height that is damped by it.
+    if not math.isnan(reference) and (r[OPTIONS] != DAMPED or not abs(reference) < LARGEST):
+        return BAD_HEIGHT
     wx, wy, wz = gyro[0], gyro[1], gyro[2]
     fx, fy, fz = accel[0], accel[1], accel[2]
     if not (usable(wx, wy, wz) and usable(fx, fy, fz)):

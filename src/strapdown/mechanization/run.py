@@ -15,11 +15,13 @@ from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import motion_increments
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-from strapdown.tables import MOTION, check_motion_increments
+from strapdown.tables import MOTION, PHI, check_motion_increments
 from strapdown.tables.checks import is_number, values_of
 
 Array = NDArray[np.float64]
 
+# A step that turns by more, in rad, is one that its samples hardly describe.
+LARGEST_TURN = 1.0
 # The longest step, in s, over which two samples say what happened between them. Longer holes
 # are for the user to judge.
 LONGEST_STEP = 1.0
@@ -132,7 +134,7 @@ def run_mechanization(
 def navigate_segments(
     mechanization: Mechanization,
     start: NavState,
-    segments: Iterable[pd.DataFrame],
+    segments: Iterable[pd.DataFrame] | pd.DataFrame,
     *,
     longest_step: float = LONGEST_STEP,
 ) -> Iterator[pd.DataFrame]:
@@ -146,7 +148,7 @@ def navigate_segments(
         Its height free or held.
     start : NavState
         At the first sample.
-    segments : iterable of DataFrame
+    segments : iterable of DataFrame, or DataFrame
         Imu tables, one after the other, of any lengths.
     longest_step : float, s
         As `run_mechanization`.
@@ -161,10 +163,11 @@ def navigate_segments(
     DataError, DivergenceError
         As `run_mechanization`.
     """
+    pieces = [segments] if isinstance(segments, pd.DataFrame) else segments
     state = mechanization.begin(start)
     kept: pd.DataFrame | None = None
     begun = False
-    for segment in segments:
+    for segment in pieces:
         if segment.empty:
             continue
         # Two samples back: the step before tells how a mean rate changes over the next.
@@ -233,9 +236,10 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
     check_longest_step(longest)
     dt = increments["dt"].to_numpy(dtype=np.float64)
     _check_joints(increments, dt)
+    turns = _check_turns(increments)
     # The usual step is no shorter than the shortest: with this most logs are done.
     if dt.max() <= min(longest, 3.0 * float(dt.min())):
-        return ()
+        return turns
     long = np.flatnonzero(dt > longest)
     source = increments.attrs.get("source")
     if long.size:
@@ -252,9 +256,10 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
     usual = float(np.median(dt))
     wide = np.flatnonzero(dt > 3.0 * usual)
     if not wide.size:
-        return ()
+        return turns
     row = int(wide[np.argmax(dt[wide])])
     return (
+        *turns,
         Finding(
             f"{wide.size} steps are more than three times as long as the usual {usual:.6g} s; the "
             f"longest, {dt[row]:.6g} s, ends at {float(increments.index[row]):.9g} s: rate and "
@@ -262,5 +267,22 @@ def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...
             file=source,
             quantity="dt",
             remedy="errors after it are larger than the sensors alone would make them",
+        ),
+    )
+
+
+def _check_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
+    phi = increments[PHI].to_numpy(dtype=np.float64)
+    if max(phi.max(), -phi.min()) <= LARGEST_TURN:
+        return ()
+    row, axis = divmod(int(np.abs(phi).argmax()), 3)
+    return (
+        Finding(
+            f"in the step ending at {float(increments.index[row]):.9g} s the body turns by "
+            f"{phi[row, axis]:.4g} rad: more than samples at its two ends can tell",
+            file=increments.attrs.get("source"),
+            quantity=PHI[axis],
+            remedy="look at the unit of the gyro (rad/s) and for a burst there; a body that does "
+            "turn so fast needs a faster log",
         ),
     )

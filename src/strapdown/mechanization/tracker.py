@@ -142,6 +142,15 @@ class NavTracker:
                 quantity="time",
                 remedy="give the state of that instant",
             )
+        if why == kernel.BAD_HEIGHT:
+            raise DataError(
+                f"a reference height with a height that is {self._mechanization.height}, or one "
+                "that is infinite",
+                row=row,
+                quantity="height",
+                remedy="give finite heights to NorthEastDown(height='damped') alone, NaN where "
+                "there is none",
+            )
         if why == kernel.GAP:
             raise DataError(
                 f"a gap of {time - self._record[kernel.TIME]:.6g} s before {time:.9g} s: what the "

@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 from strapdown.exceptions import DataError
-from strapdown.mechanization import NorthEastDown, Tadic, navigate_segments, run_mechanization
+from strapdown.mechanization import (
+    NavTracker,
+    NorthEastDown,
+    Tadic,
+    navigate_segments,
+    run_mechanization,
+)
 from strapdown.nav_state import NavState
-from strapdown.tables import motion_increments_table
+from strapdown.tables import imu_table, motion_increments_table
 
 START = NavState.from_degrees(50.0, 10.0, 100.0, time=5.0)
 
@@ -102,3 +108,36 @@ def test_a_name_of_an_ellipsoid_in_capitals(kind):
         run_mechanization(kind(ellipsoid="PZ90.11"), START, rest([0.1] * 5)).history,
         run_mechanization(kind(ellipsoid="pz90.11"), START, rest([0.1] * 5)).history,
     )
+
+
+def test_a_step_that_turns_too_far_is_told():
+    time = np.array([1.0, 2.0, 3.0]) * 0.1
+    phi = np.array([[0.0, 0.0, 0.1], [0.0, -1.5, 0.0], [0.9, 0.0, 0.0]])
+    rest = np.tile([0.0, 0.0, -0.98], (3, 1))
+    table = motion_increments_table(time, np.full(3, 0.1), phi, rest, 0.05 * rest)
+    run = run_mechanization(NorthEastDown(), NavState.from_degrees(55.0, 37.0), table)
+    (finding,) = run.findings
+    assert finding.quantity == "phi_y"
+    assert "ending at 0.2 s" in finding.what
+    assert "-1.5 rad" in finding.what
+    calm = table.assign(phi_y=0.0)
+    assert (
+        run_mechanization(NorthEastDown(), NavState.from_degrees(55.0, 37.0), calm).findings == ()
+    )
+
+
+def test_one_table_is_one_segment():
+    log = imu_table(np.arange(9) * 0.1, np.zeros((9, 3)), np.tile([0.0, 0.0, -9.8], (9, 1)))
+    start = NavState.from_degrees(55.0, 37.0)
+    (alone,) = navigate_segments(NorthEastDown(), start, log)
+    (listed,) = navigate_segments(NorthEastDown(), start, [log])
+    assert alone.equals(listed)
+
+
+@pytest.mark.parametrize(("kind", "height"), [("free", 150.0), ("held", 0.0), ("damped", np.inf)])
+def test_a_tracker_refuses_a_height_that_it_cannot_use(kind, height):
+    tracker = NavTracker(NavState.from_degrees(55.0, 37.0), NorthEastDown(height=kind))
+    force = [0.0, 0.0, -9.8]
+    with pytest.raises(DataError, match="reference height"):
+        tracker.update(0.0, np.zeros(3), force, height)
+    tracker.update(0.0, np.zeros(3), force)
