@@ -28,6 +28,7 @@ def samples(count: int) -> tuple[np.ndarray, np.ndarray]:
 def ratios() -> Iterator[Ratio]:
     from strapdown._kernels import motion_increments as increments
     from strapdown._kernels import ned as kernel
+    from strapdown.ellipsoids import WGS84
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
     from strapdown.nav_state import NavState
@@ -41,8 +42,6 @@ def ratios() -> Iterator[Ratio]:
     rows = np.empty((SAMPLES - 1, 10))
     history = np.empty((SAMPLES - 1, 10))
     none = np.empty(0)
-    from strapdown.ellipsoids import WGS84
-
     earth, options = WGS84.parameters(), mechanization.kernel_options()
 
     def batch() -> None:

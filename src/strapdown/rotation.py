@@ -321,12 +321,7 @@ def euler_from_quaternion(q: ArrayLike) -> Array:
         Wrong shape, a value that is not finite, or a norm that is not 1.
     """
     rows, leading = _unit(q, "quaternion")
-    angles = np.degrees(_apply(kernel.eulers_from_quats, rows, leading, 3))
-    heading = angles[..., 2]
-    wrapped = np.where(heading < 0.0, heading + 360.0, heading)
-    # A heading of -1e-17 deg rounds to 360 and not to just under it.
-    angles[..., 2] = np.where(wrapped >= 360.0, 0.0, wrapped)
-    return angles
+    return _apply(kernel.eulers_degrees_from_quats, rows, leading, 3)
 
 
 def dcm_from_euler(roll_pitch_heading: ArrayLike) -> Array:

@@ -25,6 +25,8 @@ ATAN_SERIES_LIMIT = 1e-6
 # but rounding, and only heading -+ roll is defined.
 GIMBAL_LOCK = 1e-14
 
+DEGREES = 180.0 / math.pi
+
 
 @njit(cache=True)
 def half_angle(u):
@@ -297,10 +299,23 @@ def quats_from_eulers(e, q):
 
 
 @njit(cache=True)
-def eulers_from_quats(q, e):
-    """Apply `euler_from_quat` to each row."""
+def euler_degrees_from_quat(w, x, y, z):
+    """As `euler_from_quat` in deg, with the heading in [0, 360)."""
+    roll, pitch, heading = euler_from_quat(w, x, y, z)
+    heading *= DEGREES
+    if heading < 0.0:
+        heading += 360.0
+        # -1e-17 deg rounds to 360 and not to just under it.
+        if heading >= 360.0:
+            heading = 0.0
+    return roll * DEGREES, pitch * DEGREES, heading
+
+
+@njit(cache=True)
+def eulers_degrees_from_quats(q, e):
+    """Apply `euler_degrees_from_quat` to each row."""
     for i in range(q.shape[0]):
-        e[i, 0], e[i, 1], e[i, 2] = euler_from_quat(q[i, 0], q[i, 1], q[i, 2], q[i, 3])
+        e[i, 0], e[i, 1], e[i, 2] = euler_degrees_from_quat(q[i, 0], q[i, 1], q[i, 2], q[i, 3])
 
 
 @njit(cache=True)

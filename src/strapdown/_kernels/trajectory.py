@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import math
-
 from numba import njit
 
-from strapdown._kernels.rotation import euler_from_quat, wrap_pi
-
-DEGREES = 180.0 / math.pi
+from strapdown._kernels.rotation import DEGREES, euler_degrees_from_quat, wrap_pi
 
 
 @njit(cache=True)
@@ -18,13 +14,6 @@ def trajectory_rows(history, out):
         out[k, 0], out[k, 1] = history[k, 0] * DEGREES, wrap_pi(history[k, 1]) * DEGREES
         for j in range(2, 6):
             out[k, j] = history[k, j]
-        roll, pitch, heading = euler_from_quat(
+        out[k, 6], out[k, 7], out[k, 8] = euler_degrees_from_quat(
             history[k, 6], history[k, 7], history[k, 8], history[k, 9]
         )
-        heading *= DEGREES
-        if heading < 0.0:
-            heading += 360.0
-            # -1e-17 deg rounds to 360 and not to just under it.
-            if heading >= 360.0:
-                heading = 0.0
-        out[k, 6], out[k, 7], out[k, 8] = roll * DEGREES, pitch * DEGREES, heading

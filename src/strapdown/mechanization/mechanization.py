@@ -12,9 +12,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.earth import RATE
-from strapdown._kernels.ned import ALT, POLE, ROW, V, reverse_increments
+from strapdown._kernels.ned import ALT, LAT, LON, POLE, ROW, Q, V, reverse_increments
 from strapdown._kernels.trajectory import trajectory_rows
-from strapdown.ellipsoids import ELLIPSOIDS, find_ellipsoid
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
@@ -121,16 +121,16 @@ class Mechanization(ABC):
         """
         return NavState(
             time=time,
-            lat=float(state[0]),
-            lon=math.remainder(float(state[1]), 2.0 * math.pi),
-            alt=float(state[2]),
-            v_n=state[3:6],
-            q_nb=state[6:10],
+            lat=float(state[LAT]),
+            lon=math.remainder(float(state[LON]), 2.0 * math.pi),
+            alt=float(state[ALT]),
+            v_n=state[V : V + 3],
+            q_nb=state[Q : Q + 4],
         )
 
     def kernel_options(self) -> Array:
         """Options and limits as the kernels take them."""
-        earth = ELLIPSOIDS[self.ellipsoid.lower()]
+        earth = find_ellipsoid(self.ellipsoid)
         return np.array(
             [
                 float(HEIGHTS.index(self.height)),
@@ -301,8 +301,8 @@ class Mechanization(ABC):
         before = ""
         if last is not None:
             before = (
-                f"; before it {np.degrees(last[0]):.6f} deg of latitude, {last[2]:.6g} m of "
-                f"height, {np.linalg.norm(last[3:6]):.6g} m/s"
+                f"; before it {np.degrees(last[LAT]):.6f} deg of latitude, {last[ALT]:.6g} m of "
+                f"height, {np.linalg.norm(last[V : V + 3]):.6g} m/s"
             )
         source = increments.attrs.get("source")
         if why == POLE:

@@ -110,7 +110,7 @@ def run_mechanization(
             quantity="increments",
             remedy="a log of at least two samples is needed",
         )
-    findings = _check_steps(increments, longest_step)
+    _refuse_holes(increments, longest_step)
     ends = increments.index.to_numpy(dtype=np.float64)
     begin = float(ends[0] - increments["dt"].iloc[0])
     _check_start(start, float(ends[-1]) if backward else begin, increments)
@@ -126,7 +126,7 @@ def run_mechanization(
         end=mechanization.nav_state(state, begin if backward else float(ends[-1])),
         time=np.concatenate([[begin], ends]),
         history=history,
-        findings=findings,
+        findings=(*_large_turns(increments), *_wide_steps(increments)),
         source=increments.attrs.get("source"),
     )
 
@@ -185,7 +185,7 @@ def navigate_segments(
             begun = True
         else:
             increments = increments.iloc[1:]
-        _check_steps(increments, longest_step)
+        _refuse_holes(increments, longest_step)
         state, history = mechanization.advance(state, increments)
         time = increments.index.to_numpy(dtype=np.float64)
         yield mechanization.trajectory(time, history, segment.attrs.get("source"))
@@ -232,46 +232,47 @@ def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
             )
 
 
-def _check_steps(increments: pd.DataFrame, longest: float) -> tuple[Finding, ...]:
+def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
     check_longest_step(longest)
     dt = increments["dt"].to_numpy(dtype=np.float64)
     _check_joints(increments, dt)
-    turns = _check_turns(increments)
-    # The usual step is no shorter than the shortest: with this most logs are done.
-    if dt.max() <= min(longest, 3.0 * float(dt.min())):
-        return turns
     long = np.flatnonzero(dt > longest)
-    source = increments.attrs.get("source")
     if long.size:
         row = int(long[0])
         end = float(increments.index[row])
         raise DataError(
             f"a gap of {dt[row]:.6g} s, from {end - dt[row]:.9g} s to {end:.9g} s: what the body "
             f"did in it is not known ({long.size} such)",
-            file=source,
+            file=increments.attrs.get("source"),
             quantity="dt",
             remedy=f"cut the log there, or pass longest_step={float(dt.max()):.3g} or more to join "
             "its sides by a line",
         )
+
+
+def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
+    dt = increments["dt"].to_numpy(dtype=np.float64)
+    # The usual step is no shorter than the shortest: with this most logs are done.
+    if dt.max() <= 3.0 * dt.min():
+        return ()
     usual = float(np.median(dt))
     wide = np.flatnonzero(dt > 3.0 * usual)
     if not wide.size:
-        return turns
+        return ()
     row = int(wide[np.argmax(dt[wide])])
     return (
-        *turns,
         Finding(
             f"{wide.size} steps are more than three times as long as the usual {usual:.6g} s; the "
             f"longest, {dt[row]:.6g} s, ends at {float(increments.index[row]):.9g} s: rate and "
             "force are taken as linear over it",
-            file=source,
+            file=increments.attrs.get("source"),
             quantity="dt",
             remedy="errors after it are larger than the sensors alone would make them",
         ),
     )
 
 
-def _check_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
+def _large_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
     phi = increments[PHI].to_numpy(dtype=np.float64)
     if max(phi.max(), -phi.min()) <= LARGEST_TURN:
         return ()
