@@ -1,0 +1,1 @@
+"""Digital filters: CFC classes, resampling, derivatives, delays between signals."""

@@ -1,0 +1,99 @@
+"""What is not known of a triad of sensors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.triad_errors import Triad, TriadLike
+
+# Facts about the range, which are not standard deviations, and may be infinite.
+FACTS = ("full_scale", "quantization", "bandwidth")
+
+
+@dataclass(frozen=True)
+class TriadUncertainty:
+    """Standard deviations of what a triad does to the truth, and the facts of its range.
+
+    The unit u is rad/s for gyros and m/s² for accelerometers. Each is the same on all axes where
+    one number is given. All errors are independent of one another, normal and of mean zero; they
+    act as in `error_chain`.
+
+    Attributes
+    ----------
+    noise_density : triad, u/√Hz
+        White noise: a sample that stands for an interval dt has the standard deviation
+        ``noise_density / √dt``.
+    bias : triad, u
+        Of a record, before any of it is estimated.
+    scale : triad
+        Relative.
+    misalignment : triad, rad
+        Of each of the two angles with which an axis feels the other two.
+    nonlinearity_2 : triad
+        Relative to full scale, at an input of full scale.
+    g_sensitivity : triad, u per m/s²
+        Of gyros: each of the three terms of an axis.
+    vibration_rectification : triad, u per (m/s²)²
+        Shift of the output per variance of the vibration on the axis.
+    full_scale : triad, u
+        The output is held within ± this.
+    quantization : triad, u
+        Step of the output.
+    bandwidth : float, Hz
+        Of the single-pole low-pass before the sampler.
+
+    Raises
+    ------
+    ConfigError
+        A number is negative or not finite.
+    """
+
+    noise_density: TriadLike = 0.0
+    bias: TriadLike = 0.0
+    scale: TriadLike = 0.0
+    misalignment: TriadLike = 0.0
+    nonlinearity_2: TriadLike = 0.0
+    g_sensitivity: TriadLike = 0.0
+    vibration_rectification: TriadLike = 0.0
+    full_scale: TriadLike = math.inf
+    quantization: TriadLike = 0.0
+    bandwidth: float = math.inf
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            given = getattr(self, f.name)
+            numbers = (given,) if isinstance(given, int | float) else tuple(given)
+            if f.name != "bandwidth":
+                numbers = numbers * 3 if len(numbers) == 1 else numbers
+            if len(numbers) != (1 if f.name == "bandwidth" else 3):
+                raise ConfigError(
+                    f"{given!r} has not the right shape",
+                    quantity=f.name,
+                    remedy="give one number, or three: x, y, z",
+                )
+            if any(math.isnan(x) or x < 0.0 for x in numbers) or (
+                f.name not in FACTS and any(math.isinf(x) for x in numbers)
+            ):
+                raise ConfigError(
+                    f"{given!r} is no standard deviation or range",
+                    quantity=f.name,
+                    remedy="give zero or more, finite",
+                )
+            value = tuple(float(x) for x in numbers)
+            object.__setattr__(self, f.name, value[0] if f.name == "bandwidth" else value)
+        if any(
+            n > 0.0 and math.isinf(r)
+            for n, r in zip(self.axis("nonlinearity_2"), self.axis("full_scale"), strict=True)
+        ):
+            raise ConfigError(
+                "a nonlinearity is relative to it, and there is none",
+                quantity="full_scale",
+                remedy="give it",
+            )
+
+    def axis(self, name: str) -> Triad:
+        """Return a per-axis attribute as three numbers."""
+        value: Triad = getattr(self, name)
+        return value
