@@ -58,7 +58,7 @@ class Mounting:
                 )
 
     @property
-    def C_vs(self) -> Array:
+    def C_vs(self) -> Array:  # noqa: N802
         """Turns vectors from sensor into vehicle axes, (3, 3)."""
         return rotation.dcm_from_quaternion(rotation.quaternion_from_euler(self.angles_deg))
 
