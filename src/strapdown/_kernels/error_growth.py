@@ -1,0 +1,103 @@
+"""How small errors of the start and of the increments grow along a path, to first order.
+
+An error is nine numbers: a rotation vector in local level, with ``C_true = (I + [phi x]) C``
+(Tadic and Vukajlovic 2016, Eqs. (20), (21)), velocity and place. Over a path of seconds the
+Earth's rate and the change of gravity with the place do not matter to it, and are left out: what
+they do to an error is 1e-4 of it a second.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy")
+def grow_errors(attitude, rows, start, theta, force, out):
+    """Grow the errors of p unknowns.
+
+    `attitude` is (k, 3, 3), body to level at the start of each step; `rows` are motion
+    increments; `start` is (p, 9); `theta` and `force` (p, 3, k) are what an unknown does to the
+    angle and to the velocity of each step, body axes of its start; `out` is (p, k + 1, 9).
+    """
+    steps = rows.shape[0]
+    for p in range(start.shape[0]):
+        for j in range(9):
+            out[p, 0, j] = start[p, j]
+        for i in range(steps):
+            dt = rows[i, 0]
+            c = attitude[i]
+            tx, ty, tz = _turned(c, theta[p, 0, i], theta[p, 1, i], theta[p, 2, i])
+            ux, uy, uz = _turned(c, force[p, 0, i], force[p, 1, i], force[p, 2, i])
+            vx, vy, vz = _turned(c, rows[i, 4], rows[i, 5], rows[i, 6])
+            rx, ry, rz = _turned(c, rows[i, 7], rows[i, 8], rows[i, 9])
+            x, y, z = out[p, i, 0], out[p, i, 1], out[p, i, 2]
+            out[p, i + 1, 0] = x + tx
+            out[p, i + 1, 1] = y + ty
+            out[p, i + 1, 2] = z + tz
+            out[p, i + 1, 3] = out[p, i, 3] + y * vz - z * vy + ux
+            out[p, i + 1, 4] = out[p, i, 4] + z * vx - x * vz + uy
+            out[p, i + 1, 5] = out[p, i, 5] + x * vy - y * vx + uz
+            half = 0.5 * dt
+            out[p, i + 1, 6] = out[p, i, 6] + dt * out[p, i, 3] + y * rz - z * ry + half * ux
+            out[p, i + 1, 7] = out[p, i, 7] + dt * out[p, i, 4] + z * rx - x * rz + half * uy
+            out[p, i + 1, 8] = out[p, i, 8] + dt * out[p, i, 5] + x * ry - y * rx + half * uz
+
+
+@njit(cache=True, error_model="numpy")
+def grow_noise(attitude, rows, theta, force, start, out):
+    """Grow the covariance of what is independent from step to step.
+
+    `theta` and `force` (3, k) are standard deviations of the noise of each step; `start` (9, 9)
+    is the covariance at the start; `out` is (k + 1, 9, 9).
+    """
+    steps = rows.shape[0]
+    for a in range(9):
+        for b in range(9):
+            out[0, a, b] = start[a, b]
+    for i in range(steps):
+        dt = rows[i, 0]
+        c = attitude[i]
+        vx, vy, vz = _turned(c, rows[i, 4], rows[i, 5], rows[i, 6])
+        rx, ry, rz = _turned(c, rows[i, 7], rows[i, 8], rows[i, 9])
+        now, then = out[i], out[i + 1]
+        # The transition is I + N, from the left and from the right; N fills six rows.
+        for a in range(9):
+            for b in range(9):
+                then[a, b] = now[a, b]
+        for b in range(9):
+            x, y, z = now[0, b], now[1, b], now[2, b]
+            then[3, b] += y * vz - z * vy
+            then[4, b] += z * vx - x * vz
+            then[5, b] += x * vy - y * vx
+            then[6, b] += dt * now[3, b] + y * rz - z * ry
+            then[7, b] += dt * now[4, b] + z * rx - x * rz
+            then[8, b] += dt * now[5, b] + x * ry - y * rx
+        for a in range(9):
+            x, y, z = then[a, 0], then[a, 1], then[a, 2]
+            sx, sy, sz = then[a, 3], then[a, 4], then[a, 5]
+            then[a, 3] += y * vz - z * vy
+            then[a, 4] += z * vx - x * vz
+            then[a, 5] += x * vy - y * vx
+            then[a, 6] += dt * sx + y * rz - z * ry
+            then[a, 7] += dt * sy + z * rx - x * rz
+            then[a, 8] += dt * sz + x * ry - y * rx
+        for a in range(3):
+            for b in range(3):
+                turned, felt = 0.0, 0.0
+                for j in range(3):
+                    turned += c[a, j] * c[b, j] * theta[j, i] * theta[j, i]
+                    felt += c[a, j] * c[b, j] * force[j, i] * force[j, i]
+                then[a, b] += turned
+                then[3 + a, 3 + b] += felt
+                then[3 + a, 6 + b] += 0.5 * dt * felt
+                then[6 + a, 3 + b] += 0.5 * dt * felt
+                then[6 + a, 6 + b] += 0.25 * dt * dt * felt
+
+
+@njit(cache=True, error_model="numpy")
+def _turned(c, x, y, z):
+    return (
+        c[0, 0] * x + c[0, 1] * y + c[0, 2] * z,
+        c[1, 0] * x + c[1, 1] * y + c[1, 2] * z,
+        c[2, 0] * x + c[2, 1] * y + c[2, 2] * z,
+    )

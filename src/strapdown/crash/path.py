@@ -1,0 +1,385 @@
+"""The path of the reference point near a crash, with its attitude and what is not known of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import frames, rotation
+from strapdown._kernels.ned import ALT, LAT, LON, Q, V
+from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.entry import Entry
+from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
+from strapdown.crash.sample_effects import SampleEffects
+from strapdown.exceptions import DataError
+from strapdown.mechanization import NorthEastDown
+from strapdown.nav_state import NavState
+from strapdown.sensors.prepared_unit import Levelling
+from strapdown.tables import EULER, NED
+from strapdown.tables import VELOCITY as VELOCITIES
+
+Array = NDArray[np.float64]
+
+WINDOW = (-0.1, 0.75)
+#: What the columns of an error are, in its order.
+ERROR = ["phi_n", "phi_e", "phi_d", *VELOCITIES, *NED]
+
+
+@dataclass(frozen=True, eq=False)
+class CrashPath:
+    """The path over a window, its linear covariance, and what makes it.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        From the common trigger.
+    anchor : int
+        The sample that the path is tied to; forward after it, backward before it.
+    entry : Entry
+    table : DataFrame
+        Indexed by time: ``north east down`` m, from the reference point's place at the entry;
+        ``VN VE VD`` m/s; ``roll pitch heading`` deg.
+    q_nb : ndarray, (n, 4)
+    names, contributors : tuple of str
+        Of p unknowns, and the line of the budget that each belongs to.
+    errors : ndarray, (p, n, 9)
+        What one standard deviation of each does to attitude (rotation vector in local level,
+        rad), velocity (m/s) and place (m).
+    noise_covariance : ndarray, (n, 9, 9)
+        Of what is independent from sample to sample.
+    start : ndarray, (p, 9)
+        `errors` at the entry.
+    legs : tuple of Leg
+        Backward and forward.
+    """
+
+    time: Array
+    anchor: int
+    entry: Entry
+    table: pd.DataFrame
+    q_nb: Array = field(repr=False)
+    names: tuple[str, ...] = field(repr=False)
+    contributors: tuple[str, ...] = field(repr=False)
+    errors: Array = field(repr=False)
+    noise_covariance: Array = field(repr=False)
+    start: Array = field(repr=False)
+    legs: tuple[Leg, Leg] = field(repr=False)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Covariance of attitude (rad), velocity (m/s) and place (m), (n, 9, 9)."""
+        systematic = np.einsum("pni,pnj->nij", self.errors, self.errors)
+        return np.asarray(systematic + self.noise_covariance)
+
+    @property
+    def sd(self) -> pd.DataFrame:
+        """Standard deviations: ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch heading`` deg.
+
+        Of the angles to first order, away from a pitch of 90 deg.
+        """
+        root = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+        to_angles = _angle_rates(self.table[EULER].to_numpy())
+        turned = np.einsum("nij,njk,nlk->nil", to_angles, self.covariance[:, :3, :3], to_angles)
+        angles = np.degrees(np.sqrt(np.diagonal(turned, axis1=1, axis2=2)))
+        values = np.concatenate([root[:, PLACE], root[:, VELOCITY], angles], axis=1)
+        return pd.DataFrame(values, index=self.table.index, columns=[*NED, *VELOCITIES, *EULER])
+
+    def variances(self, row: int = -1) -> pd.DataFrame:
+        """Variance that each contributor adds at a sample.
+
+        Parameters
+        ----------
+        row : int
+
+        Returns
+        -------
+        DataFrame
+            Indexed by contributor, columns as `ERROR`: rad², (m/s)², m². Its sums are the
+            diagonal of `covariance`.
+        """
+        squares = pd.DataFrame(self.errors[:, row] ** 2, columns=ERROR)
+        table = squares.groupby(list(self.contributors), sort=False).sum()
+        table.loc["sensor noise"] = table.reindex(["sensor noise"]).fillna(0.0).iloc[
+            0
+        ].to_numpy() + np.diagonal(self.noise_covariance[row])
+        table.index.name = "contributor"
+        return table
+
+
+def reconstruct_path(
+    imu: pd.DataFrame,
+    effects: SampleEffects,
+    levelling: Levelling,
+    level_time: float | None,
+    entry: Entry | None,
+    *,
+    window: Sequence[float] = WINDOW,
+    mechanization: NorthEastDown | None = None,
+) -> CrashPath:
+    """Navigate from the entry forward and backward, and grow what is not known along the way.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table of the reference point, vehicle axes, time from the common trigger.
+    effects : SampleEffects
+        Of its unknowns, on the same samples.
+    levelling : Levelling
+        Roll and pitch at `level_time`.
+    level_time : float, s, or None
+        End of the stretch that the vehicle was levelled on; the gyros carry the attitude from
+        there to the entry. None: roll and pitch are those at the entry.
+    entry : Entry or None
+        None: the velocity follows from a vehicle that stood still until `level_time`, the path
+        is tied to time zero, and told in axes of the vehicle there.
+    window : (float, float), s
+        The path is given over the samples within.
+    mechanization : NorthEastDown, optional
+
+    Returns
+    -------
+    CrashPath
+
+    Raises
+    ------
+    DataError
+        The record does not hold the window or the entry; there is no velocity to begin with.
+    DivergenceError
+        As `make_leg`.
+
+    Notes
+    -----
+    An error is the truth less what is computed, ``C_true = (I + [phi x]) C`` (Tadic and
+    Vukajlovic 2016, Eq. (20)). Heading is defined at the entry: what the gyros do to it before
+    does not count. A specific force that is wrong by df at rest tilts the level by
+    ``phi_e = df_n / g, phi_n = -df_e / g``: its horizontal part comes back with the opposite
+    sign, and shows in the path only as far as the vehicle turns.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    mechanization = mechanization or NorthEastDown()
+    origin = entry or Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
+    first, anchor, last = _rows(imu, time, window, origin.time)
+    if origin.attitude_deg is not None:
+        begin = _Begin(_state(origin, *origin.attitude_deg, float(time[anchor])), *_NOTHING)
+    else:
+        begin = _carried(imu, effects, levelling, level_time, entry, origin, anchor, mechanization)
+    names = (*effects.names, *begin.names, *(u[0] for u in origin.unknowns))
+    contributors = (
+        *effects.contributors,
+        *begin.contributors,
+        *(u[1] for u in origin.unknowns),
+    )
+    start = np.zeros((len(names), 9))
+    start[: len(begin.errors)] = begin.errors
+    if origin.unknowns:
+        start[-len(origin.unknowns) :] = [u[2] for u in origin.unknowns]
+    padded = _padded(effects, len(names) - len(effects.names))
+    back = make_leg(
+        mechanization, begin.state, imu, padded, slice(first, anchor + 1), backward=True
+    )
+    ahead = make_leg(
+        mechanization, begin.state, imu, padded, slice(anchor, last + 1), backward=False
+    )
+    origin = replace(origin, velocity=_triple(begin.state.v_n))
+    return _joined((back, ahead), origin, names, contributors, start)
+
+
+@dataclass(frozen=True, eq=False)
+class _Begin:
+    """The state at the entry, the errors that sensors and levelling have put on it, their names."""
+
+    state: NavState
+    names: tuple[str, ...]
+    contributors: tuple[str, ...]
+    errors: Array
+
+
+_NOTHING: tuple[tuple[str, ...], tuple[str, ...], Array] = ((), (), np.zeros((0, 9)))
+
+
+def _state(entry: Entry, roll: float, pitch: float, time: float) -> NavState:
+    return NavState.from_degrees(
+        entry.lat_deg,
+        entry.lon_deg,
+        entry.alt,
+        v_n=entry.velocity,
+        roll_deg=roll,
+        pitch_deg=pitch,
+        heading_deg=entry.heading_deg,
+        time=time,
+    )
+
+
+def _carried(
+    imu: pd.DataFrame,
+    effects: SampleEffects,
+    levelling: Levelling,
+    level_time: float | None,
+    entry: Entry | None,
+    origin: Entry,
+    anchor: int,
+    mechanization: NorthEastDown,
+) -> _Begin:
+    """Carry the attitude from where the vehicle was levelled to the entry, and its errors."""
+    time = imu.index.to_numpy(dtype=np.float64)
+    at = anchor if level_time is None else int(np.searchsorted(time, level_time - 1e-9))
+    if at > anchor:
+        raise DataError(
+            f"the vehicle was levelled at {level_time:.6g} s, after the entry at "
+            f"{time[anchor]:.6g} s",
+            file=imu.attrs.get("source"),
+            quantity="entry",
+            remedy="tie the path to an instant after the stationary stretch",
+        )
+    if entry is None and level_time is None:
+        raise DataError(
+            "nothing says how fast the vehicle was",
+            file=imu.attrs.get("source"),
+            quantity="entry speed",
+            remedy="give the entry speed with its standard deviation, or a record that begins "
+            "with the vehicle at rest",
+        )
+    names = ["levelling north", "levelling east"]
+    tilt = math.radians(levelling.sd_deg)
+    still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
+    begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))
+    padded = _padded(effects, 2)
+    leg = make_leg(mechanization, begin, imu, padded, slice(at, anchor + 1), backward=False)
+    start = np.zeros((len(effects.names) + 2, 9))
+    # The length of what is felt at rest, whatever the place's gravity is taken to be.
+    felt = effects.rest_force @ rotation.dcm_from_quaternion(begin.q_nb).T / GRAVITY
+    start[:-2, 0], start[:-2, 1] = -felt[:, 1], felt[:, 0]
+    start[-2, 0] = start[-1, 1] = tilt
+    errors = leg.errors(start)[:, -1]
+    noise = leg.noise_covariance()[-1]
+    heading = float(rotation.euler_from_quaternion(leg.nominal[-1, Q : Q + 4])[2])
+    turn = rotation.dcm_from_euler([0.0, 0.0, origin.heading_deg - heading])
+    twist = np.kron(np.eye(3), turn)
+    errors, noise = errors @ twist.T, twist @ noise @ twist.T
+    velocity = turn @ leg.nominal[-1, V : V + 3] if entry is None else np.array(origin.velocity)
+    # Heading is defined here: an error of it is one of the axes that the path is told in.
+    own = np.eye(9)
+    own[3:6, 2] = -np.cross([0.0, 0.0, 1.0], velocity)
+    own[2, 2] = 0.0
+    own[PLACE] = 0.0
+    if entry is not None:
+        own[VELOCITY] = 0.0
+    errors, noise = errors @ own.T, own @ noise @ own.T
+    values, vectors = np.linalg.eigh(noise)
+    columns = (vectors * np.sqrt(np.maximum(values, 0.0))).T
+    columns = columns[values > 1e-12 * max(values[-1], 1e-300)]
+    keep = errors[-2:].any(axis=1)
+    names = [name for name, k in zip(names, keep, strict=True) if k]
+    errors = np.concatenate([errors[:-2], errors[-2:][keep], columns])
+    q_nb = rotation.compose(rotation.quaternion_from_dcm(turn), leg.nominal[-1, Q : Q + 4])
+    state = NavState(
+        time=float(time[anchor]),
+        lat=begin.lat,
+        lon=begin.lon,
+        alt=begin.alt,
+        v_n=velocity,
+        q_nb=q_nb,
+    )
+    return _Begin(
+        state,
+        (*names, *(f"noise before the entry {k + 1}" for k in range(len(columns)))),
+        (*("levelling" for _ in names), *("sensor noise" for _ in columns)),
+        errors,
+    )
+
+
+def _rows(
+    imu: pd.DataFrame, time: Array, window: Sequence[float], at: float
+) -> tuple[int, int, int]:
+    """First, entry's and last sample of the path."""
+    begin, end = float(window[0]), float(window[1])
+    slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
+        raise DataError(
+            f"the window from {begin:g} s to {end:g} s is not within the record, which has "
+            f"{time[0]:.6g} s to {time[-1]:.6g} s",
+            file=imu.attrs.get("source"),
+            quantity="window",
+            remedy="choose a window within the record, its start before its end",
+        )
+    if not time[0] - slack <= at <= time[-1] + slack:
+        raise DataError(
+            f"the entry at {at:.6g} s is not within the record, which has {time[0]:.6g} s to "
+            f"{time[-1]:.6g} s",
+            file=imu.attrs.get("source"),
+            quantity="entry",
+            remedy="give the velocity at an instant of the record",
+        )
+    anchor = int(np.argmin(np.abs(time - at)))
+    first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
+    last = max(int(np.searchsorted(time, end + 1e-9, side="right")) - 1, anchor)
+    return first, anchor, last
+
+
+def _padded(effects: SampleEffects, more: int) -> SampleEffects:
+    """Effects with unknowns that act on no sample."""
+    n = len(effects.force_noise)
+    return replace(
+        effects,
+        force=np.concatenate([effects.force, np.zeros((more, n, 3))]),
+        rate=np.concatenate([effects.rate, np.zeros((more, n, 3))]),
+    )
+
+
+def _joined(
+    legs: tuple[Leg, Leg],
+    entry: Entry,
+    names: tuple[str, ...],
+    contributors: tuple[str, ...],
+    start: Array,
+) -> CrashPath:
+    back, ahead = legs
+    time = np.concatenate([back.time[::-1], ahead.time[1:]])
+    states = np.concatenate([_states(back)[::-1], _states(ahead)[1:]])
+    anchor = len(back.time) - 1
+    place = np.column_stack(
+        [np.degrees(states[:, LAT]), np.degrees(states[:, LON]), states[:, ALT]]
+    )
+    moved = frames.place_difference(place, np.broadcast_to(place[anchor], place.shape))
+    # The entry may lie between two samples.
+    moved = moved + (time[anchor] - entry.time) * np.asarray(entry.velocity)
+    q_nb = states[:, Q : Q + 4]
+    table = pd.DataFrame(
+        np.concatenate([moved, states[:, V : V + 3], rotation.euler_from_quaternion(q_nb)], axis=1),
+        index=pd.Index(time, name="time"),
+        columns=[*NED, *VELOCITIES, *EULER],
+    )
+    errors = np.concatenate([back.errors(start)[:, ::-1], ahead.errors(start)[:, 1:]], axis=1)
+    noise = np.concatenate([back.noise_covariance()[::-1], ahead.noise_covariance()[1:]])
+    return CrashPath(
+        time, anchor, entry, table, q_nb, names, contributors, errors, noise, start, legs
+    )
+
+
+def _states(leg: Leg) -> Array:
+    states = leg.nominal.copy()
+    if leg.backward:
+        states[:, V : V + 3] *= -1.0
+    return states
+
+
+def _angle_rates(angles: Array) -> Array:
+    """Small turn in local level to changes of roll, pitch, heading, (n, 3, 3), rad per rad."""
+    pitch, heading = np.radians(angles[:, 1]), np.radians(angles[:, 2])
+    c, s = np.cos(heading), np.sin(heading)
+    out = np.zeros((len(angles), 3, 3))
+    out[:, 0, 0], out[:, 0, 1] = c / np.cos(pitch), s / np.cos(pitch)
+    out[:, 1, 0], out[:, 1, 1] = -s, c
+    out[:, 2, 0], out[:, 2, 1] = c * np.tan(pitch), s * np.tan(pitch)
+    out[:, 2, 2] = 1.0
+    return out
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])

@@ -1,0 +1,157 @@
+"""A reconstructed path against a reference: cameras, or the truth of a simulation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.crash.leg import PLACE
+from strapdown.crash.path import CrashPath
+from strapdown.exceptions import DataError
+from strapdown.tables import NED
+
+Array = NDArray[np.float64]
+
+#: Columns of the standard deviation of a reference.
+NED_SD = ["north_sd", "east_sd", "down_sd"]
+# 95 % of a normal distribution lie within so many standard deviations.
+TWO_SIDED_95 = 1.959963984540054
+
+
+@dataclass(frozen=True, eq=False)
+class PathComparison:
+    """Reconstructed less reference.
+
+    Attributes
+    ----------
+    errors : DataFrame
+        ``north east down``, m, indexed by the reference's instants, s.
+    bound : DataFrame
+        Half width of the interval that holds 95 % of such errors, m: path and reference together.
+    rms, largest : tuple of float, m
+        Over the instants, per axis; the largest by size.
+    within : tuple of float
+        Share of the instants at which the error is within the bound. Errors of neighbouring
+        instants are nearly one and the same, so that a share is no count of independent trials.
+    chi_square : float
+        Of the three components at the last instant, against `chi_square_95`.
+    chi_square_95 : float
+        Limit of 95 % for three degrees of freedom.
+    consistent : bool
+        Whether the last instant's chi-square is below the limit.
+    """
+
+    errors: pd.DataFrame = field(repr=False)
+    bound: pd.DataFrame = field(repr=False)
+    rms: tuple[float, float, float]
+    largest: tuple[float, float, float]
+    within: tuple[float, float, float]
+    chi_square: float
+    chi_square_95: float
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the last error is one that the covariances allow."""
+        return self.chi_square <= self.chi_square_95
+
+
+def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComparison:
+    """Compare a path with a reference.
+
+    Parameters
+    ----------
+    path : CrashPath
+    reference : DataFrame
+        Indexed by time from the common trigger, s; ``north east down`` of the same point, m, in
+        the axes of the path, from any origin: it is moved so that both agree at the entry. With
+        ``north_sd east_sd down_sd``, m, where it is not exact.
+
+    Returns
+    -------
+    PathComparison
+        At the reference's instants that lie within the path. The path is taken between its
+        samples by the cubic that has its velocities, so that a reference of 1000 frames a second
+        is not compared with chords.
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, or the two do not share the entry and at
+        least one instant after it.
+    """
+    time = reference.index.to_numpy(dtype=np.float64)
+    values, sd = _columns(reference, time)
+    from scipy.interpolate import CubicHermiteSpline
+
+    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
+    inside = (time >= path.time[0] - 1e-9) & (time <= path.time[-1] + 1e-9)
+    entry = path.entry.time
+    if not (inside.any() and time[0] <= entry + 1e-9 and time[inside][-1] > entry):
+        raise DataError(
+            f"it has {time[0]:.6g} s to {time[-1]:.6g} s, and the path {path.time[0]:.6g} s to "
+            f"{path.time[-1]:.6g} s with its entry at {entry:.6g} s",
+            file=reference.attrs.get("source"),
+            quantity="reference path",
+            remedy="give a reference on the common clock that begins at or before the entry",
+        )
+    origin = np.array([np.interp(entry, time, values[:, k]) for k in range(3)])
+    at_origin = np.array([np.interp(entry, time, sd[:, k]) for k in range(3)])
+    origin = origin - own(entry)
+    difference = own(time[inside]) - (values[inside] - origin)
+    covariance = _covariance(path, time[inside])
+    # The origin's reading is one more, independent of the others.
+    own_noise = sd[inside] ** 2 + at_origin**2
+    covariance = covariance + np.einsum("ni,ij->nij", own_noise, np.eye(3))
+    bound = TWO_SIDED_95 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    largest = difference[np.abs(difference).argmax(axis=0), range(3)]
+    from scipy.stats import chi2
+
+    index = pd.Index(time[inside], name="time")
+    return PathComparison(
+        pd.DataFrame(difference, index=index, columns=NED),
+        pd.DataFrame(bound, index=index, columns=NED),
+        _triple(np.sqrt((difference**2).mean(axis=0))),
+        _triple(largest),
+        _triple((np.abs(difference) <= bound).mean(axis=0)),
+        float(difference[-1] @ np.linalg.pinv(covariance[-1]) @ difference[-1]),
+        float(chi2.ppf(0.95, 3)),
+    )
+
+
+def _covariance(path: CrashPath, time: Array) -> Array:
+    place = path.covariance[:, PLACE, PLACE].reshape(len(path.time), 9)
+    rows = np.column_stack([np.interp(time, path.time, place[:, k]) for k in range(9)])
+    return np.asarray(rows.reshape(-1, 3, 3))
+
+
+def _columns(reference: pd.DataFrame, time: Array) -> tuple[Array, Array]:
+    missing = [c for c in NED if c not in reference.columns]
+    if missing:
+        raise DataError(
+            f"there is no column {', '.join(missing)}",
+            file=reference.attrs.get("source"),
+            quantity="reference path",
+            remedy="give north, east and down in m",
+        )
+    values = reference[NED].to_numpy(dtype=np.float64)
+    has_sd = set(NED_SD) <= set(reference.columns)
+    sd = reference[NED_SD].to_numpy(dtype=np.float64) if has_sd else np.zeros_like(values)
+    bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
+    if bad.any() or (sd < 0.0).any() or (np.diff(time) <= 0.0).any() or not len(time):
+        row = int(np.flatnonzero(bad)[0]) if bad.any() else 0
+        raise DataError(
+            "it is empty, has a value that is not finite or a negative standard deviation, or "
+            "its time does not advance",
+            file=reference.attrs.get("source"),
+            row=row + 1,
+            quantity="reference path",
+            remedy="drop such rows, and sort by time",
+        )
+    return values, sd
+
+
+def _triple(values: Array) -> tuple[float, float, float]:
+    return float(values[0]), float(values[1]), float(values[2])

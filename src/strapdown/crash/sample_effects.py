@@ -1,0 +1,381 @@
+"""What the unknowns of a unit do to every sample at a point of the vehicle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.sensors.crash_unit import RecordedTriad
+from strapdown.sensors.lever_arm import angular_acceleration
+from strapdown.sensors.prepared_unit import PreparedUnit
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+# What is faster than this part of a record is vibration to it.
+VIBRATION = 0.025  # s
+AXES = "xyz"
+
+
+@dataclass(frozen=True, eq=False)
+class SampleEffects:
+    """What one standard deviation of each of p unknowns adds to n samples, in vehicle axes.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of each unknown.
+    contributors : tuple of str
+        The line of the error budget that each belongs to.
+    force : ndarray, (p, n, 3), m/s²
+        Added to the specific force at the point.
+    rate : ndarray, (p, n, 3), rad/s
+        Added to the rate of the vehicle.
+    rest_force : ndarray, (p, 3), m/s²
+        Added to the mean of the specific force from which the vehicle was levelled.
+    force_noise : ndarray, (n, 3), m/s²
+        Standard deviation of what is independent from sample to sample.
+    rate_noise : ndarray, (n, 3), rad/s
+    """
+
+    names: tuple[str, ...]
+    contributors: tuple[str, ...]
+    force: Array
+    rate: Array
+    rest_force: Array
+    force_noise: Array
+    rate_noise: Array
+
+
+def unit_effects(
+    prepared: PreparedUnit, point: Sequence[float], *, time_sd: float = 0.0
+) -> SampleEffects:
+    """List the unknowns of a unit and what each does at a point.
+
+    Parameters
+    ----------
+    prepared : PreparedUnit
+    point : sequence of float, (3,), m
+        Vehicle axes, from the vehicle's origin.
+    time_sd : float, s
+        How well the unit's clock is known against the common one.
+
+    Returns
+    -------
+    SampleEffects
+        Bias, scale factor, misalignment, nonlinearity and vibration rectification of every range
+        that speaks, with what its bias was taken from; the same of the gyro, with its sensitivity
+        to specific force and what it does through the lever arm; mounting; lever arm; timing.
+        An unknown without a standard deviation is left out.
+
+    Notes
+    -----
+    A higher range whose bias was taken from a lower one at rest has the lower one's error there,
+    and its own only as far as the input has changed since: with ``e_l`` and ``e_h`` the errors of
+    the two curves, ``e_l(f_rest) + e_h(f) - e_h(f_rest)``. A gyro's bias was taken at rest, so
+    that its sensitivity to specific force acts on ``f - f_rest``. Vibration is the variance about
+    a moving mean of 25 ms.
+    """
+    return _UnitEffects(prepared, np.asarray(point, dtype=np.float64), time_sd).collect()
+
+
+class _UnitEffects:
+    def __init__(self, prepared: PreparedUnit, point: Array, time_sd: float) -> None:
+        unit = prepared.unit
+        if unit.gyro is None:
+            raise DataError(
+                "there is no gyro, nor one that is borrowed",
+                file=unit.name,
+                quantity="gyro",
+                remedy="name the unit whose gyro this one borrows (gyro_from)",
+            )
+        self.prepared, self.time_sd = prepared, time_sd
+        self.gyro: RecordedTriad = unit.gyro
+        self.turn = unit.mounting.C_vs
+        self.time = prepared.imu.index.to_numpy(dtype=np.float64)
+        self.force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
+        self.rate = prepared.imu[GYRO].to_numpy(dtype=np.float64)
+        # As the sensors have them.
+        self.felt, self.turned = self.force @ self.turn, self.rate @ self.turn
+        rest = prepared.rest
+        has_rest = rest is not None and rest.accel_mean is not None
+        self.rest_felt = (
+            np.asarray(rest.accel_mean) @ self.turn if has_rest and rest else np.zeros(3)
+        )
+        self.has_rest = has_rest
+        self.arm = point - np.asarray(unit.mounting.position)
+        self.names: list[str] = []
+        self.contributors: list[str] = []
+        self.forces: list[Array] = []
+        self.rates: list[Array] = []
+        self.rests: list[Array] = []
+
+    def collect(self) -> SampleEffects:
+        for number in range(len(self.prepared.unit.accelerometers)):
+            self._range(number)
+        self._gyro()
+        self._mounting()
+        self._timing()
+        count, n = len(self.names), len(self.time)
+        return SampleEffects(
+            tuple(self.names),
+            tuple(self.contributors),
+            np.array(self.forces).reshape(count, n, 3),
+            np.array(self.rates).reshape(count, n, 3),
+            np.array(self.rests).reshape(count, 3),
+            # Axes of the vehicle see what those of the sensors have, by the squares.
+            np.sqrt(self.prepared.noise**2 @ (self.turn.T**2)),
+            np.sqrt(self.prepared.gyro_noise**2 @ (self.turn.T**2)),
+        )
+
+    def _add(
+        self,
+        name: str,
+        contributor: str,
+        force: Array | None,
+        rate: Array | None,
+        rest: Array,
+        owner: str = "",
+    ) -> None:
+        n = len(self.time)
+        moved = np.zeros((n, 3)) if force is None else force
+        if rate is not None and self.arm.any():
+            moved = moved + self._through_arm(rate)
+        # The correction that makes the force at rest as long as gravity takes back what an
+        # unknown adds along it.
+        if self.prepared.gravity_matched and self.has_rest and rest.any():
+            along = self.turn @ self.rest_felt
+            along = along / np.sqrt(along @ along)
+            taken = (rest @ along) * along
+            moved, rest = moved - taken, rest - taken
+        self.names.append(f"{owner or self.prepared.unit.name} {name}")
+        self.contributors.append(contributor)
+        self.forces.append(moved)
+        self.rates.append(np.zeros((n, 3)) if rate is None else rate)
+        self.rests.append(rest)
+
+    def _through_arm(self, rate: Array) -> Array:
+        own = np.cross(rate, np.cross(self.rate, self.arm))
+        other = np.cross(self.rate, np.cross(rate, self.arm))
+        return np.cross(angular_acceleration(self.time, rate), self.arm) + own + other
+
+    def _range(self, number: int) -> None:
+        triad = self.prepared.unit.accelerometers[number]
+        spoke = self.prepared.range_spoken == number
+        source = self.prepared.bias_from[number]
+        # Ranges whose bias was taken from this one carry its error at rest.
+        heirs = np.isin(self.prepared.range_spoken, self._heirs(number))
+        if not (spoke.any() or heirs.any()):
+            return
+        sd = triad.uncertainty
+        bias = sd.bias if source is None else self.prepared.bias_sd[number]
+        for axis in range(3):
+            if bias[axis] > 0.0:  # type: ignore[index]
+                one = lambda f, a=axis, b=bias: np.full(len(f), b[a])  # noqa: E731
+                what = "bias" if source is None else "bias against the lower range"
+                self._axis_effect(number, axis, spoke, heirs, one, what, "accelerometer bias", True)
+        for name, contributor, effects in _curves(triad):
+            for axis, label, effect in effects:
+                self._axis_effect(
+                    number, axis, spoke, heirs, effect, f"{name}{label}", contributor, False
+                )
+        self._vibration(triad, spoke)
+
+    def _heirs(self, number: int) -> list[int]:
+        found: list[int] = []
+        for other, source in enumerate(self.prepared.bias_from):
+            if source is not None and (source == number or source in found):
+                found.append(other)
+        return found
+
+    def _axis_effect(
+        self,
+        number: int,
+        axis: int,
+        spoke: NDArray[np.bool_],
+        heirs: NDArray[np.bool_],
+        effect: Callable[[Array], Array],
+        name: str,
+        contributor: str,
+        constant: bool,
+    ) -> None:
+        at_rest = float(effect(self.rest_felt[None, :])[0]) if self.has_rest or constant else 0.0
+        calibrated = self.prepared.bias_from[number] is not None
+        one = np.zeros(len(self.time))
+        here = spoke[:, axis]
+        one[here] = effect(self.felt)[here]
+        if calibrated and not constant:
+            one[here] -= at_rest
+        one[heirs[:, axis]] = at_rest
+        direction = self.turn[:, axis]
+        rests = not calibrated and self.has_rest and self.prepared.levelling.from_rest
+        rest = at_rest * direction if rests else np.zeros(3)
+        triad = self.prepared.unit.accelerometers[number]
+        label = f"{triad.name} {name}"
+        if "→" not in name:
+            label += f" {AXES[axis]}"
+        self._add(label, contributor, np.outer(one, direction), None, rest)
+
+    def _vibration(self, triad: RecordedTriad, spoke: NDArray[np.bool_]) -> None:
+        sd = triad.uncertainty.axis("vibration_rectification")
+        if not any(sd):
+            return
+        variance = self._vibrating()
+        for axis in range(3):
+            if sd[axis] > 0.0:
+                one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
+                force = np.outer(one, self.turn[:, axis])
+                self._add(
+                    f"{triad.name} rectification {AXES[axis]}",
+                    "vibration rectification",
+                    force,
+                    None,
+                    np.zeros(3),
+                )
+
+    def _vibrating(self) -> Array:
+        from scipy.ndimage import uniform_filter1d
+
+        step = float(np.median(np.diff(self.time)))
+        width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
+        smooth = uniform_filter1d(self.felt, width, axis=0, mode="nearest")
+        return np.asarray(
+            uniform_filter1d((self.felt - smooth) ** 2, width, axis=0, mode="nearest")
+        )
+
+    def _gyro(self) -> None:
+        sd = self.gyro.uncertainty
+        owner = self.prepared.unit.gyro_from or self.prepared.unit.name
+        none = np.zeros(3)
+        for axis in range(3):
+            direction = self.turn[:, axis]
+            bias = self.prepared.gyro_bias_sd[axis]
+            if bias > 0.0:
+                rate = np.tile(bias * direction, (len(self.time), 1))
+                self._add(f"gyro bias {AXES[axis]}", "gyro bias", None, rate, none, owner)
+            for name, contributor, one in self._gyro_curves(axis):
+                self._add(name, contributor, None, np.outer(one, direction), none, owner)
+            slope = sd.axis("g_sensitivity")[axis]
+            if slope > 0.0:
+                for j in range(3):
+                    one = slope * (self.felt[:, j] - self.rest_felt[j])
+                    self._add(
+                        f"g-sensitivity {AXES[axis]} of {AXES[j]}",
+                        "gyro g-sensitivity",
+                        None,
+                        np.outer(one, direction),
+                        none,
+                        owner,
+                    )
+
+    def _gyro_curves(self, axis: int) -> Iterator[tuple[str, str, Array]]:
+        for name, contributor, effects in _curves(self.gyro):
+            for a, label, effect in effects:
+                if a == axis:
+                    end = "" if "→" in label else f" {AXES[axis]}"
+                    yield f"gyro {name}{label}{end}", f"gyro {contributor}", effect(self.turned)
+
+    def _mounting(self) -> None:
+        mounting = self.prepared.unit.mounting
+        angle = np.radians(mounting.angles_sd_deg)
+        levelled = self.has_rest and self.prepared.levelling.from_rest
+        rest = self.turn @ self.rest_felt if levelled else np.zeros(3)
+        for axis in range(3):
+            unit = np.eye(3)[axis]
+            if angle > 0.0:
+                self._add(
+                    f"mounting {('roll', 'pitch', 'heading')[axis]}",
+                    "mounting",
+                    angle * np.cross(unit, self.force),
+                    angle * np.cross(unit, self.rate),
+                    angle * np.cross(unit, rest),
+                )
+            if mounting.position_sd > 0.0:
+                # The sensor sits further along the axis, so that the arm is shorter there.
+                arm = -mounting.position_sd * unit
+                alpha = angular_acceleration(self.time, self.rate)
+                force = np.cross(alpha, arm) + np.cross(self.rate, np.cross(self.rate, arm))
+                self._add(f"lever arm {AXES[axis]}", "lever arm", force, None, np.zeros(3))
+
+    def _timing(self) -> None:
+        if self.time_sd > 0.0:
+            force = self.time_sd * np.gradient(self.force, self.time, axis=0)
+            rate = self.time_sd * np.gradient(self.rate, self.time, axis=0)
+            # Force and rate are late together: the arm's part is in both already.
+            arm, self.arm = self.arm, np.zeros(3)
+            own = force + self.time_sd * np.gradient(self._arm_force(arm), self.time, axis=0)
+            self._add("timing", "timing", own, rate, np.zeros(3))
+            self.arm = arm
+
+    def _arm_force(self, arm: Array) -> Array:
+        alpha = angular_acceleration(self.time, self.rate)
+        return np.cross(alpha, arm) + np.cross(self.rate, np.cross(self.rate, arm))
+
+
+Effect = tuple[int, str, Callable[[Array], Array]]
+
+
+def _curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[Effect]]]:
+    """Errors that follow from the input: one standard deviation of each, by axis."""
+    sd = triad.uncertainty
+    scale, skew = sd.axis("scale"), sd.axis("misalignment")
+    bend, full = sd.axis("nonlinearity_2"), sd.axis("full_scale")
+    scales: list[Effect] = []
+    skews: list[Effect] = []
+    bends: list[Effect] = []
+    for a in range(3):
+        if scale[a] > 0.0:
+            scales.append((a, "", lambda f, a=a: scale[a] * f[:, a]))
+        if skew[a] > 0.0:
+            for j in range(3):
+                if j != a:
+                    label = f" {AXES[j]}→{AXES[a]}"
+                    skews.append((a, label, lambda f, a=a, j=j: skew[a] * f[:, j]))
+        if bend[a] > 0.0:
+            bends.append((a, "", lambda f, a=a: bend[a] * f[:, a] ** 2 / full[a]))
+    yield "scale", "scale factor", scales
+    yield "misalignment", "misalignment", skews
+    yield "nonlinearity", "nonlinearity", bends
+
+
+def combine_effects(parts: Sequence[SampleEffects], weights: Sequence[float]) -> SampleEffects:
+    """Effects on a weighted mean of units at one point.
+
+    Parameters
+    ----------
+    parts : sequence of SampleEffects
+        Of units on the same stamps and at the same point. Unknowns of one name are one unknown,
+        as of a gyro that two units share; the others are independent.
+    weights : sequence of float
+        Summing to one.
+
+    Returns
+    -------
+    SampleEffects
+        The attitude at rest is that of the mean force at rest.
+    """
+    force: dict[str, Array] = {}
+    rate: dict[str, Array] = {}
+    rest: dict[str, Array] = {}
+    contributors: dict[str, str] = {}
+    for weight, part in zip(weights, parts, strict=True):
+        for k, name in enumerate(part.names):
+            contributors[name] = part.contributors[k]
+            force[name] = force.get(name, 0.0) + weight * part.force[k]
+            rate[name] = rate.get(name, 0.0) + weight * part.rate[k]
+            rest[name] = rest.get(name, 0.0) + weight * part.rest_force[k]
+    count, rows = len(force), parts[0].force.shape[1:]
+    squares = [float(weight) ** 2 for weight in weights]
+    return SampleEffects(
+        tuple(contributors),
+        tuple(contributors.values()),
+        np.array(list(force.values())).reshape(count, *rows),
+        np.array(list(rate.values())).reshape(count, *rows),
+        np.array(list(rest.values())).reshape(count, 3),
+        np.sqrt(sum(k * p.force_noise**2 for k, p in zip(squares, parts, strict=True))),
+        np.sqrt(sum(k * p.rate_noise**2 for k, p in zip(squares, parts, strict=True))),
+    )
