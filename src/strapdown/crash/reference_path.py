@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.crash.delta_v_bound import TWO_SIDED_95
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
 from strapdown.exceptions import DataError
@@ -17,8 +18,6 @@ Array = NDArray[np.float64]
 
 #: Columns of the standard deviation of a reference.
 NED_SD = ["north_sd", "east_sd", "down_sd"]
-# 95 % of a normal distribution lie within so many standard deviations.
-TWO_SIDED_95 = 1.959963984540054
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,201 @@
+"""How well a change of velocity is known, from the same unknowns as the path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.leg import ATTITUDE, VELOCITY
+from strapdown.crash.path import CrashPath
+from strapdown.crash.sample_effects import SampleEffects
+from strapdown.exceptions import DataError
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+# 95 % of a normal distribution lie within so many standard deviations.
+TWO_SIDED_95 = 1.959963984540054
+NOISE = "sensor noise"
+
+
+@dataclass(frozen=True, eq=False)
+class DeltaVBound:
+    """Uncertainty of a change of velocity.
+
+    Attributes
+    ----------
+    covariance : ndarray, (3, 3), (m/s)²
+    by_contributor : DataFrame
+        Covariance of each contributor as nine columns ``xx xy … zz``, (m/s)²; they add up to
+        `covariance`.
+    """
+
+    covariance: Array = field(repr=False)
+    by_contributor: pd.DataFrame = field(repr=False)
+
+    @property
+    def sd(self) -> Triple:
+        """Standard deviations of the components, m/s."""
+        x, y, z = np.sqrt(np.diagonal(self.covariance))
+        return float(x), float(y), float(z)
+
+    @property
+    def half_width(self) -> Triple:
+        """Half widths of the intervals that hold 95 %, m/s."""
+        x, y, z = (TWO_SIDED_95 * s for s in self.sd)
+        return x, y, z
+
+    def along(self, direction: ArrayLike) -> float:
+        """Standard deviation along a direction, m/s: of the resultant, along the vector itself.
+
+        Raises
+        ------
+        DataError
+            The direction has no length.
+        """
+        d = _direction(direction)
+        return float(np.sqrt(d @ self.covariance @ d))
+
+    def shares(self, direction: ArrayLike) -> pd.Series:
+        """Part of the variance along a direction that each contributor has; their sum is one."""
+        d = _direction(direction)
+        parts = self.by_contributor.to_numpy().reshape(-1, 3, 3) @ d @ d
+        total = parts.sum()
+        return pd.Series(
+            parts / total if total > 0.0 else parts, index=self.by_contributor.index, name="share"
+        )
+
+
+def body_delta_v_bound(
+    effects: SampleEffects,
+    weights: ArrayLike,
+    *,
+    rest_sd: ArrayLike = (0.0, 0.0, 0.0),
+    at_ends: ArrayLike | None = None,
+) -> DeltaVBound:
+    """Bound of a change of velocity that was integrated along the turning axes of the body.
+
+    Parameters
+    ----------
+    effects : SampleEffects
+        At the point whose change of velocity it is.
+    weights : array_like, (n,), s
+        Of each sample: the change is their product with the specific force less that at rest.
+    rest_sd : array_like, (3,), m/s²
+        How well the noise lets the mean at rest be known, which was taken off.
+    at_ends : array_like, (e, 3), m/s, optional
+        What one standard deviation of each instant that bounds the window does to the change.
+
+    Returns
+    -------
+    DeltaVBound
+        Vehicle axes.
+    """
+    w = np.asarray(weights, dtype=np.float64)
+    length = float(w.sum())
+    each = np.einsum("n,pni->pi", w, effects.force) - length * effects.rest_force
+    noise = (w[:, None] ** 2 * effects.force_noise**2).sum(axis=0)
+    noise += (length * np.asarray(rest_sd, dtype=np.float64)) ** 2
+    return _bound(each, effects.contributors, np.diag(noise), at_ends)
+
+
+def resolved_delta_v_bound(
+    path: CrashPath, start: float, end: float, *, at_ends: ArrayLike | None = None
+) -> DeltaVBound:
+    """Bound of a change of velocity in local level, gravity taken away by the attitude.
+
+    Parameters
+    ----------
+    path : CrashPath
+    start, end : float, s
+        Within the path; between samples, errors run on straight lines.
+    at_ends : array_like, (e, 3), m/s, optional
+        As `body_delta_v_bound`.
+
+    Returns
+    -------
+    DeltaVBound
+        North, east, down in the axes of the path. What the entry speed is wrong by does not
+        matter to it.
+
+    Raises
+    ------
+    DataError
+        The window is not within the path.
+    """
+    low, high = path.time[0] - 1e-9, path.time[-1] + 1e-9
+    if not (low <= start < end <= high):
+        raise DataError(
+            f"the window from {start:g} s to {end:g} s is not within the path",
+            quantity="window",
+            remedy=f"choose instants from {path.time[0]:.6g} s to {path.time[-1]:.6g} s",
+        )
+    velocity = path.errors[:, :, VELOCITY]
+    each = _at(path.time, velocity, end) - _at(path.time, velocity, start)
+    return _bound(each, path.contributors, _noise_between(path, start, end), at_ends)
+
+
+def _at(time: Array, values: Array, instant: float) -> Array:
+    """Values (p, n, …) at an instant between two samples."""
+    k = int(np.clip(np.searchsorted(time, instant, side="right") - 1, 0, len(time) - 2))
+    part = (instant - time[k]) / (time[k + 1] - time[k])
+    return np.asarray((1.0 - part) * values[:, k] + part * values[:, k + 1])
+
+
+def _noise_between(path: CrashPath, start: float, end: float) -> Array:
+    """Covariance of the change of velocity that noise makes between two instants.
+
+    Noise on the force is independent from step to step, so that its variances subtract; what
+    noise of the gyros before the window has done to the attitude acts on through it.
+    """
+    noise = path.noise_covariance[None]
+    here, there = _at(path.time, noise, start)[0], _at(path.time, noise, end)[0]
+    if start >= path.time[path.anchor] - 1e-9:
+        tilt = _turn_effect(path, start, end)
+        carried = tilt @ here[ATTITUDE, VELOCITY]
+        # var(v1 - v0) = P11 + P00 - P10 - P01, with v1 = v0 + tilt phi0 + new noise.
+        both = here[VELOCITY, VELOCITY] + carried
+        return np.asarray(there[VELOCITY, VELOCITY] + here[VELOCITY, VELOCITY] - both - both.T)
+    # The two sides of the entry have noise of their own.
+    return np.asarray(there[VELOCITY, VELOCITY] + here[VELOCITY, VELOCITY])
+
+
+def _turn_effect(path: CrashPath, start: float, end: float) -> Array:
+    """What a turn of the attitude at `start` does to the velocity at `end`: (3, 3), m/s per rad."""
+    gained = path.table[["VN", "VE", "VD"]].to_numpy()[None]
+    x, y, z = (_at(path.time, gained, end) - _at(path.time, gained, start))[0]
+    # Gravity is not turned by the attitude; what was felt is.
+    z = z - GRAVITY * (end - start)
+    return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+
+
+def _bound(
+    each: Array, contributors: tuple[str, ...], noise: Array, at_ends: ArrayLike | None
+) -> DeltaVBound:
+    products = np.einsum("pi,pj->pij", each, each).reshape(-1, 9)
+    columns = [a + b for a in "xyz" for b in "xyz"]
+    table = pd.DataFrame(products, columns=columns)
+    table = table.groupby(list(contributors), sort=False).sum()
+    extra = {NOISE: noise}
+    if at_ends is not None:
+        ends = np.asarray(at_ends, dtype=np.float64)
+        extra["time of the window"] = ends.T @ ends
+    for name, covariance in extra.items():
+        already = table.loc[name].to_numpy() if name in table.index else np.zeros(9)
+        table.loc[name] = already + covariance.ravel()
+    table.index.name = "contributor"
+    return DeltaVBound(table.to_numpy().sum(axis=0).reshape(3, 3), table)
+
+
+def _direction(given: ArrayLike) -> Array:
+    d = np.asarray(given, dtype=np.float64)
+    size = float(np.sqrt(d @ d))
+    if not size > 0.0:
+        raise DataError(
+            "it has no length", quantity="direction", remedy="give a vector that is not zero"
+        )
+    return np.asarray(d / size)
