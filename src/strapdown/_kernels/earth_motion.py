@@ -88,3 +88,41 @@ def feel(place, velocity, acceleration, q_nb, turning, p, rate, force):
         for j in range(3):
             force[i, j] = m[j] * f_n + m[3 + j] * f_e + m[6 + j] * f_d
             rate[i, j] = turning[i, j] + (m[j] * w_n + m[3 + j] * w_e + m[6 + j] * w_d)
+
+
+@njit(cache=True)
+def swing(place, velocity, acceleration, q_nb, turning, swinging, p, out):
+    """Fill the derivative of the body rate relative to inertial space, in body axes, (n, 3).
+
+    `swinging` is the derivative of the components of `turning`; the rest as in `feel`. With
+    ``w_in = w_ie + w_en``, ``w_ib' = w_nb' + C_nb^T w_in' - w_nb x (C_nb^T w_in)``, where w_in'
+    are the derivatives of the components north, east, down, and the radii change as in
+    `velocities`.
+    """
+    for i in range(place.shape[0]):
+        alt, d_alt = place[i, 2], -velocity[i, 2]
+        s, c = math.sin(place[i, 0]), math.cos(place[i, 0])
+        meridian, transverse = radii(s, p[A], p[E2])
+        d_lat = velocity[i, 0] / (meridian + alt)
+        slope = p[E2] * s * c * (transverse / p[A]) * (transverse / p[A]) * d_lat
+        d_meridian = 3.0 * meridian * slope + d_alt
+        d_transverse = transverse * slope + d_alt
+        meridian += alt
+        transverse += alt
+        earth_n, earth_d = earth_rate(s, c, p[RATE])
+        move_n, move_e, move_d = transport_rate(
+            s, c, velocity[i, 0], velocity[i, 1], meridian, transverse
+        )
+        d_move_n = (acceleration[i, 1] - move_n * d_transverse) / transverse
+        d_n = earth_d * d_lat + d_move_n
+        d_e = -(acceleration[i, 0] + move_e * d_meridian) / meridian
+        d_d = -earth_n * d_lat - d_move_n * s / c - move_n * d_lat / (c * c)
+        w_n, w_e, w_d = earth_n + move_n, move_e, earth_d + move_d
+        m = dcm_from_quat(q_nb[i, 0], q_nb[i, 1], q_nb[i, 2], q_nb[i, 3])
+        x = m[0] * w_n + m[3] * w_e + m[6] * w_d
+        y = m[1] * w_n + m[4] * w_e + m[7] * w_d
+        z = m[2] * w_n + m[5] * w_e + m[8] * w_d
+        t_x, t_y, t_z = turning[i, 0], turning[i, 1], turning[i, 2]
+        out[i, 0] = swinging[i, 0] + (m[0] * d_n + m[3] * d_e + m[6] * d_d) - (t_y * z - t_z * y)
+        out[i, 1] = swinging[i, 1] + (m[1] * d_n + m[4] * d_e + m[7] * d_d) - (t_z * x - t_x * z)
+        out[i, 2] = swinging[i, 2] + (m[2] * d_n + m[5] * d_e + m[8] * d_d) - (t_x * y - t_y * x)

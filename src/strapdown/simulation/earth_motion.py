@@ -93,6 +93,8 @@ class Kinematics:
     angles : ndarray, (n, 3), deg, optional
         Roll, pitch, heading, where the motion is made of them: a truth without the rounding of
         what is taken back from `q_nb`.
+    swinging : ndarray, (n, 3), rad/s², optional
+        Derivative by time of `turning`, where the motion knows it.
     """
 
     moved: Array
@@ -101,6 +103,7 @@ class Kinematics:
     q_nb: Array
     turning: Array
     angles: Array | None = None
+    swinging: Array | None = None
 
 
 class EarthMotion(ABC):
@@ -149,6 +152,46 @@ class EarthMotion(ABC):
             ``C_nb^T (v' + (2 w_ie + w_en) x v - g_n)`` with the ellipsoid's normal gravity.
         """
         return self._feel(time)[1]
+
+    def angular_acceleration(self, time: ArrayLike) -> Array:
+        """Derivative by time of the body rate relative to inertial space.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), rad/s²
+            Of the components of `rate` in body axes, with how the Earth's and the transport rate
+            turn and change along the course.
+
+        Raises
+        ------
+        ConfigError
+            The motion does not know the second derivative of its attitude.
+        """
+        from strapdown._kernels.earth_motion import swing
+
+        k = self.kinematics(_instants(time))
+        if k.swinging is None:
+            raise ConfigError(
+                f"a {type(self).__name__} does not know its angular acceleration",
+                quantity="angular acceleration",
+                remedy="use a CrashMotion or a StationaryMotion",
+            )
+        out = np.empty((len(k.moved), 3))
+        swing(
+            self.origin.place(k.moved),
+            k.velocity,
+            k.acceleration,
+            k.q_nb,
+            k.turning,
+            k.swinging,
+            self.ellipsoid.parameters(),
+            out,
+        )
+        return out
 
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero.

@@ -1,4 +1,4 @@
-"""Attitude and body rate of a motion that is given by its 3-2-1 angles."""
+"""Attitude, body rate and angular acceleration of a motion that is given by its 3-2-1 angles."""
 
 from __future__ import annotations
 
@@ -65,5 +65,37 @@ def euler_body_rate(angles: Array, rates: Array) -> Array:
             d_roll - d_heading * np.sin(pitch),
             d_pitch * np.cos(roll) + across * np.sin(roll),
             across * np.cos(roll) - d_pitch * np.sin(roll),
+        ]
+    )
+
+
+def euler_body_acceleration(angles: Array, rates: Array, accelerations: Array) -> Array:
+    """Derivative by time of the body rate, from that of the rates of the 3-2-1 angles.
+
+    Parameters
+    ----------
+    angles : ndarray, (n, 3), deg
+        Roll, pitch, heading.
+    rates, accelerations : ndarray, (n, 3), deg/s and deg/s²
+        Their first and second derivatives.
+
+    Returns
+    -------
+    ndarray, (n, 3), rad/s²
+        Of the components of `euler_body_rate` in body axes, at every pitch; exactly zero where
+        all derivatives are.
+    """
+    roll, pitch = np.radians(angles[:, 0]), np.radians(angles[:, 1])
+    d_roll, d_pitch, d_heading = np.radians(rates).T
+    dd_roll, dd_pitch, dd_heading = np.radians(accelerations).T
+    sin, cos, steep, flat = np.sin(roll), np.cos(roll), np.sin(pitch), np.cos(pitch)
+    across = dd_heading * flat - d_heading * d_pitch * steep
+    # The y and z axes roll within the plane that these two span.
+    along_y, along_z = dd_pitch + d_roll * d_heading * flat, across - d_roll * d_pitch
+    return np.column_stack(
+        [
+            dd_roll - dd_heading * steep - d_heading * d_pitch * flat,
+            along_y * cos + along_z * sin,
+            along_z * cos - along_y * sin,
         ]
     )

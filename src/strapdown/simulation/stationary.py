@@ -52,7 +52,8 @@ class StationaryMotion(EarthMotion):
         still = np.zeros((time.size, 3))
         angles = np.array([self.roll_deg, self.pitch_deg, self.heading_deg])
         q_nb = np.tile(rotation.quaternion_from_euler(angles), (time.size, 1))
-        return Kinematics(still, still, still, q_nb, still, np.tile(angles, (time.size, 1)))
+        turned = np.tile(angles, (time.size, 1))
+        return Kinematics(still, still, still, q_nb, still, turned, still)
 
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero; (n, 3), rad: the constant rate, times time."""

@@ -21,10 +21,10 @@ from strapdown.nav_state import NavState
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation.course import Manoeuvre
+from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.imu import simulate_imu
 from strapdown.simulation.manoeuvres import Accelerate, Stop, Straight, Turn
-from strapdown.simulation.pulse_motion import PulseMotion
 from strapdown.simulation.sine_velocity import SineVelocityMotion
 from strapdown.simulation.vehicles import car
 from strapdown.tables import NED, VELOCITY
@@ -93,15 +93,8 @@ class Trip:
 
 def _crash() -> EarthMotion:
     """Pole test: 7.1 m/s, a pulse of 113 ms that changes it by 7.20 m/s and leaves 87 deg/s."""
-    return PulseMotion(
-        0.75,
-        Origin(45.0, 20.0, 100.0),
-        (7.1, 0.0, 0.0),
-        velocity_change=(-7.2, 0.0, 0.0),
-        rate_change=(0.0, 0.0, 87.0),
-        start=0.1,
-        length=0.113,
-    )
+    pulse = HaversinePulse(0.1, 0.113, (-7.2, 0.0, 0.0), (0.0, 0.0, 87.0))
+    return CrashMotion(0.75, Origin(45.0, 20.0, 100.0), (7.1, 0.0, 0.0), (pulse,))
 
 
 def straight(

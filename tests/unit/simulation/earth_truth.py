@@ -86,6 +86,56 @@ def felt(ellipsoid, place, angles):
     return np.array([float(x) for x in rate]), np.array([float(x) for x in force])
 
 
+def turned_twice(ellipsoid, place, angles):
+    """Derivative of the body rate at time zero, in body axes: ``C^T C''`` is its cross product
+    matrix and a square, which is symmetric.
+    """
+    omega = mpf(ellipsoid.rotation_rate)
+
+    def body(t):
+        lat, lon, _ = place(t)
+        lon = lon + omega * t
+        sl, cl, so, co = mpmath.sin(lat), mpmath.cos(lat), mpmath.sin(lon), mpmath.cos(lon)
+        level = mpmath.matrix([[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, 0, -sl]])
+        return level * turns(angles(t))
+
+    with mpmath.workdps(DIGITS):
+        second = mpmath.matrix(3, 3)
+        for i in range(3):
+            for j in range(3):
+                second[i, j] = mpmath.diff(lambda t, i=i, j=j: body(t)[i, j], 0, 2)
+        m = body(mpf(0)).T * second
+        swing = [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]
+    return np.array([float(x) for x in swing]) / 2.0
+
+
+def gravitation(ellipsoid, position):
+    """Attraction at a point in inertial axes, as these stand at time zero, from the kernel."""
+    a = mpf(ellipsoid.semi_major_axis)
+    f = 1 / mpf(ellipsoid.inverse_flattening)
+    e2 = f * (2 - f)
+    omega = mpf(ellipsoid.rotation_rate)
+    x, y, z = position
+    across = mpmath.sqrt(x * x + y * y)
+    lat = mpmath.atan2(z, across * (1 - e2))
+    for _ in range(20):
+        n = a / mpmath.sqrt(1 - e2 * mpmath.sin(lat) ** 2)
+        lat = mpmath.atan2(z + e2 * n * mpmath.sin(lat), across)
+    lon = mpmath.atan2(y, x)
+    alt = across / mpmath.cos(lat) - a / mpmath.sqrt(1 - e2 * mpmath.sin(lat) ** 2)
+    p = ellipsoid.parameters()
+    north, down = earth.gravity(
+        math.sin(lat),
+        math.cos(lat),
+        float(alt),
+        *(p[k] for k in (earth.A, earth.E2, earth.GAMMA, earth.K, earth.F, earth.M)),
+    )
+    sl, cl, so, co = mpmath.sin(lat), mpmath.cos(lat), mpmath.sin(lon), mpmath.cos(lon)
+    level = mpmath.matrix([[-sl * co, -so, -cl * co], [-sl * so, co, -cl * so], [cl, 0, -sl]])
+    centrifugal = mpmath.matrix([omega**2 * x, omega**2 * y, 0])
+    return level * mpmath.matrix([mpf(north), 0, mpf(down)]) - centrifugal
+
+
 def course(ellipsoid, start, velocity):
     """Functions of the place, right to the second derivative at time zero, of a velocity.
 

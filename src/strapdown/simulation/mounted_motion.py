@@ -1,0 +1,169 @@
+"""What a unit feels that is mounted somewhere on a moving vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.sensors.crash_unit import Mounting
+from strapdown.simulation.earth_motion import EarthMotion
+from strapdown.simulation.ringing import Ringing
+from strapdown.simulation.vehicle_points import (
+    Arm,
+    MovingPoint,
+    PointKinematics,
+    in_axes_of,
+    level_change,
+    moving_point,
+    places_beside,
+    rigid_arm,
+)
+from strapdown.tables import trajectory_table
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MountedMotion:
+    """The motion of a unit on a vehicle, as a `Motion`; several units are several of these.
+
+    Attributes
+    ----------
+    motion : EarthMotion
+        Of the vehicle's origin; it must know its angular acceleration, as `CrashMotion` does.
+    mounting : Mounting
+        Where the sensors sit, and how they are turned. Its standard deviations are not used: it
+        is the truth.
+    ringing : tuple of Ringing
+        By which the sensors swing about their place, without turning.
+
+    Notes
+    -----
+    Exact to rounding (`vehicle_points.moving_point`): the arm is that of the rigid vehicle and the
+    displacement of the ringing, with all that the turning of the vehicle makes of it. Attitude and
+    trajectory are those of the sensor axes, relative to the local level of the sensors.
+    """
+
+    motion: EarthMotion
+    mounting: Mounting = field(default_factory=Mounting)
+    ringing: tuple[Ringing, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "ringing", tuple(self.ringing))
+
+    @property
+    def duration(self) -> float:
+        """Length in s."""
+        return self.motion.duration
+
+    def rate(self, time: ArrayLike) -> Array:
+        """Rate relative to inertial space in sensor axes, (n, 3), rad/s."""
+        return rotation.rotate(self._to_sensor, self.motion.rate(time))
+
+    def angle(self, time: ArrayLike) -> Array:
+        """Integral of the rate from time zero, (n, 3), rad."""
+        return rotation.rotate(self._to_sensor, self.motion.angle(time))
+
+    def angular_acceleration(self, time: ArrayLike) -> Array:
+        """Derivative of the rate, in sensor axes, (n, 3), rad/s²."""
+        return rotation.rotate(self._to_sensor, self.motion.angular_acceleration(time))
+
+    def specific_force(self, time: ArrayLike) -> Array:
+        """What an ideal accelerometer reads in sensor axes.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+
+        Returns
+        -------
+        ndarray, (n, 3), m/s²
+        """
+        t = _instants(time)
+        force = self.motion.specific_force(t)
+        if self.ringing or any(self.mounting.position):
+            force = force + self._point(t).added_force
+        return rotation.rotate(self._to_sensor, force)
+
+    def attitude(self, time: ArrayLike) -> Array:
+        """Attitude of the sensor axes, ``q_ns``, relative to local level at the sensors, (n, 4)."""
+        point = self._point(_instants(time))
+        return self._turned(point, self._places(point))
+
+    def trajectory(self, time: ArrayLike, source: str | None = None) -> pd.DataFrame:
+        """Place and velocity of the sensors, and attitude of their axes.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+        source : str, optional
+            Name for messages.
+
+        Returns
+        -------
+        DataFrame
+            Trajectory table; places right to 5e-9 m.
+        """
+        t = _instants(time)
+        point = self._point(t)
+        places = self._places(point)
+        to_level = rotation.compose(level_change(point.origin, places), point.q_nv)
+        return trajectory_table(
+            t,
+            places,
+            rotation.rotate(to_level, point.velocity),
+            rotation.euler_from_quaternion(self._turned(point, places)),
+            source=source,
+        )
+
+    def kinematics_from(self, time: ArrayLike, *, epoch: float = 0.0) -> PointKinematics:
+        """Position, velocity and acceleration with the ringing, as `point_kinematics`.
+
+        Parameters
+        ----------
+        time : array_like, (n,), s
+        epoch : float, s
+            When the vehicle's origin is where the axes are.
+
+        Returns
+        -------
+        PointKinematics
+            Of the sensors; ``q_nv`` is that of the vehicle.
+
+        Raises
+        ------
+        ConfigError
+            The epoch is outside of the motion.
+        """
+        return in_axes_of(self.motion, self._point(_instants(time)), epoch)
+
+    @cached_property
+    def _to_sensor(self) -> Array:
+        return rotation.conjugate(rotation.quaternion_from_euler(self.mounting.angles_deg))
+
+    def _point(self, time: Array) -> MovingPoint:
+        arm = rigid_arm(self.mounting.position, time.size)
+        for ringing in self.ringing:
+            arm = Arm(
+                arm.place + ringing.displacement(time),
+                arm.velocity + ringing.velocity(time),
+                arm.acceleration + ringing.acceleration(time),
+            )
+        return moving_point(self.motion, arm, time)
+
+    def _places(self, point: MovingPoint) -> Array:
+        offset = rotation.rotate(point.q_nv, point.arm)
+        return places_beside(self.motion, point.origin, offset)
+
+    def _turned(self, point: MovingPoint, places: Array) -> Array:
+        q_nv = rotation.compose(level_change(point.origin, places), point.q_nv)
+        return rotation.compose(q_nv, rotation.conjugate(self._to_sensor))
+
+
+def _instants(time: ArrayLike) -> Array:
+    return np.ascontiguousarray(np.asarray(time, dtype=np.float64))
