@@ -1,0 +1,120 @@
+"""What every digital filter asks of its samples: finite numbers, a step, enough of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import ConfigError, DataError
+
+Array = NDArray[np.float64]
+
+__all__ = ["as_channels", "even_step", "positive_step"]
+
+# Stamps that were printed to a tenth of a step still name an even grid.
+JITTER = 0.1
+
+
+def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
+    """Samples as floats of shape (n, k), every one finite.
+
+    Parameters
+    ----------
+    values : array_like, (n,) or (n, k)
+    quantity : str
+        Name for messages.
+
+    Raises
+    ------
+    DataError
+        They are no such array, or one is not finite.
+    """
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0, 0))
+    if array.ndim not in (1, 2) or array.size == 0:
+        raise DataError(
+            "these are no samples of shape (n,) or (n, k)",
+            quantity=quantity,
+            remedy="pass one row a sample, one column a channel",
+        )
+    array = array.reshape(len(array), -1)
+    bad = ~np.isfinite(array)
+    if bad.any():
+        row, channel = (int(i) for i in np.argwhere(bad)[0])
+        raise DataError(
+            f"channel {channel} has {array[row, channel]} at sample {row}, and {int(bad.sum())} "
+            "such in all; one would spread over the whole output",
+            row=row + 1,
+            quantity=quantity,
+            remedy="cut the record before it, or fill it with what is known",
+        )
+    return array
+
+
+def positive_step(step: float) -> float:
+    """Distance of samples in s.
+
+    Raises
+    ------
+    ConfigError
+        It is not positive and finite.
+    """
+    if not (math.isfinite(step) and step > 0.0):
+        raise ConfigError(
+            f"{step!r} s is no distance of samples",
+            quantity="step",
+            remedy="give the sampling interval in s, as 1e-4 for 10 kHz",
+        )
+    return float(step)
+
+
+def even_step(time: ArrayLike, quantity: str = "time") -> float:
+    """Step of stamps that lie on an even grid.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    quantity : str
+        Name for messages.
+
+    Returns
+    -------
+    float, s
+        First to last stamp over their number of steps. Stamps may be off the grid by a tenth of
+        it, as printed ones are.
+
+    Raises
+    ------
+    DataError
+        Fewer than two stamps, time that stands or goes back, or no even grid.
+    """
+    stamps = as_channels(time, quantity)[:, 0]
+    if len(stamps) < 2:
+        raise DataError(
+            f"{len(stamps)} stamp has no step", quantity=quantity, remedy="pass two or more samples"
+        )
+    steps = np.diff(stamps)
+    if not steps.min() > 0.0:
+        row = int(np.argmax(steps <= 0.0)) + 1
+        raise DataError(
+            f"time does not advance: {stamps[row - 1]:.9g} s is followed by {stamps[row]:.9g} s",
+            row=row + 1,
+            quantity=quantity,
+            remedy="sort the rows and drop repeated stamps",
+        )
+    step = float(stamps[-1] - stamps[0]) / (len(stamps) - 1)
+    off = np.abs(stamps - stamps[0] - step * np.arange(len(stamps)))
+    if off.max() > JITTER * step:
+        row = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
+        raise DataError(
+            f"the samples are not evenly spaced: the usual step is {np.median(steps):.6g} s, and "
+            f"{stamps[row - 1]:.9g} s is followed by {stamps[row]:.9g} s",
+            row=row + 1,
+            quantity=quantity,
+            remedy="interpolate onto even stamps first, or cut the record at the gap",
+        )
+    return step
