@@ -99,9 +99,10 @@ class RestStretch:
         shaking and slow wandering count, and not from the samples as if each were new.
     accel_sd, accel_mean_sd : tuple of float or None, m/s²
         As for the gyro.
-    grade : {'still', 'shaking', 'stated'}
+    grade : {'still', 'shaking', 'steady', 'stated'}
         Quiet within the noise of the sensor; shaken about one attitude, so that only the
-        means are those of a rest; or taken from the user's word.
+        means are those of a rest; quiet and without turning, but perhaps at speed; or taken
+        from the user's word.
     """
 
     start: float

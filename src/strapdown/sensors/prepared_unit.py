@@ -15,6 +15,9 @@ from strapdown.sensors.triad_errors import Triad
 
 Array = NDArray[np.float64]
 
+# In `PreparedUnit.bias_from`: from gravity in the stated attitude.
+FROM_GRAVITY = -1
+
 
 @dataclass(frozen=True)
 class Levelling:
@@ -57,16 +60,22 @@ class PreparedUnit:
     gyro_noise : ndarray, (n, 3), rad/s
         The same of the rates.
     rest : RestStretch or None
-        The stationary (or steady) stretch before the crash, in vehicle axes, common clock.
+        The stationary (or steady) stretch before the crash, as measured by the lowest range, in
+        vehicle axes, common clock.
+    rest_accel_sd : float, m/s²
+        What is not known of the vehicle's own acceleration over it, each axis: zero at rest.
     levelling : Levelling
     gyro_bias_sd : triad, rad/s
         Left after the rest; sensor axes of the unit that has the gyro.
     bias_from : tuple of int or None
-        For every range, the range that its bias was taken from, None for its own.
+        For every range, the range that its bias was taken from, `FROM_GRAVITY` where it was
+        taken from gravity in the stated attitude, None where its own is left.
     bias_sd : tuple of triad, m/s²
         How well that difference is known (noise of the means), for every range.
     gravity_matched : bool
         Whether a correction along the specific force at rest makes its length gravity's.
+    gravity_correction : float, m/s²
+        That was added along the specific force at rest.
     findings : tuple of Finding
     """
 
@@ -78,9 +87,11 @@ class PreparedUnit:
     noise: Array
     gyro_noise: Array
     rest: RestStretch | None
+    rest_accel_sd: float
     levelling: Levelling
     gyro_bias_sd: Triad
     bias_from: tuple[int | None, ...]
     bias_sd: tuple[Triad, ...]
     gravity_matched: bool
+    gravity_correction: float = 0.0
     findings: tuple[Finding, ...] = ()

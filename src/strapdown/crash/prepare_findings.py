@@ -1,0 +1,286 @@
+"""What a person should know of a unit's preparation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.results import RestStretch
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.range_merge import MergedRanges
+from strapdown.sensors.saturation import RangeLimits
+from strapdown.sensors.unit_checks import UnitArrays
+
+Array = NDArray[np.float64]
+
+# Beyond this many standard deviations a number contradicts what is stated of it.
+SIGMAS = 4.0
+# Of a specific force at rest that was read in g.
+NEAR_ONE = (0.8, 1.2)
+
+
+def rest_findings(
+    unit: CrashUnit,
+    time: Array,
+    rest: RestStretch | None,
+    levelled: bool,
+    steady_acceleration: float,
+) -> list[Finding]:
+    """No rest, or only a steady stretch.
+
+    Raises
+    ------
+    DataError
+        There is neither, and no levelling is stated.
+    """
+    if rest is None:
+        if time[0] > -0.05:
+            what = (
+                f"the record starts at {time[0]:.4g} s, in the crash (the trigger is at zero): "
+                "nothing before it tells biases or attitude"
+            )
+        else:
+            what = (
+                f"no stationary stretch and none at a constant velocity between {time[0]:.4g} s "
+                "and the trigger"
+            )
+        if not levelled:
+            raise DataError(
+                what,
+                file=unit.name,
+                quantity="rest",
+                remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road; "
+                "the biases stay at their stated standard deviations. Or name the stretch: "
+                "rest=(start, end) in s",
+            )
+        return [
+            Finding(
+                what,
+                file=unit.name,
+                quantity="rest",
+                remedy="the stated attitude is used, and the biases stay at their stated standard "
+                "deviations; a record that begins before the vehicle moves off would do better",
+            )
+        ]
+    if rest.grade == "steady":
+        return [
+            Finding(
+                f"no stationary stretch; the {rest.end - rest.start:.3g} s from {rest.start:.4g} s "
+                "are quiet and without turning, and may be at speed: an acceleration of "
+                f"{steady_acceleration:g} m/s² (one sigma) cannot be told from a tilt in them",
+                file=unit.name,
+                quantity="rest",
+                remedy="if the vehicle stood still until it was struck, say "
+                "moving_at_impact=False; if its velocity was constant, say steady_acceleration=0",
+            )
+        ]
+    return []
+
+
+def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[Finding]:
+    """A specific force at rest that is in g, points down, or contradicts its stated errors.
+
+    Raises
+    ------
+    DataError
+        Its length is near one.
+    """
+    assert rest.accel_mean is not None
+    mean = np.asarray(rest.accel_mean)
+    length = float(np.linalg.norm(mean))
+    lowest = unit.accelerometers[0]
+    if NEAR_ONE[0] <= length <= NEAR_ONE[1]:
+        raise DataError(
+            f"the specific force at rest is {length:.3g} long: that is gravity in g, not in m/s²",
+            file=f"{unit.name}, {lowest.name}",
+            quantity="accel",
+            remedy="multiply the accelerations by 9.80665",
+        )
+    found = []
+    if mean[2] > 0.5 * gravity:
+        found.append(
+            Finding(
+                f"the specific force at rest is {mean[2]:+.3g} m/s² along the vehicle's down axis: "
+                "the vehicle stands on its roof, or the unit reports gravity or has axes up",
+                file=f"{unit.name}, {lowest.name}",
+                quantity="accel_z",
+                remedy="state the mounting angles; a forward-right-down unit reads -9.8 at rest",
+            )
+        )
+    u = lowest.uncertainty
+    stated = float(np.hypot(max(u.axis("bias")), gravity * max(u.axis("scale"))))
+    if stated > 0.0 and abs(length - gravity) > SIGMAS * stated and 8.0 < length < 11.6:
+        found.append(
+            Finding(
+                f"the specific force at rest is {length:.4g} m/s² long, {length - gravity:+.2g} "
+                f"off gravity, {abs(length - gravity) / stated:.1f} times the "
+                f"{stated:.2g} m/s² that bias and scale factor are stated to make",
+                file=f"{unit.name}, {lowest.name}",
+                quantity="accel",
+                remedy="state a larger bias, or look for another scale factor",
+            )
+        )
+    return found
+
+
+def saturation_findings(
+    unit: CrashUnit,
+    data: UnitArrays,
+    limits: Sequence[RangeLimits],
+    gyro_limits: RangeLimits,
+) -> list[Finding]:
+    """The last range or the gyro at its end; ranges that are not what is stated."""
+    found = []
+    last = len(limits) - 1
+    for j, (triad, limit) in enumerate(zip(unit.accelerometers, limits, strict=True)):
+        found += _ends(unit, triad, limit, "m/s²", "accel")
+        if j == last:
+            found += _clipped(
+                unit,
+                triad,
+                data.time,
+                limit,
+                "accel",
+                "what is cut off is missing from delta-V: it is a lower bound on this axis",
+            )
+    assert unit.gyro is not None
+    found += _ends(unit, unit.gyro, gyro_limits, "rad/s", "gyro")
+    found += _clipped(
+        unit,
+        unit.gyro,
+        data.time,
+        gyro_limits,
+        "gyro",
+        "the attitude after it is not known; borrow the gyro of another unit with a wider range",
+    )
+    return found
+
+
+def _ends(
+    unit: CrashUnit, triad: RecordedTriad, limits: RangeLimits, u: str, quantity: str
+) -> list[Finding]:
+    found = []
+    stated = triad.uncertainty.axis("full_scale")
+    for k, axis in enumerate("xyz"):
+        source = f"{unit.name}, {triad.name}"
+        if limits.found[k]:
+            found.append(
+                Finding(
+                    f"it is held between {limits.lower[k]:.5g} and {limits.upper[k]:.5g} {u}, and "
+                    f"its stated full scale is {stated[k]:.5g} {u}",
+                    file=source,
+                    quantity=f"{quantity}_{axis}",
+                    remedy="the ends that were found are used; correct the stated full scale",
+                )
+            )
+        if limits.beyond[k]:
+            found.append(
+                Finding(
+                    f"it reads more than its stated full scale of {stated[k]:.5g} {u}",
+                    file=source,
+                    quantity=f"{quantity}_{axis}",
+                    remedy="correct the stated full scale or the unit of the values",
+                )
+            )
+    return found
+
+
+def _clipped(
+    unit: CrashUnit,
+    triad: RecordedTriad,
+    time: Array,
+    limits: RangeLimits,
+    quantity: str,
+    remedy: str,
+) -> list[Finding]:
+    found = []
+    for k, axis in enumerate("xyz"):
+        rows = np.flatnonzero(limits.clipped[:, k])
+        if rows.size:
+            found.append(
+                Finding(
+                    f"{rows.size} samples are at the end of the range, the first at "
+                    f"{time[rows[0]]:.5g} s, the last at {time[rows[-1]]:.5g} s",
+                    file=f"{unit.name}, {triad.name}",
+                    row=int(rows[0]) + 1,
+                    quantity=f"{quantity}_{axis}",
+                    remedy=remedy,
+                )
+            )
+    return found
+
+
+def bias_findings(
+    unit: CrashUnit,
+    bias: Sequence[Array],
+    bias_from: Sequence[int | None],
+    rest: RestStretch | None,
+) -> list[Finding]:
+    """A bias that could not be found, or is larger than was stated."""
+    found = []
+    for j in range(1, len(bias)):
+        triad = unit.accelerometers[j]
+        source = f"{unit.name}, {triad.name}"
+        if bias_from[j] is None:
+            why = "there is no quiet stretch before the crash"
+            if rest is not None:
+                why = f"{unit.accelerometers[j - 1].name} is at its end in the quiet stretch"
+            found.append(
+                Finding(
+                    f"its bias is not known, because {why}",
+                    file=source,
+                    quantity="bias",
+                    remedy="it stays at its stated standard deviation, "
+                    f"{max(triad.uncertainty.axis('bias')):.3g} m/s²",
+                )
+            )
+            continue
+        own = bias[j] - bias[j - 1]
+        stated = np.hypot(
+            triad.uncertainty.axis("bias"), unit.accelerometers[j - 1].uncertainty.axis("bias")
+        )
+        for k, axis in enumerate("xyz"):
+            if stated[k] > 0.0 and abs(own[k]) > SIGMAS * stated[k]:
+                found.append(
+                    Finding(
+                        f"its bias is {own[k]:+.3g} m/s² against "
+                        f"{unit.accelerometers[j - 1].name}, {abs(own[k]) / stated[k]:.1f} times "
+                        f"the {stated[k]:.2g} m/s² stated",
+                        file=source,
+                        quantity=f"accel_{axis}",
+                        remedy="it is taken off all the same; look whether axes are swapped or "
+                        "inverted, which moves gravity from one axis to another",
+                    )
+                )
+    return found
+
+
+def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
+    """Ranges that do not meet where one takes over from the other."""
+    found = []
+    for j in range(len(merged.step)):
+        low, high = unit.accelerometers[j], unit.accelerometers[j + 1]
+        for k, axis in enumerate("xyz"):
+            if not merged.switches[j, k]:
+                continue
+            level = min(low.uncertainty.axis("full_scale")[k], 1e6)
+            scale = level * np.hypot(
+                low.uncertainty.axis("scale")[k], high.uncertainty.axis("scale")[k]
+            )
+            sd = float(np.hypot(merged.step_sd[j, k], scale))
+            if sd > 0.0 and abs(merged.step[j, k]) > SIGMAS * sd:
+                found.append(
+                    Finding(
+                        f"where {low.name} and {high.name} take over from one another they differ "
+                        f"by {merged.step[j, k]:+.3g} m/s² in the mean of {merged.switches[j, k]} "
+                        f"places, {abs(merged.step[j, k]) / sd:.1f} standard deviations",
+                        file=unit.name,
+                        quantity=f"accel_{axis}",
+                        remedy="look for different filters, delays or scale factors of the two; a "
+                        "margin that is wider keeps the low range further from its end",
+                    )
+                )
+    return found

@@ -1,0 +1,135 @@
+"""Attitude and the lowest range's bias from the specific force before a crash."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.alignment.levelling import level
+from strapdown.exceptions import DataError
+from strapdown.results import RestStretch
+from strapdown.sensors.prepared_unit import Levelling
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+
+Array = NDArray[np.float64]
+
+__all__ = ["from_stated_attitude", "gravity_correction", "level_at_rest"]
+
+
+def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
+    """Roll and pitch from the mean specific force, with the sd that its noise leaves.
+
+    Parameters
+    ----------
+    rest : RestStretch
+        In vehicle axes.
+    unknown : float, m/s²
+        Standard deviation of the vehicle's own acceleration over it, each axis.
+    gravity : float, m/s²
+    source : str
+        For messages.
+
+    Returns
+    -------
+    Levelling
+        Its sd is that of the worse of the two angles: an acceleration error e across the
+        specific force turns it by ``e / g`` (roll: over ``cos(pitch)``).
+
+    Raises
+    ------
+    DataError
+        The length is not within 20 % of gravity.
+    """
+    assert rest.accel_mean is not None and rest.accel_mean_sd is not None
+    try:
+        roll, pitch = level(rest.accel_mean)
+    except DataError as error:
+        raise DataError(
+            f"{error.finding.what} ({rest.start:.6g} to {rest.end:.6g} s)",
+            file=source,
+            quantity="levelling",
+            remedy="state the unit of the accelerometer, or give levelling=(roll, pitch, sd): then "
+            "the bias of the lowest range is taken from gravity in that attitude",
+        ) from None
+    across = math.hypot(max(rest.accel_mean_sd), unknown) / gravity
+    sd = math.degrees(across / max(math.cos(math.radians(pitch)), 1e-3))
+    return Levelling(roll, pitch, sd, from_rest=True)
+
+
+def from_stated_attitude(
+    stated: tuple[float, float, float],
+    rest: RestStretch | None,
+    bias_sd: Array,
+    unknown: float,
+    gravity: float,
+) -> tuple[Levelling, Array | None]:
+    """Bias of the lowest range from gravity in a stated attitude.
+
+    Parameters
+    ----------
+    stated : (roll, pitch, sd), deg
+    rest : RestStretch, optional
+        In vehicle axes.
+    bias_sd : ndarray, (3,), m/s²
+        Stated sd of the lowest range's bias, vehicle axes.
+    unknown : float, m/s²
+        As `level_at_rest`.
+    gravity : float, m/s²
+
+    Returns
+    -------
+    levelling : Levelling
+    shift : ndarray, (3,), m/s², or None
+        What the lowest range reads at rest less what gravity gives in that attitude; None where
+        there is no rest, or where the stated bias is known better than ``g`` times the sd of
+        the attitude.
+    """
+    roll, pitch, sd = stated
+    levelling = Levelling(float(roll), float(pitch), float(sd), from_rest=False)
+    if rest is None or rest.accel_mean is None or rest.accel_mean_sd is None:
+        return levelling, None
+    known = math.hypot(gravity * math.radians(sd), unknown, max(rest.accel_mean_sd))
+    if known >= float(bias_sd.max()):
+        return levelling, None
+    C_nb = rotation.dcm_from_euler([roll, pitch, 0.0])
+    return levelling, np.asarray(rest.accel_mean) - C_nb.T @ np.array([0.0, 0.0, -gravity])
+
+
+def gravity_correction(
+    rest: RestStretch, uncertainty: TriadUncertainty, unknown: float, gravity: float
+) -> tuple[float, Array] | None:
+    """What makes the specific force at rest as long as gravity.
+
+    Parameters
+    ----------
+    rest : RestStretch
+        In vehicle axes.
+    uncertainty : TriadUncertainty
+        Of the lowest range.
+    unknown : float, m/s²
+        As `level_at_rest`.
+    gravity : float, m/s²
+
+    Returns
+    -------
+    correction : float, m/s²
+        To be added along the direction.
+    direction : ndarray, (3,)
+        Of the mean specific force, vehicle axes.
+
+    Notes
+    -----
+    It takes off the bias along the vertical, and what the scale factor makes of gravity, while
+    the body does not turn. None over a steady stretch whose own acceleration is less known than
+    that bias and scale.
+    """
+    assert rest.accel_mean is not None
+    mean = np.asarray(rest.accel_mean)
+    length = float(np.linalg.norm(mean))
+    own = math.hypot(max(uncertainty.axis("bias")), gravity * max(uncertainty.axis("scale")))
+    if unknown > 0.0 and unknown >= own:
+        return None
+    return gravity - length, mean / length

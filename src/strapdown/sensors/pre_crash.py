@@ -1,0 +1,260 @@
+"""The stretch before a crash from which biases and attitude are taken."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.ellipsoids import WGS84
+from strapdown.results import RestStretch
+from strapdown.sensors.rest import MAX_GYRO_SD, MAX_MEAN_RATE, find_rests, rest_between
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+__all__ = ["BiasEstimate", "find_pre_crash_rest", "gyro_bias_from", "in_axes"]
+
+# Parts of a stretch are compared by their means: long where the record is, short where it
+# starts a tenth of a second before the impact.
+LONG_BLOCK, SHORT_BLOCK = 0.5, 0.02  # s
+LEAST_IN_BLOCK = 5
+LEAST_STEADY = 0.04  # s
+# How far back a short stretch is looked for.
+SHORT_REACH = 1.0  # s
+# Quiet is what stays within three times the quietest twentieth, as in `rest`.
+QUIET_QUANTILE, QUIET_FACTOR = 0.05, 3.0
+# A sensor without noise (a simulation) is quiet where it is constant to rounding.
+ROUNDING_GYRO, ROUNDING_ACCEL = 1e-9, 1e-6  # rad/s, m/s²
+# Driving shakes a floor by more than this, and no standing car without an engine does.
+MAX_ACCEL_SD = 0.3  # m/s², of an axis, beyond the sensor's own noise
+# Means of parts of one rest agree to their noise and to this: people move in a car.
+SAME_FORCE, SAME_FORCE_SIGMAS = 0.05, 5.0  # m/s², standard deviations
+# A vehicle that moves when it is struck did not stand this shortly before.
+LAST_STOP = 0.5  # s
+# Biases wander with warmth: a rest within this time before the impact comes first.
+RECENT = 60.0  # s
+
+
+def find_pre_crash_rest(
+    imu: pd.DataFrame,
+    *,
+    impact: float = 0.0,
+    moving_at_impact: bool = True,
+    accel_noise: float = 0.0,
+    gyro_noise: float = 0.0,
+) -> RestStretch | None:
+    """Find the stationary, else a steady, stretch before a crash.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table with acceleration of the lowest range.
+    impact : float, s
+        Nothing after it is looked at.
+    moving_at_impact : bool
+        A vehicle that moves when it is struck did not stand just before: what is quiet up to
+        the impact is then a coast, grade ``steady``. Say False for one that was struck
+        standing.
+    accel_noise, gyro_noise : float, m/s² and rad/s
+        Stated standard deviation of a sample of an axis: no stretch can be quieter.
+
+    Returns
+    -------
+    RestStretch or None
+        Of grade ``still``: the longest that ended within a minute before the impact, else the
+        latest. Without any, ``steady``: no turning, a constant specific force, at least 40 ms;
+        constant velocity cannot be told from rest by an inertial sensor, nor can a constant
+        acceleration from a tilt. None where the record has neither.
+
+    Notes
+    -----
+    The gyro finds the candidates (`sensors.rest.find_rests`). A gyro does not feel how a car
+    drives off: so each is cut where the mean specific force changes by more than 50 mm/s² and
+    five standard deviations, and where it is noisier than three times the quietest of the
+    record.
+    """
+    before = imu[imu.index.to_numpy(dtype=np.float64) < impact]
+    if len(before) < LEAST_IN_BLOCK:
+        return None
+    floors = (accel_noise, gyro_noise)
+    candidates = find_rests(before[GYRO])
+    spans = [
+        span
+        for rest in candidates
+        for span in _parts(
+            before[(before.index >= rest.start) & (before.index <= rest.end)], LONG_BLOCK, floors
+        )
+        if span[1] - span[0] >= 1.0
+    ]
+    still = [s for s in spans if s[1] < impact - LAST_STOP or not moving_at_impact]
+    if still:
+        recent = [s for s in still if s[1] >= impact - RECENT]
+        best = max(recent, key=_length) if recent else max(still, key=lambda s: s[1])
+        return rest_between(before, *best, grade="still")
+    if not spans:
+        late = before[before.index >= impact - SHORT_REACH]
+        spans = [s for s in _parts(late, SHORT_BLOCK, floors) if _length(s) >= LEAST_STEADY]
+    if not spans:
+        return None
+    best = max(spans, key=_length)
+    standing = not moving_at_impact
+    return rest_between(before, *best, grade="still" if standing else "steady")
+
+
+def _length(span: tuple[float, float]) -> float:
+    return span[1] - span[0]
+
+
+def _parts(
+    imu: pd.DataFrame, block: float, floors: tuple[float, float]
+) -> list[tuple[float, float]]:
+    """First and last stamp of the parts that are quiet and feel one force."""
+    time = imu.index.to_numpy(dtype=np.float64)
+    if time.size < 2 * LEAST_IN_BLOCK:
+        return []
+    accel, gyro = imu[ACCEL].to_numpy(dtype=np.float64), imu[GYRO].to_numpy(dtype=np.float64)
+    size = max(LEAST_IN_BLOCK, round(block / float(np.median(np.diff(time)))))
+    # Whole blocks, the last one ending where the stretch does.
+    starts = np.arange(time.size % size, time.size, size)
+    if starts.size < 2:
+        return []
+    first = int(starts[0])
+    force, rate = (v[first:].reshape(-1, size, 3) for v in (accel, gyro))
+    force_sd, rate_sd = force.std(axis=1), np.sqrt(rate.var(axis=1).sum(axis=1))
+    limit = _threshold(force_sd, size - 1, size, floors[0], ROUNDING_ACCEL, MAX_ACCEL_SD)
+    quiet = (force_sd <= limit).all(axis=1)
+    # Of three axes together.
+    stated = math.sqrt(3.0) * floors[1]
+    degrees = 3 * (size - 1)
+    quiet &= rate_sd <= _threshold(rate_sd, degrees, 3 * size, stated, ROUNDING_GYRO, MAX_GYRO_SD)
+    quiet &= np.abs(rate.mean(axis=1)).max(axis=1) <= MAX_MEAN_RATE
+    means = force.mean(axis=1)
+    noise = np.median(force_sd[quiet], axis=0) if quiet.any() else np.zeros(3)
+    spans: list[tuple[float, float]] = []
+    for group in _groups(quiet, means, noise / math.sqrt(size)):
+        a, b = first + group[0] * size, first + (group[-1] + 1) * size - 1
+        spans.append((float(time[a]), float(time[b])))
+    return spans
+
+
+def _threshold(
+    sd: Array, degrees: int, values: int, stated: float, rounding: float, most: float
+) -> Array:
+    """Per column: three times the quietest or the stated noise, no more than a cap above it."""
+    from scipy.stats import chi2
+
+    # The quietest of short blocks is quiet by chance: this is how much, for normal noise.
+    chance = math.sqrt(float(chi2.ppf(QUIET_QUANTILE, degrees)) / values)
+    quietest = np.quantile(sd, QUIET_QUANTILE, axis=0) / chance
+    cap = np.hypot(most, QUIET_FACTOR * stated)
+    limit = np.maximum(QUIET_FACTOR * np.maximum(quietest, stated), rounding)
+    return np.asarray(np.minimum(limit, cap))
+
+
+def _groups(quiet: NDArray[np.bool_], means: Array, noise: Array) -> list[list[int]]:
+    """Neighbouring quiet blocks whose means agree with the mean of those before."""
+    groups: list[list[int]] = []
+    total = np.zeros(3)
+    for k in range(len(means)):
+        if not quiet[k]:
+            continue
+        if groups and groups[-1][-1] == k - 1:
+            size = len(groups[-1])
+            allowed = SAME_FORCE + SAME_FORCE_SIGMAS * noise * math.sqrt(1.0 + 1.0 / size)
+            if (np.abs(means[k] - total / size) <= allowed).all():
+                groups[-1].append(k)
+                total = total + means[k]
+                continue
+        groups.append([k])
+        total = means[k].copy()
+    return groups
+
+
+@dataclass(frozen=True)
+class BiasEstimate:
+    """Bias of a triad and how well it is known.
+
+    Attributes
+    ----------
+    bias, sd : tuple of float, u
+    """
+
+    bias: tuple[float, float, float]
+    sd: tuple[float, float, float]
+
+
+def gyro_bias_from(
+    rest: RestStretch | None, stated: tuple[float, float, float], *, steady_rate: float = 0.01
+) -> BiasEstimate:
+    """Bias of a gyro from a stretch before the crash.
+
+    Parameters
+    ----------
+    rest : RestStretch, optional
+        In the axes of the gyro.
+    stated : tuple of float, rad/s
+        Standard deviation of the bias before anything is known of it.
+    steady_rate : float, rad/s
+        How fast a vehicle may turn over a ``steady`` stretch, standard deviation: 0.6 deg/s is
+        a bend of 1.5 km radius at 15 m/s.
+
+    Returns
+    -------
+    BiasEstimate
+        Zero with the stated sd where there is no rest. At rest the mean, and the sd of the
+        mean; the rate of the Earth, up to 7.3e-5 rad/s in all, is part of it and of its sd.
+        Over a steady stretch the mean and the stated bias are weighed by their variances.
+    """
+    if rest is None:
+        return BiasEstimate((0.0, 0.0, 0.0), stated)
+    mean = np.asarray(rest.gyro_mean)
+    noise = np.asarray(rest.gyro_sd if rest.gyro_mean_sd is None else rest.gyro_mean_sd)
+    sd = np.hypot(noise, WGS84.rotation_rate / math.sqrt(3.0))
+    if rest.grade == "steady":
+        sd = np.hypot(sd, steady_rate)
+        prior = np.asarray(stated)
+        weight = prior**2 / (prior**2 + sd**2)
+        mean, sd = weight * mean, np.sqrt(weight) * sd
+    return BiasEstimate(
+        (float(mean[0]), float(mean[1]), float(mean[2])), (float(sd[0]), float(sd[1]), float(sd[2]))
+    )
+
+
+def in_axes(rest: RestStretch, C: Array) -> RestStretch:
+    """The same stretch in other axes.
+
+    Parameters
+    ----------
+    rest : RestStretch
+    C : ndarray, (3, 3)
+        Turns vectors into the other axes. Standard deviations are turned as if the axes'
+        noises were independent.
+
+    Returns
+    -------
+    RestStretch
+    """
+
+    def mean(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
+        return None if v is None else _triple(C @ np.asarray(v))
+
+    def sd(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
+        return None if v is None else _triple(np.sqrt(C**2 @ np.asarray(v) ** 2))
+
+    return replace(
+        rest,
+        gyro_mean=_triple(C @ np.asarray(rest.gyro_mean)),
+        gyro_sd=_triple(np.sqrt(C**2 @ np.asarray(rest.gyro_sd) ** 2)),
+        accel_mean=mean(rest.accel_mean),
+        gyro_mean_sd=sd(rest.gyro_mean_sd),
+        accel_sd=sd(rest.accel_sd),
+        accel_mean_sd=sd(rest.accel_mean_sd),
+    )
+
+
+def _triple(v: Array) -> tuple[float, float, float]:
+    return float(v[0]), float(v[1]), float(v[2])

@@ -1,0 +1,120 @@
+"""Where a sensor is at the end of its range, also where that is not where its data sheet says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+__all__ = ["RangeLimits", "find_limits"]
+
+# A crash holds a sensor at its end for tens of milliseconds; what is flat for longer is a rest.
+LONGEST_FLAT = 0.5  # s
+LEAST_FLAT = 3  # samples
+# The top of a smooth pulse in coarse steps is flat, too, but is left by one step.
+LEAST_JUMP = 3.0  # steps
+# A flat extreme below this part of the stated range is no end of anything.
+LEAST_PART = 0.1
+# Of a full scale: what is nearer to it than this, or than a step, is at it.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class RangeLimits:
+    """Ends of the range of a triad, and who stood there.
+
+    Attributes
+    ----------
+    lower, upper : ndarray, (3,)
+        Ends of the range, as stated or as found, in the unit of the values.
+    clipped : ndarray of bool, (n, 3)
+        Samples at either end.
+    found : ndarray of bool, (3,)
+        Axes with an end that was found within the stated range.
+    beyond : ndarray of bool, (3,)
+        Axes that read more than their stated full scale.
+    """
+
+    lower: Array
+    upper: Array
+    clipped: Mask
+    found: Mask
+    beyond: Mask
+
+
+def find_limits(time: Array, values: Array, full_scale: Array, quantization: Array) -> RangeLimits:
+    """Find the ends of a triad's range and the samples that stand there.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    values : ndarray, (n, 3)
+        As recorded: saturation happens before any bias is taken off.
+    full_scale : ndarray, (3,)
+        As stated; may be infinite.
+    quantization : ndarray, (3,)
+        Step of the output; zero where there is none.
+
+    Returns
+    -------
+    RangeLimits
+
+    Notes
+    -----
+    A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
+    an end where it stays on the very same extreme value of the record for three samples or
+    more, up to 0.5 s, and jumps there by three steps or more: noise repeats no number, and the
+    top of a smooth pulse is left by one step.
+    """
+    lower, upper = -np.asarray(full_scale, dtype=np.float64), np.array(full_scale, dtype=np.float64)
+    found, beyond = np.zeros(3, dtype=bool), np.zeros(3, dtype=bool)
+    clipped = np.zeros(values.shape, dtype=bool)
+    for k in range(3):
+        y, full = values[:, k], float(full_scale[k])
+        slack = max(float(quantization[k]), ROUNDING * full) if np.isfinite(full) else 0.0
+        beyond[k] = bool(np.abs(y).max(initial=0.0) > full + slack)
+        if np.isfinite(full):
+            clipped[:, k] = (np.abs(y) >= full - slack) & (np.abs(y) <= full + slack)
+        for sign in (1.0, -1.0):
+            flat = _flat_extreme(time, sign * y, full)
+            if flat is None or flat.all() or (flat & ~clipped[:, k]).sum() == 0:
+                continue
+            end = float(y[flat][0])
+            clipped[:, k] |= flat
+            found[k] = True
+            if sign > 0.0:
+                upper[k] = end
+            else:
+                lower[k] = end
+    return RangeLimits(lower, upper, clipped, found, beyond)
+
+
+def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
+    """Samples on the largest value, where it looks like an end of the range."""
+    if y.size < LEAST_FLAT:
+        return None
+    top = float(y.max())
+    floor = LEAST_PART * full if np.isfinite(full) else 0.0
+    if top <= max(floor, 0.0) or top == float(np.median(y)):
+        return None
+    at = y == top
+    edges = np.diff(np.r_[False, at, False].astype(np.int8))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    step = _least_step(y)
+    for a, b in zip(starts.tolist(), ends.tolist(), strict=True):
+        sides = [float(y[i]) for i in (a - 1, b) if 0 <= i < y.size]
+        jump = max((top - side for side in sides), default=0.0)
+        short = time[b - 1] - time[a] <= LONGEST_FLAT
+        if b - a >= LEAST_FLAT and short and jump >= (LEAST_JUMP - 0.5) * step:
+            return np.asarray(at, dtype=np.bool_)
+    return None
+
+
+def _least_step(y: Array) -> float:
+    """Smallest difference of two values that occur: the converter's step, or rounding."""
+    gaps = np.diff(np.unique(y))
+    return float(gaps.min()) if gaps.size else 0.0
