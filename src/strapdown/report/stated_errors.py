@@ -10,10 +10,16 @@ from strapdown.simulation import TriadErrors
 __all__ = ["stated_errors"]
 
 # What follows the unit of the triad in a key, or stands instead of it.
-_AFTER = {"noise_density": "_per_sqrt_hz", "random_walk": "_per_sqrt_s", "trend": "_per_s"}
+_AFTER = {
+    "noise_density": "_per_sqrt_hz",
+    "random_walk": "_per_sqrt_s",
+    "trend": "_per_s",
+    "vibration_rectification": "_per_m2_per_s4",
+}
 _UNITS = {
     "correlation_time": "s",
     "jitter": "s",
+    "warm_up_time": "s",
     "bandwidth": "hz",
     "misalignment": "rad",
     "scale": "relative",

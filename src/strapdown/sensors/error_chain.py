@@ -7,12 +7,13 @@ The order is that of a real chain, from the motion to the number that is read:
 3. the directions of the sensors: ``v = (I + misalignment) u``;
 4. what the specific force does to a gyro: ``v + g_sensitivity f``;
 5. the sensor's curve: `scale`, `nonlinearity_2`, `nonlinearity_3`;
-6. the drifts: `bias`, `trend`, `bias_instability`, `random_walk`;
+6. the drifts: `bias`, `trend`, `warm_up`, `vibration_rectification`, `bias_instability`,
+   `random_walk`;
 7. `noise_density`;
 8. the converter: `full_scale`, then `quantization`.
 
-`compensate` undoes 3 to 5 and the bias and trend of 6. The others are random, or lose what
-they take.
+`compensate` undoes 3 to 5 and the bias, trend, warm-up and rectification of 6. The others are
+random, or lose what they take.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ def apply(
     seed: Seed = 0,
     specific_force: ArrayLike | None = None,
     sampled: bool = False,
+    vibration: ArrayLike | None = None,
 ) -> Array:
     """Put the errors of a triad on true values.
 
@@ -73,6 +75,9 @@ def apply(
         The values already have what comes before the sampler, jitter and low-pass: where a
         motion is known between the samples, `simulate_imu` evaluates it there. Otherwise the
         values are taken to run linearly (means: their integral) from one to the next.
+    vibration : array_like, (n, 3), (m/s²)², optional
+        Mean square of the vibration about each sample, which `vibration_rectification` turns
+        into a shift; none, if not given.
 
     Returns
     -------
@@ -94,7 +99,7 @@ def apply(
         u = _through_filter(errors, t, u, steps, mean)
     v = u + u @ np.asarray(errors.misalignment).T + _g_effect(errors, u, specific_force)
     y = np.column_stack([transfer(v[:, k], *_curve(errors, k)) for k in range(3)])
-    y += _known_drift(errors, t, steps, mean)
+    y += _known_drift(errors, t, steps, mean) + _rectified(errors, y, vibration)
     if any(errors.axis("bias_instability")):
         y += gauss_markov(
             seed, steps, errors.axis("bias_instability"), errors.correlation_time, mean
@@ -117,6 +122,7 @@ def compensate(
     *,
     sampling: str = "instantaneous",
     specific_force: ArrayLike | None = None,
+    vibration: ArrayLike | None = None,
 ) -> Array:
     """Take the known part of the errors off what was measured.
 
@@ -129,12 +135,14 @@ def compensate(
     sampling : {'instantaneous', 'mean'}
     specific_force : array_like, (n, 3), m/s², optional
         Needed where `g_sensitivity` is not zero; compensate the accelerometer first.
+    vibration : array_like, (n, 3), (m/s²)², optional
+        As of `apply`.
 
     Returns
     -------
     ndarray, (n, 3), u
-        Free of bias, trend, scale factor, nonlinearity, g-sensitivity and misalignment to
-        rounding.
+        Free of bias, trend, warm-up, rectification, scale factor, nonlinearity, g-sensitivity and
+        misalignment to rounding.
 
     Raises
     ------
@@ -143,7 +151,7 @@ def compensate(
     """
     t, y = _rows(time, measured, "measured")
     mean = _is_mean(sampling)
-    y = y - _known_drift(errors, t, intervals(t), mean)
+    y = y - _known_drift(errors, t, intervals(t), mean) - _rectified(errors, y, vibration)
     v = np.column_stack([input_of(y[:, k], *_curve(errors, k)) for k in range(3)])
     v -= _g_effect(errors, v, specific_force)
     directions = np.eye(3) + np.asarray(errors.misalignment)
@@ -251,14 +259,26 @@ def _g_effect(errors: TriadErrors, like: Array, specific_force: ArrayLike | None
             quantity="g_sensitivity",
             remedy="pass specific_force, (n, 3) in m/s²",
         )
-    f = np.asarray(specific_force, dtype=np.float64)
-    if f.shape != like.shape:
+    f = _alike(specific_force, like, "specific_force")
+    return np.asarray(f @ matrix.T, dtype=np.float64)
+
+
+def _rectified(errors: TriadErrors, like: Array, vibration: ArrayLike | None) -> Array:
+    if vibration is None:
+        return np.zeros_like(like)
+    shaken = _alike(vibration, like, "vibration")
+    return np.asarray(shaken * errors.axis("vibration_rectification"), dtype=np.float64)
+
+
+def _alike(values: ArrayLike, like: Array, name: str) -> Array:
+    out = np.asarray(values, dtype=np.float64)
+    if out.shape != like.shape:
         raise DataError(
-            f"it has the shape {f.shape}, and the values {like.shape}",
-            quantity="specific_force",
+            f"it has the shape {out.shape}, and the values {like.shape}",
+            quantity=name,
             remedy="pass one row of three values a sample",
         )
-    return np.asarray(f @ matrix.T, dtype=np.float64)
+    return out
 
 
 def _curve(errors: TriadErrors, axis: int) -> tuple[float, float, float, float]:
@@ -271,6 +291,14 @@ def _curve(errors: TriadErrors, axis: int) -> tuple[float, float, float, float]:
 
 
 def _known_drift(errors: TriadErrors, t: Array, steps: Array, mean: bool) -> Array:
-    """Bias and trend; the mean of a trend over an interval is its value in the middle."""
+    """Bias, trend and warm-up; the mean of a trend over an interval is its value in the middle."""
     middle = t - 0.5 * steps if mean else t
-    return np.asarray(errors.bias) + np.outer(middle, np.asarray(errors.trend))
+    drift = np.asarray(errors.bias) + np.outer(middle, np.asarray(errors.trend))
+    if any(errors.axis("warm_up")):
+        left = np.exp(-t / errors.warm_up_time)
+        if mean:
+            # The mean of exp(-s/T) over the interval that ends at t.
+            h = steps / errors.warm_up_time
+            left *= np.divide(np.expm1(h), h, out=np.ones_like(h), where=h > 0.0)
+        drift += np.outer(left, errors.axis("warm_up"))
+    return np.asarray(drift, dtype=np.float64)

@@ -29,6 +29,8 @@ TRIADS = (
     "nonlinearity_3",
     "quantization",
     "full_scale",
+    "warm_up",
+    "vibration_rectification",
 )
 NOT_NEGATIVE = (
     "noise_density",
@@ -37,7 +39,7 @@ NOT_NEGATIVE = (
     "quantization",
     "jitter",
 )
-POSITIVE = ("correlation_time", "full_scale", "bandwidth")
+POSITIVE = ("correlation_time", "full_scale", "bandwidth", "warm_up_time")
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,11 @@ class TriadErrors:
         1/√2 (-3 dB). Noise and drifts are those of the output, and do not pass it.
     jitter : float, s
         Standard deviation of the sampling instant about the stamp.
+    warm_up : triad, u
+        Part of the bias at time zero that dies away as ``exp(-t / warm_up_time)``.
+    warm_up_time : float, s
+    vibration_rectification : triad, u per (m/s²)²
+        Shift of the output per mean square of the vibration along the axis.
 
     Raises
     ------
@@ -104,6 +111,9 @@ class TriadErrors:
     full_scale: TriadLike = math.inf
     bandwidth: float = math.inf
     jitter: float = 0.0
+    warm_up: TriadLike = ZERO
+    warm_up_time: float = math.inf
+    vibration_rectification: TriadLike = ZERO
 
     def __post_init__(self) -> None:
         for f in fields(self):

@@ -18,6 +18,8 @@ MEAN_NODES = 8
 FILTER_NODES = 6
 # exp(-40) is less than the rounding of what it is added to.
 MEMORY = 40.0  # time constants
+# Where a step is looked at: at odd places, which a vibration does not all pass at zero.
+PROBES = (0.23, 0.57, 0.81)
 # Instants that are evaluated together, for the sake of memory.
 TOGETHER = 200_000
 
@@ -37,7 +39,9 @@ def mean_over(quantity: Quantity, starts: Array, ends: Array) -> Array:
     return np.concatenate(parts)
 
 
-def low_passed(quantity: Quantity, instants: Array, bandwidth: float) -> Array:
+def low_passed(
+    quantity: Quantity, instants: Array, bandwidth: float, straight: float = 0.0
+) -> Array:
     """Output of a single-pole low-pass at increasing instants, (n, 3).
 
     Parameters
@@ -48,6 +52,9 @@ def low_passed(quantity: Quantity, instants: Array, bandwidth: float) -> Array:
         At rest with the value at the first instant, until then.
     bandwidth : float, Hz
         -3 dB frequency.
+    straight : float
+        From one instant to the next, a quantity that is found within this of a straight line is
+        taken to run along it; zero never does so. It saves evaluations where little happens.
 
     Returns
     -------
@@ -64,23 +71,59 @@ def low_passed(quantity: Quantity, instants: Array, bandwidth: float) -> Array:
 
     tau = time_constant(bandwidth)
     steps = np.diff(instants)
+    out = np.empty((instants.size, 3))
+    drive = np.empty((steps.size, 3))
+    curved = np.arange(steps.size)
+    if straight > 0.0:
+        values = quantity(instants)
+        out[:1] = values[:1]
+        curved = _curved(quantity, instants, values, straight)
+        h = (steps / tau)[:, None]
+        a = np.exp(-h)
+        held = -np.expm1(-h) / h
+        # As `sensors.low_pass.low_pass` does between samples.
+        drive[:] = (held - a) * values[:-1] + (1.0 - held) * values[1:]
+    else:
+        out[:1] = quantity(instants[:1])
+    if curved.size:
+        drive[curved] = _weighted(quantity, instants[1:][curved], steps[curved], tau)
+    first_order(np.exp(-steps / tau), drive, out[0].copy(), out[1:])
+    return out
+
+
+def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float) -> Array:
+    """``∫ exp(-(t1 - s)/τ) u(s) ds/τ`` over the step that ends at each instant, (n, 3)."""
     window = np.minimum(steps, MEMORY * tau)
     stretches = max(1, math.ceil(float(window.max()) / tau))
     nodes, weights = np.polynomial.legendre.leggauss(FILTER_NODES)
     # Places within the window from 0 to 1, and their weights.
     place = ((np.arange(stretches)[:, None] + 0.5 * (1.0 + nodes)) / stretches).ravel()
     weight = np.tile(0.5 * weights, stretches) / stretches
-    parts = [np.empty((0, 3))]
+    parts = []
     for chunk in _chunks(steps.size, place.size):
         back = window[chunk, None] * (1.0 - place)
-        values = quantity((instants[1:][chunk, None] - back).ravel()).reshape(*back.shape, 3)
+        values = quantity((ends[chunk, None] - back).ravel()).reshape(*back.shape, 3)
         share = weight * np.exp(-back / tau) * window[chunk, None] / tau
         parts.append(np.einsum("nm,nmk->nk", share, values))
-    out = np.empty((instants.size, 3))
-    out[:1] = quantity(instants[:1])
-    drive = np.ascontiguousarray(np.concatenate(parts))
-    first_order(np.exp(-steps / tau), drive, out[0].copy(), out[1:])
-    return out
+    return np.concatenate(parts)
+
+
+def _curved(
+    quantity: Quantity, instants: Array, values: Array, straight: float
+) -> NDArray[np.intp]:
+    """Steps in which the quantity leaves the straight line, and their neighbours."""
+    steps = np.diff(instants)
+    bent = np.zeros(steps.size, dtype=bool)
+    at = (instants[:-1, None] + steps[:, None] * np.array(PROBES)).ravel()
+    found = quantity(at).reshape(steps.size, len(PROBES), 3)
+    for k, part in enumerate(PROBES):
+        line = values[:-1] + part * (values[1:] - values[:-1])
+        bent |= (np.abs(found[:, k] - line) > straight).any(axis=1)
+    # What begins late in a step may be missed by its probes, and shows in the next.
+    near = bent.copy()
+    near[:-1] |= bent[1:]
+    near[1:] |= bent[:-1]
+    return np.flatnonzero(near)
 
 
 def _chunks(count: int, each: int) -> list[slice]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.error_chain import apply, jitter
-from strapdown.sensors.error_draws import child
+from strapdown.sensors.error_draws import Seed, child
 from strapdown.sensors.low_pass import mean_of_filtered
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.between_samples import Quantity, low_passed, mean_over
@@ -68,37 +68,124 @@ def simulate_imu(
         jitter is too large for the rate.
     """
     time = _stamps(motion, rate, sampling)
-    step = 1.0 / rate
-
     wants_force = accelerometer or bool(np.any(np.asarray(errors.gyro.g_sensitivity)))
-    plain = _force(motion, TriadErrors(), time, step, sampling, 0) if wants_force else None
-    gyro_seed, accel_seed = child(seed, GYRO_SEED), child(seed, ACCEL_SEED)
-    gyro = apply(
+    plain = None
+    if wants_force:
+        plain = _force(motion, TriadErrors(), time, 1.0 / rate, sampling, 0, 0.0)
+    gyro = sample_gyro(
+        motion,
         errors.gyro,
         time,
-        _rate(motion, errors.gyro, time, step, sampling, gyro_seed),
         sampling=sampling,
-        seed=gyro_seed,
+        seed=child(seed, GYRO_SEED),
         specific_force=plain,
-        sampled=True,
     )
     accel = plain if accelerometer else None
     if accel is not None and errors.accel is not None:
-        own = errors.accel
-        if own.jitter > 0.0 or np.isfinite(own.bandwidth):
-            accel = _force(motion, own, time, step, sampling, accel_seed)
-        accel = apply(
-            own,
+        accel = sample_accelerometer(
+            motion,
+            errors.accel,
             time,
-            accel,
             sampling=sampling,
-            seed=accel_seed,
+            seed=child(seed, ACCEL_SEED),
             specific_force=plain,
-            sampled=True,
         )
     return (
         imu_table(time, gyro, accel, sampling=sampling, source=source),
         attitude_table(time, motion.attitude(time), source=source),
+    )
+
+
+def sample_gyro(
+    motion: Motion,
+    errors: TriadErrors,
+    time: Array,
+    *,
+    sampling: str = "instantaneous",
+    seed: Seed = 0,
+    straight: float = 0.0,
+    specific_force: Array | None = None,
+) -> Array:
+    """Read a triad of gyros.
+
+    Parameters
+    ----------
+    motion : Motion
+    errors : TriadErrors
+    time : ndarray, (n,), s
+        Equally spaced, within the motion.
+    sampling : {'instantaneous', 'mean'}
+    seed : int or SeedSequence
+        Of the triad.
+    straight : float, rad/s
+        How far the rate may be from a straight line between two samples for the low-pass to
+        take it as one (`between_samples.low_passed`); zero is never.
+    specific_force : ndarray, (n, 3), m/s², optional
+        What an ideal accelerometer reads, where it is at hand.
+
+    Returns
+    -------
+    ndarray, (n, 3), rad/s
+    """
+    step = float(time[1] - time[0])
+    plain = specific_force
+    if plain is None and np.any(np.asarray(errors.g_sensitivity)):
+        plain = _force(motion, TriadErrors(), time, step, sampling, 0, 0.0)
+    return apply(
+        errors,
+        time,
+        _rate(motion, errors, time, step, sampling, seed, straight),
+        sampling=sampling,
+        seed=seed,
+        specific_force=plain,
+        sampled=True,
+    )
+
+
+def sample_accelerometer(
+    motion: Motion,
+    errors: TriadErrors,
+    time: Array,
+    *,
+    sampling: str = "instantaneous",
+    seed: Seed = 0,
+    straight: float = 0.0,
+    vibration: Array | None = None,
+    specific_force: Array | None = None,
+) -> Array:
+    """Read a triad of accelerometers.
+
+    Parameters
+    ----------
+    motion, errors, time, sampling, seed
+        As of `sample_gyro`.
+    straight : float, m/s²
+        As of `sample_gyro`.
+    vibration : ndarray, (n, 3), (m/s²)², optional
+        As of `sensors.error_chain.apply`.
+    specific_force : ndarray, (n, 3), m/s², optional
+        As of `sample_gyro`.
+
+    Returns
+    -------
+    ndarray, (n, 3), m/s²
+    """
+    step = float(time[1] - time[0])
+    plain = specific_force
+    if plain is None:
+        plain = _force(motion, TriadErrors(), time, step, sampling, 0, 0.0)
+    true = plain
+    if errors.jitter > 0.0 or np.isfinite(errors.bandwidth):
+        true = _force(motion, errors, time, step, sampling, seed, straight)
+    return apply(
+        errors,
+        time,
+        true,
+        sampling=sampling,
+        seed=seed,
+        specific_force=plain,
+        sampled=True,
+        vibration=vibration,
     )
 
 
@@ -126,9 +213,7 @@ def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
     return np.arange(int(samples)) / rate
 
 
-def _instants(
-    motion: Motion, errors: TriadErrors, time: Array, seed: int | np.random.SeedSequence
-) -> Array:
+def _instants(motion: Motion, errors: TriadErrors, time: Array, seed: Seed) -> Array:
     """When the sampler really looks; the motion is known from zero to its end."""
     if errors.jitter == 0.0:
         return time
@@ -142,14 +227,15 @@ def _rate(
     time: Array,
     step: float,
     sampling: str,
-    seed: int | np.random.SeedSequence,
+    seed: Seed,
+    straight: float,
 ) -> Array:
     at = _instants(motion, errors, time, seed)
     if sampling == "instantaneous":
-        return low_passed(motion.rate, at, errors.bandwidth)
+        return low_passed(motion.rate, at, errors.bandwidth, straight)
     angle = motion.angle(at)
     mean = np.vstack([motion.rate(at[:1]), np.diff(angle, axis=0) / step])
-    return _filtered_mean(motion.rate, at, mean, step, errors.bandwidth)
+    return _filtered_mean(motion.rate, at, mean, step, errors.bandwidth, straight)
 
 
 def _force(
@@ -158,22 +244,23 @@ def _force(
     time: Array,
     step: float,
     sampling: str,
-    seed: int | np.random.SeedSequence,
+    seed: Seed,
+    straight: float,
 ) -> Array:
     at, force = _instants(motion, errors, time, seed), motion.specific_force
     if sampling == "instantaneous":
-        return low_passed(force, at, errors.bandwidth)
+        return low_passed(force, at, errors.bandwidth, straight)
     mean = np.vstack([force(at[:1]), mean_over(force, at[:-1], at[1:])])
     if errors.jitter > 0.0:
         # The sensor divides what it has gathered by the interval that it knows of.
         mean[1:] *= np.diff(at)[:, None] / step
-    return _filtered_mean(force, at, mean, step, errors.bandwidth)
+    return _filtered_mean(force, at, mean, step, errors.bandwidth, straight)
 
 
 def _filtered_mean(
-    quantity: Quantity, at: Array, mean: Array, step: float, bandwidth: float
+    quantity: Quantity, at: Array, mean: Array, step: float, bandwidth: float, straight: float
 ) -> Array:
     if np.isinf(bandwidth):
         return mean
-    ends = low_passed(quantity, at, bandwidth)
+    ends = low_passed(quantity, at, bandwidth, straight)
     return mean_of_filtered(ends, mean, np.full(at.size, step), bandwidth)

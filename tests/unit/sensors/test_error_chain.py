@@ -238,3 +238,28 @@ def test_what_cannot_be_applied_is_refused():
         compensate(KNOWN, t, u[:3], specific_force=force())
     with pytest.raises(ConfigError, match="tenth of the interval"):
         apply(TriadErrors(jitter=0.01), t, u)
+
+
+def test_warm_up_dies_away_and_its_means_are_exact():
+    errors = TriadErrors(warm_up=(0.5, -0.2, 0.0), warm_up_time=2.0)
+    time, rest = np.arange(1, 9) * 0.5, np.zeros((8, 3))
+    at = apply(errors, time, rest)
+    np.testing.assert_allclose(at[:, 0], 0.5 * np.exp(-time / 2.0), rtol=1e-15)
+    mean = apply(errors, time, rest, sampling="mean")
+    integral = -2.0 * np.exp(-np.append(0.0, time) / 2.0)
+    np.testing.assert_allclose(mean[:, 1], -0.2 * np.diff(integral) / 0.5, rtol=1e-14)
+    np.testing.assert_allclose(compensate(errors, time, mean, sampling="mean"), 0.0, atol=1e-16)
+    lasting = TriadErrors(warm_up=0.5)
+    np.testing.assert_array_equal(apply(lasting, time, rest, sampling="mean"), 0.5)
+
+
+def test_vibration_shifts_the_output_and_is_taken_off():
+    errors = TriadErrors(vibration_rectification=(1e-3, 0.0, -2e-3), scale=0.01)
+    time, true = np.arange(5) * 0.01, np.ones((5, 3))
+    shaken = np.full((5, 3), 400.0)
+    read = apply(errors, time, true, vibration=shaken)
+    np.testing.assert_allclose(read[2], 1.01 + np.array([0.4, 0.0, -0.8]), rtol=1e-14)
+    np.testing.assert_allclose(compensate(errors, time, read, vibration=shaken), true, rtol=1e-14)
+    np.testing.assert_allclose(apply(errors, time, true), 1.01, rtol=1e-15)
+    with pytest.raises(DataError, match="vibration"):
+        apply(errors, time, true, vibration=shaken[:3])
