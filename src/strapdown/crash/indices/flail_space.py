@@ -1,0 +1,128 @@
+"""Occupant impact velocity and ridedown acceleration: the flail-space model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.indices.crossings import cubic, first_reach
+from strapdown.crash.indices.moving_means import largest_mean
+from strapdown.crash.indices.pulse import checked, from_start, integrals
+from strapdown.exceptions import ConfigError, DataError, Finding
+
+__all__ = ["FlailSpace", "flail_space"]
+
+FORWARD, SIDEWAYS = 0.6, 0.3  # m
+WINDOW = 0.01  # s
+
+
+@dataclass(frozen=True)
+class FlailSpace:
+    """Occupant risk by the flail-space model.
+
+    Attributes
+    ----------
+    oiv_x, oiv_y : float, m/s
+        Occupant impact velocity: of the occupant relative to the vehicle, forward and to the
+        right.
+    at : float, s, or None
+        Of the occupant's impact, on the record's clock; None where the occupant meets nothing,
+        and the velocities are the greatest changes of the vehicle's.
+    ora_x_g, ora_y_g : float or None
+        Ridedown acceleration of the vehicle, the mean over 10 ms of greatest size after the
+        impact, in g, with its sign.
+    findings : tuple of Finding
+    """
+
+    oiv_x: float
+    oiv_y: float
+    at: float | None
+    ora_x_g: float | None
+    ora_y_g: float | None
+    findings: tuple[Finding, ...] = ()
+
+
+def flail_space(
+    time: ArrayLike,
+    accel: ArrayLike,
+    *,
+    start: float = 0.0,
+    forward: float = FORWARD,
+    sideways: float = SIDEWAYS,
+) -> FlailSpace:
+    """Occupant impact velocity, and the ridedown acceleration after it.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    accel : array_like, (n, 2) or (n, 3), m/s²
+        Of the vehicle near its centre of gravity, forward and to the right, without gravity, of
+        class CFC 180.
+    start : float, s
+        First contact.
+    forward, sideways : float, m
+        The flail space; the same to the rear and to the left.
+
+    Returns
+    -------
+    FlailSpace
+
+    Raises
+    ------
+    DataError
+        As `pulse.checked`; `start` is not in the record.
+    ConfigError
+        A distance is none.
+
+    Notes
+    -----
+    Each axis for itself, the vehicle's turn left out: the occupant moves by ``-∬ a`` relative to
+    the vehicle and meets it when that is 0.6 m along or 0.3 m across, whichever is first; the
+    velocities are ``-∫ a`` then. Where neither is reached, they are the vehicle's changes of
+    velocity (Michie 1981, Transportation Research Record 796; NCHRP Report 350, 1993, and MASH
+    2009, occupant risk). Exact for acceleration that is linear between samples.
+    """
+    for name, distance in (("forward", forward), ("sideways", sideways)):
+        if not (math.isfinite(distance) and distance > 0.0):
+            raise ConfigError(
+                f"{distance} m is no space", quantity=name, remedy="give metres above zero"
+            )
+    plane = np.asarray(accel, dtype=np.float64)
+    t, a = checked(time, plane[:, :2] if plane.ndim == 2 else plane, 2, "accel")
+    t, a = from_start(t, a, start, "start")
+    velocity, way = integrals(t, -a)
+    met = [
+        at
+        for axis, distance in ((0, forward), (1, sideways))
+        for sign in (1.0, -1.0)
+        if (at := first_reach(t, sign * way[:, axis], sign * velocity[:, axis], distance))
+        is not None
+    ]
+    if not met:
+        x, y = (float(v[np.argmax(np.abs(v))]) for v in velocity.T)
+        found = Finding(
+            f"the occupant moves by less than {forward:g} m along and {sideways:g} m across until "
+            f"the record ends at {t[-1]:.6g} s: OIV is the vehicle's greatest change of velocity, "
+            "and ORA has no value",
+            quantity="OIV",
+            remedy="take a longer record, if the impact is not over in it",
+        )
+        return FlailSpace(x, y, None, None, None, (found,))
+    at = min(met)
+    x, y = (cubic(t, way[:, k], velocity[:, k], at)[1] for k in (0, 1))
+    try:
+        rest, values = from_start(t, a, at, "ORA")
+        ora = [largest_mean(rest, values[:, k], WINDOW)[0] / STANDARD_GRAVITY for k in (0, 1)]
+    except DataError:
+        found = Finding(
+            f"the record ends less than 10 ms after the occupant's impact at {at:.6g} s: ORA has "
+            "no value",
+            quantity="ORA",
+            remedy="take a longer record",
+        )
+        return FlailSpace(x, y, at, None, None, (found,))
+    return FlailSpace(x, y, at, ora[0], ora[1])

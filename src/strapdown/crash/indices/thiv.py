@@ -1,0 +1,218 @@
+"""Theoretical head impact velocity and post-impact head deceleration."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.indices.crossings import cubic, first_reach
+from strapdown.crash.indices.moving_means import largest_mean
+from strapdown.crash.indices.phaseless import four_pole
+from strapdown.crash.indices.pulse import checked, from_start, integrals
+from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+
+__all__ = ["PHD_AVERAGES", "Thiv", "thiv"]
+
+Array = NDArray[np.float64]
+FORWARD, SIDEWAYS = 0.6, 0.3  # m
+WINDOW = 0.01  # s
+FREQUENCY = 10.0  # Hz
+#: How the acceleration after the impact of the head is smoothed.
+PHD_AVERAGES: dict[str, str] = {
+    "mean_10ms": "mean of the resultant over a moving window of 10 ms (EN 1317-1:1998; MASH)",
+    "butterworth_10hz": "resultant of the components through a four-pole Butterworth low-pass "
+    "without phase, 10 Hz",
+}
+
+
+@dataclass(frozen=True)
+class Thiv:
+    """What a head that flies freely in the vehicle meets.
+
+    Attributes
+    ----------
+    velocity : float, m/s, or None
+        Of the head relative to the vehicle at its impact; None where it meets nothing.
+    time_of_flight : float, s, or None
+        From the start.
+    surface : str or None
+        ``front``, ``right`` or ``left`` of the vehicle.
+    phd_g : float or None
+        Post-impact head deceleration, in g.
+    phd_at : float, s, or None
+        On the record's clock: start of the window, or the instant of the filtered peak.
+    largest : float, m/s
+        Greatest velocity of the head relative to the vehicle up to its impact, or to the end.
+    findings : tuple of Finding
+    """
+
+    velocity: float | None
+    time_of_flight: float | None
+    surface: str | None
+    phd_g: float | None
+    phd_at: float | None
+    largest: float
+    findings: tuple[Finding, ...] = ()
+
+
+def thiv(
+    time: ArrayLike,
+    accel: ArrayLike,
+    yaw_rate: ArrayLike | None = None,
+    *,
+    start: float = 0.0,
+    head: tuple[float, float] = (0.0, 0.0),
+    forward: float = FORWARD,
+    sideways: float = SIDEWAYS,
+    phd_average: str = "mean_10ms",
+) -> Thiv:
+    """Theoretical head impact velocity, and the deceleration after it.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    accel : array_like, (n, 2) or (n, 3), m/s²
+        Acceleration of the reference point, forward and to the right, without gravity, of class
+        CFC 180.
+    yaw_rate : array_like, (n,), rad/s, optional
+        About the downward axis: clockwise from above; left out, the vehicle does not turn.
+    start : float, s
+        First contact.
+    head : pair of float, m
+        The head before the impact, forward and right of the reference point.
+    forward, sideways : float, m
+        How far the head flies until it meets something.
+    phd_average : {'mean_10ms', 'butterworth_10hz'}
+
+    Returns
+    -------
+    Thiv
+
+    Raises
+    ------
+    DataError
+        As `pulse.checked`; `start` is not in the record.
+    ConfigError
+        An option is unknown, or a distance is none.
+
+    Notes
+    -----
+    The head keeps the velocity that the reference point had at `start`. In axes that move with
+    this velocity and do not turn, the vehicle's point moves by ``X'' = ax cos ψ - ay sin ψ``,
+    ``Y'' = ax sin ψ + ay cos ψ``; the head, at rest there, is at ``(x, y) = C(ψ)ᵀ (head - (X, Y))``
+    in the vehicle. It meets a surface where x has grown by `forward` or y has changed by
+    `sideways`, whichever is first, with the velocity ``(x', y')``, the turn of the vehicle
+    included (EN 1317-1, clauses on THIV and PHD; MASH 2009, appendix F2, which takes it over).
+    There is no surface behind the head. Exact for acceleration that is linear between samples
+    and no yaw; with yaw, of the second order of the step.
+    """
+    t, a, rate = _inputs(time, accel, yaw_rate, forward, sideways, phd_average)
+    table = np.column_stack([a, rate])
+    after, cut = from_start(t, table, start, "start")
+    position, velocity = _head_in_vehicle(after, cut[:, :2], cut[:, 2], np.asarray(head))
+    meeting = _first_surface(after, position, velocity, head, forward, sideways)
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    if meeting is None:
+        found = Finding(
+            f"the head flies less than {forward:g} m forward and {sideways:g} m sideways until "
+            f"the record ends at {after[-1]:.6g} s: it meets nothing, and THIV has no value",
+            quantity="THIV",
+            remedy="take a longer record; a weak or a rear impact has none",
+        )
+        return Thiv(None, None, None, None, None, float(speed.max()), (found,))
+    at, surface = meeting
+    met = [cubic(after, position[:, k], velocity[:, k], at)[1] for k in (0, 1)]
+    flown = speed[after <= at]
+    thiv_value = math.hypot(*met)
+    phd, phd_at, findings = _after_impact(t, a, at, phd_average)
+    return Thiv(
+        thiv_value,
+        at - start,
+        surface,
+        phd,
+        phd_at,
+        max(float(flown.max()), thiv_value),
+        findings,
+    )
+
+
+def _inputs(
+    time: ArrayLike,
+    accel: ArrayLike,
+    yaw_rate: ArrayLike | None,
+    forward: float,
+    sideways: float,
+    phd_average: str,
+) -> tuple[Array, Array, Array]:
+    if phd_average not in PHD_AVERAGES:
+        raise ConfigError(
+            f"'{phd_average}' is no average of the PHD",
+            quantity="phd_average",
+            remedy=nearest(phd_average, PHD_AVERAGES),
+        )
+    for name, distance in (("forward", forward), ("sideways", sideways)):
+        if not (math.isfinite(distance) and distance > 0.0):
+            raise ConfigError(
+                f"{distance} m is no way to fly", quantity=name, remedy="give metres above zero"
+            )
+    plane = np.asarray(accel, dtype=np.float64)
+    t, a = checked(time, plane[:, :2] if plane.ndim == 2 else plane, 2, "accel")
+    rate = np.zeros(t.size) if yaw_rate is None else checked(time, yaw_rate, None, "yaw_rate")[1]
+    return t, a, rate
+
+
+def _head_in_vehicle(time: Array, accel: Array, rate: Array, head: Array) -> tuple[Array, Array]:
+    """Place of the head in vehicle axes, and its velocity there."""
+    yaw, _ = integrals(time, rate)
+    c, s = np.cos(yaw), np.sin(yaw)
+    level = np.column_stack([c * accel[:, 0] - s * accel[:, 1], s * accel[:, 0] + c * accel[:, 1]])
+    moved, place = integrals(time, level)
+    away = head - place
+    x, y = c * away[:, 0] + s * away[:, 1], c * away[:, 1] - s * away[:, 0]
+    vx = rate * y - (c * moved[:, 0] + s * moved[:, 1])
+    vy = -rate * x - (c * moved[:, 1] - s * moved[:, 0])
+    return np.column_stack([x, y]), np.column_stack([vx, vy])
+
+
+def _first_surface(
+    time: Array,
+    position: Array,
+    velocity: Array,
+    head: tuple[float, float],
+    forward: float,
+    sideways: float,
+) -> tuple[float, str] | None:
+    sides = (("front", 0, 1.0, forward), ("right", 1, 1.0, sideways), ("left", 1, -1.0, sideways))
+    met = []
+    for surface, axis, sign, distance in sides:
+        flown = sign * (position[:, axis] - head[axis])
+        at = first_reach(time, flown, sign * velocity[:, axis], distance)
+        if at is not None:
+            met.append((at, surface))
+    return min(met) if met else None
+
+
+def _after_impact(
+    time: Array, accel: Array, at: float, average: str
+) -> tuple[float | None, float | None, tuple[Finding, ...]]:
+    if average == "butterworth_10hz":
+        smooth = four_pole(time, accel, FREQUENCY)
+        rest, values = from_start(time, np.hypot(smooth[:, 0], smooth[:, 1]), at, "PHD")
+        k = int(np.argmax(values))
+        return float(values[k]) / STANDARD_GRAVITY, float(rest[k]), ()
+    try:
+        rest, values = from_start(time, np.hypot(accel[:, 0], accel[:, 1]), at, "PHD")
+        phd, begins = largest_mean(rest, values, WINDOW)
+    except DataError:
+        found = Finding(
+            f"the record ends less than 10 ms after the head's impact at {at:.6g} s: PHD has no "
+            "value",
+            quantity="PHD",
+            remedy="take a longer record",
+        )
+        return None, None, (found,)
+    return phd / STANDARD_GRAVITY, begins, ()

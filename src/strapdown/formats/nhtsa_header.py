@@ -1,0 +1,116 @@
+"""The header of a crash test of the NHTSA database, row by row: sections, fields, numbers."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+from strapdown.exceptions import DataError, nearest
+
+SECTIONS = ("EV5", "TEST", "VEHICLE", "BARRIER", "OCCUPANT", "RESTRAINT", "INSTRUMENTATION", "END")
+# Headers are text of some hundred bytes a channel, of which no test has a hundred thousand.
+LARGEST_HEADER = 50_000_000
+
+
+def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
+    """Rows of each section, field by field, with their line numbers.
+
+    Raises
+    ------
+    DataError
+        The file is missing, empty, far too large, cut, or in another form.
+    """
+    if not file.is_file():
+        raise DataError("there is no such file", file=str(file), remedy="check the path")
+    size = file.stat().st_size
+    if size == 0 or size > LARGEST_HEADER:
+        raise DataError(
+            "the file is empty" if not size else f"{size} bytes are no EV5 header",
+            file=file.name,
+            remedy="give the .EV5 file of the test, or get it from the database again",
+        )
+    rows: dict[str, list[tuple[list[str], int]]] = {name: [] for name in SECTIONS}
+    section = ""
+    seen: set[str] = set()
+    for k, line in enumerate(file.read_bytes().decode("latin-1").splitlines(), start=1):
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        if text.startswith("-----"):
+            section = text.strip("- ").upper()
+            if section not in rows:
+                raise DataError(
+                    f"there is no section '{section}' in EV5",
+                    file=file.name,
+                    row=k,
+                    quantity="section",
+                    remedy=nearest(section, SECTIONS),
+                )
+            seen.add(section)
+        elif section in ("", "EV5", "END"):
+            raise DataError(
+                f"'{text[:40]}' stands in no section",
+                file=file.name,
+                row=k,
+                remedy="give the .EV5 file of a test of the NHTSA vehicle database",
+            )
+        else:
+            rows[section].append(([f.strip() for f in line.split("|")], k))
+    missing = [name for name in ("EV5", "TEST", "INSTRUMENTATION", "END") if name not in seen]
+    if missing:
+        raise DataError(
+            f"no section {', '.join(missing)}",
+            file=file.name,
+            quantity="section",
+            remedy="the file is cut, or no EV5 header: get it from the database again",
+        )
+    return rows
+
+
+def only(
+    rows: dict[str, list[tuple[list[str], int]]], section: str, file: Path
+) -> tuple[list[str], int]:
+    """Return the row of a section that has one, with its line; refuse another count."""
+    if len(rows[section]) != 1:
+        raise DataError(
+            f"{len(rows[section])} rows in section {section}, and one is needed",
+            file=file.name,
+            quantity=section,
+            remedy="get the header from the database again",
+        )
+    return rows[section][0]
+
+
+def to_number(text: str, file: Path, line: int, what: str) -> float:
+    """Return a field as a number, NaN where it is not stated; refuse what is none."""
+    if text in ("", "NA", "UN"):
+        return math.nan
+    try:
+        value = float(text)
+    except ValueError:
+        raise bad_number(text, file, line, what) from None
+    if not math.isfinite(value):
+        raise bad_number(text, file, line, what)
+    return value
+
+
+def bad_number(text: str, file: Path, line: int, what: str) -> DataError:
+    """What is said of a field that should be a number."""
+    return DataError(
+        f"'{text}' is no number",
+        file=file.name,
+        row=line,
+        quantity=what,
+        remedy="correct the header, or get it from the database again",
+    )
+
+
+def row_error(file: Path, line: int, section: str, found: int, needed: int) -> DataError:
+    """What is said of a row with too few or too many fields."""
+    return DataError(
+        f"{found} fields between its bars, and a row of {section} has {needed}",
+        file=file.name,
+        row=line,
+        quantity=section,
+        remedy="the header is cut or was edited: get it from the database again",
+    )

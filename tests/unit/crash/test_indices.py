@@ -1,0 +1,330 @@
+"""Indices of severity on pulses with closed-form answers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize
+
+from strapdown.crash.indices.asi import asi
+from strapdown.crash.indices.flail_space import flail_space
+from strapdown.crash.indices.hic import hic
+from strapdown.crash.indices.moving_means import largest_mean, moving_means
+from strapdown.crash.indices.olc import olc
+from strapdown.crash.indices.phaseless import four_pole
+from strapdown.crash.indices.thiv import thiv
+from strapdown.exceptions import ConfigError, DataError
+
+G = 9.80665
+STEP = 1e-4
+# Rounding of some thousand sums.
+EXACT = 1e-11
+DELTA, LENGTH = 15.0, 0.1
+
+
+def constant(size: float, seconds: float = 0.4):
+    time = np.arange(round(seconds / STEP) + 1) * STEP
+    return time, np.full(time.size, size)
+
+
+def haversine(seconds: float = 0.4):
+    """Deceleration whose integral is DELTA over LENGTH: (2Δ/T) sin²(πt/T)."""
+    time = np.arange(-500, round(seconds / STEP) + 1) * STEP
+    within = (time > 0) & (time < LENGTH)
+    return time, np.where(within, 2 * DELTA / LENGTH * np.sin(np.pi * time / LENGTH) ** 2, 0.0)
+
+
+def lost(t):
+    t = min(t, LENGTH)
+    return DELTA * (t / LENGTH - math.sin(2 * math.pi * t / LENGTH) / (2 * math.pi))
+
+
+def ahead(t):
+    s = min(t, LENGTH)
+    part = math.cos(2 * math.pi * s / LENGTH) - 1.0
+    within = DELTA * (s * s / (2 * LENGTH) + LENGTH / (4 * math.pi**2) * part)
+    return within + DELTA * (t - s)
+
+
+def plane(x, y=None):
+    return np.column_stack([x, np.zeros_like(x) if y is None else y, np.zeros_like(x)])
+
+
+# The trapezoid of a sine of 1/T over the step h is short by (2πh/T)²/12 = 3.3e-6 of it.
+TRAPEZOID = 4e-6
+
+
+class TestMovingMeans:
+    def test_is_exact_for_a_record_of_lines_and_any_width(self):
+        # A triangle of height 1 on a base of 2: a window w about its top has the mean 1 - w/4.
+        time = np.array([0.0, 0.3, 1.0, 1.1, 2.0])
+        values = np.interp(time, [0, 1, 2], [0, 1, 0])
+        mean, start = largest_mean(time, -values, 0.37)
+        assert mean == pytest.approx(-(1 - 0.37 / 4), rel=1e-14)
+        assert start == pytest.approx(1 - 0.37 / 2, rel=1e-14)
+
+    def test_is_that_of_a_fine_sum(self):
+        rng = np.random.default_rng(5)
+        time = np.cumsum(rng.uniform(0.5, 1.5, 40))
+        values = rng.standard_normal((40, 2))
+        starts, means = moving_means(time, values, 3.3)
+        for k in (0, 17, starts.size - 1):
+            fine = np.linspace(starts[k], starts[k] + 3.3, 200_001)
+            for axis in (0, 1):
+                # The trapezoid over 200000 parts misses the corners by 1e-10.
+                expected = np.trapezoid(np.interp(fine, time, values[:, axis]), fine) / 3.3
+                assert means[k, axis] == pytest.approx(expected, abs=1e-9)
+
+    def test_a_record_as_long_as_its_window_and_a_shorter_one(self):
+        time, values = constant(2.0, 0.05)
+        assert largest_mean(time, values, 0.05)[0] == pytest.approx(2.0, rel=1e-12)
+        with pytest.raises(DataError, match="shorter than the window"):
+            largest_mean(time, values, 0.0501)
+
+
+class TestAsi:
+    @pytest.mark.parametrize("axis", [0, 1, 2])
+    def test_constant_acceleration_of_the_limit_is_one(self, axis):
+        time, a = constant((12.0, 9.0, 10.0)[axis] * G)
+        accel = np.zeros((time.size, 3))
+        accel[:, axis] = -a
+        for average in ("mean_50ms", "butterworth_13hz"):
+            # The filter's own transients at the ends die out within the padding.
+            found = asi(time, accel, average=average)
+            assert found.value == pytest.approx(1.0, rel=1e-6)
+
+    def test_short_rectangle_over_the_window(self):
+        time = np.array([-0.1, 0.0, 1e-12, 0.02, 0.02 + 1e-12, 0.2])
+        a = np.array([0.0, 0.0, 24.0, 24.0, 0.0, 0.0]) * G
+        found = asi(time, plane(-a), average="mean_50ms")
+        assert found.value == pytest.approx(2.0 * 0.02 / 0.05, rel=1e-9)
+
+    def test_haversine_by_the_mean(self):
+        time, a = haversine()
+        w = 0.05
+        mean = DELTA * (w / LENGTH + math.sin(math.pi * w / LENGTH) / math.pi) / w
+        found = asi(time, plane(-a), average="mean_50ms")
+        assert found.value == pytest.approx(mean / (12 * G), rel=TRAPEZOID)
+        assert found.at == pytest.approx(LENGTH / 2, abs=STEP)
+
+    def test_filter_at_its_frequency(self):
+        # A whole filter is 3 dB down at its cut-off, and two passes of it 6 dB; no phase.
+        time = np.arange(-20000, 20001) * STEP
+        wave = np.cos(2 * np.pi * 13.0 * time)
+        for cutoff, gain in (("whole", math.sqrt(0.5)), ("pass", 0.5)):
+            out = four_pole(time, wave, 13.0, cutoff)
+            middle = np.abs(time) < 0.5
+            # The warping of the bilinear transform, (π 16/10⁴)² / 3 = 8e-6 of the frequency.
+            np.testing.assert_allclose(out[middle], gain * wave[middle], atol=2e-5)
+
+    def test_filter_on_a_long_haversine_is_near_the_mean_of_the_older_edition(self):
+        time, a = haversine()
+        old = asi(time, plane(-a), average="mean_50ms").value
+        new = asi(time, plane(-a)).value
+        both = asi(time, plane(-a), cutoff="pass").value
+        assert both < new
+        # To second order a mean over w takes w²/24 of the curvature; the two passes, in series
+        # 1/(1 + (f/fc)^4), none. A spectrum within 10 Hz keeps them within a fifth.
+        assert abs(both - old) < 0.2 * old
+
+    def test_options_and_steps_are_checked(self):
+        time, a = constant(10.0)
+        with pytest.raises(ConfigError, match="no average"):
+            asi(time, plane(a), average="mean")
+        with pytest.raises(ConfigError, match="no kind of cut-off"):
+            asi(time, plane(a), cutoff="half")
+        with pytest.raises(DataError, match="ten times"):
+            asi(np.arange(10) * 0.01, np.zeros((10, 3)))
+        uneven = np.delete(time, 7)
+        with pytest.raises(DataError, match="resample"):
+            asi(uneven, plane(a[1:]))
+
+
+class TestThiv:
+    @pytest.mark.parametrize(
+        ("x", "y", "surface", "way"),
+        [(-100.0, 0.0, "front", 0.6), (0.0, 80.0, "left", 0.3), (0.0, -80.0, "right", 0.3)],
+    )
+    def test_constant_acceleration(self, x, y, surface, way):
+        time, one = constant(1.0)
+        found = thiv(time, plane(x * one, y * one))
+        size = abs(x + y)
+        assert found.surface == surface
+        assert found.time_of_flight == pytest.approx(math.sqrt(2 * way / size), rel=EXACT)
+        assert found.velocity == pytest.approx(math.sqrt(2 * way * size), rel=EXACT)
+        assert found.phd_g == pytest.approx(size / G, rel=EXACT)
+
+    def test_haversine(self):
+        time, a = haversine()
+        found = thiv(time, plane(-a))
+        at = brentq(lambda t: ahead(t) - 0.6, 0.01, 0.4, xtol=1e-15)
+        assert found.time_of_flight == pytest.approx(at, rel=TRAPEZOID)
+        assert found.velocity == pytest.approx(lost(at), rel=TRAPEZOID)
+
+    def test_vehicle_that_turns_about_its_point(self):
+        # The head rests; in the vehicle it runs round the point with the rate times its distance.
+        time, one = constant(1.0)
+        found = thiv(time, plane(0 * one), 3.0 * one, head=(0.8, 0.0))
+        assert found.surface == "left"
+        assert found.velocity == pytest.approx(2.4, rel=1e-10)
+        # The place between samples is a cubic: h⁴ w⁴ / 384 is far below.
+        assert found.time_of_flight == pytest.approx(math.asin(0.3 / 0.8) / 3.0, rel=1e-10)
+
+    def test_braked_in_a_fixed_direction_while_it_turns(self):
+        time, one = constant(1.0)
+        rate, brake = 2.0, 90.0
+        yaw = rate * time
+        accel = plane(-brake * np.cos(yaw), brake * np.sin(yaw))
+        found = thiv(time, accel, rate * one)
+        at = brentq(lambda t: math.cos(rate * t) * brake * t * t / 2 - 0.6, 0.01, 0.3)
+        c, s = math.cos(rate * at), math.sin(rate * at)
+        vx = c * brake * at - rate * s * brake * at**2 / 2
+        vy = -s * brake * at - rate * c * brake * at**2 / 2
+        # The ground acceleration is constant and only rounded by the turn there and back.
+        assert found.surface == "front"
+        assert found.time_of_flight == pytest.approx(at, rel=1e-9)
+        assert found.velocity == pytest.approx(math.hypot(vx, vy), rel=1e-9)
+
+    def test_start_within_the_record_leaves_out_what_was_before(self):
+        time, one = constant(1.0)
+        found = thiv(time, plane(-100.0 * one), start=0.05005)
+        assert found.velocity == pytest.approx(math.sqrt(120.0), rel=EXACT)
+
+    def test_filtered_deceleration(self):
+        time, one = constant(1.0, 1.0)
+        found = thiv(time, plane(-100.0 * one), phd_average="butterworth_10hz")
+        assert found.phd_g == pytest.approx(100.0 / G, rel=1e-6)
+
+    def test_weak_impact_has_no_value(self):
+        time, one = constant(1.0)
+        found = thiv(time, plane(-1.0 * one))
+        assert found.velocity is None
+        assert found.largest == pytest.approx(0.4, rel=1e-12)
+        assert "meets nothing" in found.findings[0].what
+
+    def test_record_that_ends_with_the_impact_has_no_deceleration(self):
+        time, one = constant(1.0, 0.112)
+        found = thiv(time, plane(-100.0 * one))
+        assert found.velocity is not None
+        assert found.phd_g is None
+        assert "ends less than 10 ms" in found.findings[0].what
+
+    def test_bad_input(self):
+        time, one = constant(1.0)
+        with pytest.raises(DataError, match="needed"):
+            thiv(time, one)
+        with pytest.raises(DataError, match="not within the record"):
+            thiv(time, plane(one), start=7.0)
+        with pytest.raises(ConfigError, match="no way to fly"):
+            thiv(time, plane(one), forward=0.0)
+        with pytest.raises(ConfigError, match="no average"):
+            thiv(time, plane(one), phd_average="10")
+        holed = one.copy()
+        holed[9] = np.nan
+        with pytest.raises(DataError, match="sample 10"):
+            thiv(time, plane(holed))
+
+
+class TestOlc:
+    def test_constant_deceleration(self):
+        # t1² = 0.13/A, and A t2 t1/2 - 0.065 = 0.235 gives t2/t1 = 0.6/0.13.
+        time, a = constant(-250.0)
+        found = olc(time, a)
+        ratio = 0.6 / 0.13
+        assert found.restraint_from == pytest.approx(math.sqrt(0.13 / 250.0), rel=EXACT)
+        assert found.restraint_to == pytest.approx(math.sqrt(0.13 / 250.0) * ratio, rel=EXACT)
+        assert found.value_g == pytest.approx(250.0 / G * ratio / (ratio - 1), rel=EXACT)
+
+    def test_haversine(self):
+        time, a = haversine()
+        found = olc(time, -a)
+        begin = brentq(lambda t: ahead(t) - 0.065, 1e-3, 0.4, xtol=1e-15)
+        end = brentq(lambda t: ahead(t) - lost(t) * (t - begin) / 2 - 0.3, begin, 0.4, xtol=1e-15)
+        assert found.value_g == pytest.approx(lost(end) / (end - begin) / G, rel=2 * TRAPEZOID)
+
+    def test_stop_at_once_is_two_times_that_of_its_energy(self):
+        # A vehicle that stops at once: t1 = 0.065/V, and the occupant stops within 0.235 m.
+        time = np.array([0.0, 1e-9, 2e-9, 0.1, 0.2])
+        speed = 15.0
+        a = np.array([0.0, -speed / 1e-9, 0.0, 0.0, 0.0])
+        # The nanosecond of the stop is 1.5e-8 m of way.
+        assert olc(time, a).value_g == pytest.approx(speed**2 / (2 * 0.235) / G, rel=1e-6)
+
+    def test_weak_and_rear_impacts_have_no_value(self):
+        time, a = constant(-0.5)
+        weak = olc(time, a)
+        assert (weak.value_g, weak.restraint_from) == (None, None)
+        assert "not by 0.065 m" in weak.findings[0].what
+        between = olc(*constant(-2.0))
+        assert between.restraint_from is not None
+        assert "not by 0.3 m" in between.findings[0].what
+        assert olc(*constant(100.0)).value_g is None
+
+    def test_ways_are_checked(self):
+        with pytest.raises(ConfigError, match="ways of"):
+            olc(*constant(-100.0), free=0.3, whole=0.3)
+
+
+class TestFlailSpace:
+    def test_constant_acceleration(self):
+        time, one = constant(1.0)
+        found = flail_space(time, plane(-100.0 * one, 20.0 * one))
+        at = math.sqrt(1.2 / 100.0)
+        assert found.at == pytest.approx(at, rel=EXACT)
+        assert (found.oiv_x, found.oiv_y) == pytest.approx((100.0 * at, -20.0 * at), rel=EXACT)
+        assert (found.ora_x_g, found.ora_y_g) == pytest.approx((-100.0 / G, 20.0 / G), rel=EXACT)
+
+    def test_haversine_and_the_thiv_of_a_straight_impact(self):
+        time, a = haversine()
+        found = flail_space(time, plane(-a))
+        at = brentq(lambda t: ahead(t) - 0.6, 0.01, 0.4, xtol=1e-15)
+        assert found.oiv_x == pytest.approx(lost(at), rel=TRAPEZOID)
+        assert found.oiv_x == pytest.approx(thiv(time, plane(-a)).velocity, rel=EXACT)
+        w = 0.01
+        starts = np.linspace(at, 0.3, 20001)
+        mean = max(abs(lost(s + w) - lost(s)) / w for s in starts)
+        # The greatest mean begins at the impact, as the pulse is past its top.
+        assert abs(found.ora_x_g) * G == pytest.approx(mean, rel=1e-3)
+
+    def test_rear_impact(self):
+        time, one = constant(1.0)
+        found = flail_space(time, plane(100.0 * one))
+        assert found.oiv_x == pytest.approx(-math.sqrt(120.0), rel=EXACT)
+
+    def test_nothing_met_gives_the_change_of_velocity(self):
+        time, one = constant(1.0)
+        found = flail_space(time, plane(-2.0 * one))
+        assert found.at is None
+        assert found.oiv_x == pytest.approx(0.8, rel=1e-12)
+        assert "greatest change" in found.findings[0].what
+        with pytest.raises(ConfigError, match="no space"):
+            flail_space(time, plane(one), sideways=-0.3)
+
+
+class TestHic:
+    def test_constant_acceleration(self):
+        time, a = constant(50.0 * G, 0.1)
+        for longest in (0.015, 0.036):
+            found = hic(time, plane(-a), longest=longest)
+            assert found.value == pytest.approx(longest * 50.0**2.5, rel=1e-9)
+            assert found.end - found.begin == pytest.approx(longest, rel=1e-9)
+
+    def test_haversine_against_a_continuous_maximisation(self):
+        time, a = haversine()
+
+        def short(ends):
+            b, e = sorted(ends)
+            return -(e - b) * ((lost(e) - lost(b)) / ((e - b) * G)) ** 2.5
+
+        best = minimize(short, [0.03, 0.07], method="Nelder-Mead", options={"xatol": 1e-9})
+        # At the greatest the ends may be off by half a step without first-order loss: the
+        # share lost is of the order of (h/T)² times 2.5·1.5·π², 4e-5.
+        found = hic(time, plane(a), longest=0.1)
+        assert found.value == pytest.approx(-best.fun, rel=5e-5)
+        assert found.value <= -best.fun * (1 + TRAPEZOID)
+
+    def test_window_is_checked(self):
+        with pytest.raises(ConfigError, match="no length"):
+            hic(*constant(1.0), longest=0.0)
