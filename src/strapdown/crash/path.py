@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from strapdown import frames, rotation
 from strapdown._kernels.ned import ALT, LAT, LON, Q, V
-from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
 from strapdown.crash.sample_effects import SampleEffects
@@ -245,17 +243,10 @@ def _carried(
             remedy="give the entry speed with its standard deviation, or a record that begins "
             "with the vehicle at rest",
         )
-    names = ["levelling north", "levelling east"]
-    tilt = math.radians(levelling.sd_deg)
     still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))
-    padded = _padded(effects, 2)
-    leg = make_leg(mechanization, begin, imu, padded, slice(at, anchor + 1), backward=False)
-    start = np.zeros((len(effects.names) + 2, 9))
-    # The length of what is felt at rest, whatever the place's gravity is taken to be.
-    felt = effects.rest_force @ rotation.dcm_from_quaternion(begin.q_nb).T / GRAVITY
-    start[:-2, 0], start[:-2, 1] = -felt[:, 1], felt[:, 0]
-    start[-2, 0] = start[-1, 1] = tilt
+    leg = make_leg(mechanization, begin, imu, effects, slice(at, anchor + 1), backward=False)
+    start = np.concatenate([effects.tilt, np.zeros((len(effects.names), 6))], axis=1)
     errors = leg.errors(start)[:, -1]
     noise = leg.noise_covariance()[-1]
     heading = float(rotation.euler_from_quaternion(leg.nominal[-1, Q : Q + 4])[2])
@@ -274,9 +265,6 @@ def _carried(
     values, vectors = np.linalg.eigh(noise)
     columns = (vectors * np.sqrt(np.maximum(values, 0.0))).T
     columns = columns[values > 1e-12 * max(values[-1], 1e-300)]
-    keep = errors[-2:].any(axis=1)
-    names = [name for name, k in zip(names, keep, strict=True) if k]
-    errors = np.concatenate([errors[:-2], errors[-2:][keep], columns])
     q_nb = rotation.compose(rotation.quaternion_from_dcm(turn), leg.nominal[-1, Q : Q + 4])
     state = NavState(
         time=float(time[anchor]),
@@ -288,9 +276,9 @@ def _carried(
     )
     return _Begin(
         state,
-        (*names, *(f"noise before the entry {k + 1}" for k in range(len(columns)))),
-        (*("levelling" for _ in names), *("sensor noise" for _ in columns)),
-        errors,
+        tuple(f"noise before the entry {k + 1}" for k in range(len(columns))),
+        tuple("sensor noise" for _ in columns),
+        np.concatenate([errors, columns]),
     )
 
 

@@ -8,10 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.exceptions import DataError
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.lever_arm import angular_acceleration
-from strapdown.sensors.prepared_unit import PreparedUnit
+from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -36,7 +38,10 @@ class SampleEffects:
     rate : ndarray, (p, n, 3), rad/s
         Added to the rate of the vehicle.
     rest_force : ndarray, (p, 3), m/s²
-        Added to the mean of the specific force from which the vehicle was levelled.
+        Added to the mean of the specific force at rest.
+    tilt : ndarray, (p, 3), rad
+        Rotation vector by which it turns the attitude that the vehicle was levelled at, in local
+        level with forward as north.
     force_noise : ndarray, (n, 3), m/s²
         Standard deviation of what is independent from sample to sample.
     rate_noise : ndarray, (n, 3), rad/s
@@ -47,6 +52,7 @@ class SampleEffects:
     force: Array
     rate: Array
     rest_force: Array
+    tilt: Array
     force_noise: Array
     rate_noise: Array
 
@@ -113,6 +119,9 @@ class _UnitEffects:
         self.forces: list[Array] = []
         self.rates: list[Array] = []
         self.rests: list[Array] = []
+        self.tilts: list[Array] = []
+        level = prepared.levelling
+        self.level = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0])
 
     def collect(self) -> SampleEffects:
         for number in range(len(self.prepared.unit.accelerometers)):
@@ -120,6 +129,7 @@ class _UnitEffects:
         self._gyro()
         self._mounting()
         self._timing()
+        self._levelling()
         count, n = len(self.names), len(self.time)
         return SampleEffects(
             tuple(self.names),
@@ -127,6 +137,7 @@ class _UnitEffects:
             np.array(self.forces).reshape(count, n, 3),
             np.array(self.rates).reshape(count, n, 3),
             np.array(self.rests).reshape(count, 3),
+            np.array(self.tilts).reshape(count, 3),
             # Axes of the vehicle see what those of the sensors have, by the squares.
             np.sqrt(self.prepared.noise**2 @ (self.turn.T**2)),
             np.sqrt(self.prepared.gyro_noise**2 @ (self.turn.T**2)),
@@ -140,6 +151,7 @@ class _UnitEffects:
         rate: Array | None,
         rest: Array,
         owner: str = "",
+        tilt: Array | None = None,
     ) -> None:
         n = len(self.time)
         moved = np.zeros((n, 3)) if force is None else force
@@ -157,6 +169,14 @@ class _UnitEffects:
         self.forces.append(moved)
         self.rates.append(np.zeros((n, 3)) if rate is None else rate)
         self.rests.append(rest)
+        self.tilts.append(self._tilted(rest) if tilt is None else tilt)
+
+    def _tilted(self, rest: Array) -> Array:
+        """Turn of the level by what was added to the force that it was found from."""
+        if not self.prepared.levelling.from_rest:
+            return np.zeros(3)
+        north, east, _ = self.level @ rest / GRAVITY
+        return np.array([-east, north, 0.0])
 
     def _through_arm(self, rate: Array) -> Array:
         own = np.cross(rate, np.cross(self.rate, self.arm))
@@ -204,16 +224,16 @@ class _UnitEffects:
         constant: bool,
     ) -> None:
         at_rest = float(effect(self.rest_felt[None, :])[0]) if self.has_rest or constant else 0.0
-        calibrated = self.prepared.bias_from[number] is not None
+        source = self.prepared.bias_from[number]
+        calibrated = source is not None and source != FROM_GRAVITY
         one = np.zeros(len(self.time))
         here = spoke[:, axis]
         one[here] = effect(self.felt)[here]
         if calibrated and not constant:
             one[here] -= at_rest
-        one[heirs[:, axis]] = at_rest
+        one[heirs[:, axis]] = 0.0 if calibrated and not constant else at_rest
         direction = self.turn[:, axis]
-        rests = not calibrated and self.has_rest and self.prepared.levelling.from_rest
-        rest = at_rest * direction if rests else np.zeros(3)
+        rest = at_rest * direction if not calibrated and self.has_rest else np.zeros(3)
         triad = self.prepared.unit.accelerometers[number]
         label = f"{triad.name} {name}"
         if "→" not in name:
@@ -282,17 +302,19 @@ class _UnitEffects:
     def _mounting(self) -> None:
         mounting = self.prepared.unit.mounting
         angle = np.radians(mounting.angles_sd_deg)
-        levelled = self.has_rest and self.prepared.levelling.from_rest
-        rest = self.turn @ self.rest_felt if levelled else np.zeros(3)
+        rest = self.turn @ self.rest_felt if self.has_rest else np.zeros(3)
         for axis in range(3):
             unit = np.eye(3)[axis]
             if angle > 0.0:
+                felt, left = self.force, rest
+                if self.prepared.bias_from[0] == FROM_GRAVITY:
+                    felt, left = self.force - rest, np.zeros(3)
                 self._add(
                     f"mounting {('roll', 'pitch', 'heading')[axis]}",
                     "mounting",
-                    angle * np.cross(unit, self.force),
+                    angle * np.cross(unit, felt),
                     angle * np.cross(unit, self.rate),
-                    angle * np.cross(unit, rest),
+                    angle * np.cross(unit, left),
                 )
             if mounting.position_sd > 0.0:
                 # The sensor sits further along the axis, so that the arm is shorter there.
@@ -300,6 +322,25 @@ class _UnitEffects:
                 alpha = angular_acceleration(self.time, self.rate)
                 force = np.cross(alpha, arm) + np.cross(self.rate, np.cross(self.rate, arm))
                 self._add(f"lever arm {AXES[axis]}", "lever arm", force, None, np.zeros(3))
+
+    def _levelling(self) -> None:
+        sd = np.radians(self.prepared.levelling.sd_deg)
+        n = len(self.time)
+        for axis, name in enumerate(("north", "east")):
+            tilt = sd * np.eye(3)[axis]
+            # Where a bias was taken from gravity in a stated attitude, it is wrong with it.
+            shift = np.zeros(3)
+            if self.prepared.bias_from[0] == FROM_GRAVITY:
+                shift = -self.level.T @ np.cross(tilt, [0.0, 0.0, -GRAVITY])
+            if sd > 0.0:
+                force = np.tile(shift, (n, 1))
+                self._add(f"levelling {name}", "levelling", force, None, shift, tilt=tilt)
+        steady = self.prepared.rest_accel_sd
+        if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
+            for axis in range(3):
+                force = np.tile(steady * np.eye(3)[axis], (n, 1))
+                name = f"steady acceleration {AXES[axis]}"
+                self._add(name, "accelerometer bias", force, None, np.zeros(3))
 
     def _timing(self) -> None:
         if self.time_sd > 0.0:
@@ -361,6 +402,7 @@ def combine_effects(parts: Sequence[SampleEffects], weights: Sequence[float]) ->
     force: dict[str, Array] = {}
     rate: dict[str, Array] = {}
     rest: dict[str, Array] = {}
+    tilt: dict[str, Array] = {}
     contributors: dict[str, str] = {}
     for weight, part in zip(weights, parts, strict=True):
         for k, name in enumerate(part.names):
@@ -368,6 +410,7 @@ def combine_effects(parts: Sequence[SampleEffects], weights: Sequence[float]) ->
             force[name] = force.get(name, 0.0) + weight * part.force[k]
             rate[name] = rate.get(name, 0.0) + weight * part.rate[k]
             rest[name] = rest.get(name, 0.0) + weight * part.rest_force[k]
+            tilt[name] = tilt.get(name, 0.0) + weight * part.tilt[k]
     count, rows = len(force), parts[0].force.shape[1:]
     squares = [float(weight) ** 2 for weight in weights]
     return SampleEffects(
@@ -376,6 +419,7 @@ def combine_effects(parts: Sequence[SampleEffects], weights: Sequence[float]) ->
         np.array(list(force.values())).reshape(count, *rows),
         np.array(list(rate.values())).reshape(count, *rows),
         np.array(list(rest.values())).reshape(count, 3),
+        np.array(list(tilt.values())).reshape(count, 3),
         np.sqrt(sum(k * p.force_noise**2 for k, p in zip(squares, parts, strict=True))),
         np.sqrt(sum(k * p.rate_noise**2 for k, p in zip(squares, parts, strict=True))),
     )

@@ -1,0 +1,270 @@
+"""The path of a crash: exact samples give the truth, and small errors grow as they should."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from strapdown import rotation
+from strapdown._kernels.perturbed_runs import perturbed_runs
+from strapdown.crash.entry import Entry
+from strapdown.crash.leg import PLACE, VELOCITY
+from strapdown.crash.monte_carlo import sample_paths
+from strapdown.crash.path import reconstruct_path
+from strapdown.crash.sample_effects import combine_effects, unit_effects
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.crash_unit import Mounting
+from strapdown.sensors.prepared_unit import Levelling
+from strapdown.simulation import ImuErrors, simulate_imu
+from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
+from strapdown.simulation.earth_motion import Origin
+from strapdown.tables import ACCEL, GYRO, NED
+from tests.unit.crash.crash_case import RATE, prepared
+
+IMPACT = 2.0
+LENGTH = 0.113
+CHANGE = (-7.2, -0.9, 0.3)
+TURN = (4.0, -6.0, 87.0)
+WINDOW = (-0.1, 0.75)
+
+
+def crash(velocity=(7.1, 0.0, 0.0), *, rate=RATE, change=CHANGE, turn=TURN):
+    """A vehicle at constant velocity that is struck at time zero, and exact samples of it."""
+    pulse = HaversinePulse(IMPACT, LENGTH, change, turn)
+    motion = CrashMotion(3.0, Origin(45.0, 0.0, 0.0), velocity, (pulse,))
+    imu, _ = simulate_imu(motion, ImuErrors(), rate=rate)
+    imu.index = imu.index - IMPACT
+    return motion, imu
+
+
+def truth(motion, time):
+    """Place from the impact on, m: closed form of the pulse, in the flat axes of the start.
+
+    In a second the level turns by 1e-6 rad, which moves nothing here by a micrometre.
+    """
+    x = np.clip(time / LENGTH, 0.0, 1.0)
+    after = np.maximum(time - LENGTH, 0.0)
+    gathered = LENGTH * (0.5 * x * x + (np.cos(2 * np.pi * x) - 1) / (4 * np.pi**2)) + after
+    return np.outer(time, motion.velocity) + np.outer(gathered, CHANGE)
+
+
+@pytest.fixture(scope="module")
+def case():
+    motion, imu = crash()
+    unit = prepared(imu)
+    effects = unit_effects(unit, (0.0, 0.0, 0.0), time_sd=5e-4)
+    entry = Entry.from_speed(7.1, 0.05, slip_sd_deg=1.0, climb_sd=0.02)
+    path = reconstruct_path(imu, effects, unit.levelling, -0.1, entry, window=WINDOW)
+    return motion, imu, unit, effects, entry, path
+
+
+def test_exact_samples_give_the_truth(case):
+    motion, _, _, _, _, path = case
+    error = path.table[NED].to_numpy() - truth(motion, path.time)
+    # The chord between two samples leaves out dt²/12 times the change of the slope of the force:
+    # of a haversine sin², whose slope returns to zero, nothing in the velocity after the pulse;
+    # within it up to dt²/12 · 2Δ/T · π/T = 0.7 mm/s for 0.1 s, and as much of the turn.
+    assert np.abs(error).max() < 2e-4
+    again = reconstruct_path(*_again(400.0), window=WINDOW)
+    finer = again.table[NED].to_numpy() - truth(motion, again.time)
+    assert np.abs(finer).max() < 0.4 * np.abs(error).max()
+
+
+def _again(rate):
+    _, imu = crash(rate=rate)
+    unit = prepared(imu)
+    return imu, unit_effects(unit, (0, 0, 0)), unit.levelling, -0.1, Entry.from_speed(7.1, 0.05)
+
+
+def test_backward_and_forward_meet(case):
+    _, imu, unit, effects, entry, path = case
+    # Tied to its own state 0.5 s later, the path is the same.
+    row = int(np.searchsorted(path.time, 0.5))
+    late = path.table.iloc[row]
+    other = reconstruct_path(
+        imu,
+        effects,
+        unit.levelling,
+        None,
+        Entry(
+            time=float(path.time[row]),
+            velocity=tuple(late[["VN", "VE", "VD"]]),
+            heading_deg=float(late["heading"]),
+            attitude_deg=(float(late["roll"]), float(late["pitch"])),
+        ),
+        window=WINDOW,
+    )
+    moved = path.table[NED].to_numpy() - path.table[NED].to_numpy()[row]
+    # The same increments met backward; rounding of a latitude is 1e-9 m, of an angle in degrees
+    # 1e-14 rad times 7 m/s.
+    assert np.abs(other.table[NED].to_numpy() - moved).max() < 1e-8
+
+
+def test_every_unknown_grows_as_navigation_does(case):
+    *_, path = case
+    small = 1e-3
+    largest = 0.0
+    for leg in path.legs:
+        unknowns = len(path.names)
+        start = path.start.copy()
+        sign = -1.0 if leg.backward else 1.0
+        start[:, VELOCITY] *= sign
+        steps = len(leg.rows)
+        out = np.empty((unknowns, steps + 1, 9))
+        whole = perturbed_runs(
+            leg.state,
+            leg.rows,
+            leg.nominal,
+            start,
+            leg.effects,
+            leg.effects.any(axis=2),
+            np.zeros((6, steps)),
+            small * np.eye(unknowns),
+            np.zeros((unknowns, 6, steps)),
+            leg.earth,
+            leg.options,
+            out,
+        )
+        assert whole == unknowns
+        out[..., VELOCITY] *= sign
+        linear = leg.errors(path.start)
+        scale = np.abs(linear).max(axis=(0, 1))
+        # One standard deviation is up to 0.02 rad, so that a thousandth of it is linear to 1e-5;
+        # a step turns by 0.01 rad, of which the half is left out of how an error of the rate
+        # turns the attitude: 0.5 % of the unknown's own effect, in gyro errors alone.
+        largest = max(largest, float((np.abs(out / small - linear) / scale).max()))
+    assert largest < 2e-3
+
+
+def test_an_error_is_truth_less_computed(case):
+    _, imu, unit, effects, entry, path = case
+    # A vehicle that really is rolled by 1 deg more than it was levelled to.
+    more = replace(unit.levelling, roll_deg=unit.levelling.roll_deg + 1.0)
+    other = reconstruct_path(imu, effects, more, -0.1, entry, window=WINDOW)
+    turned = rotation.rotation_vector_from_quaternion(
+        rotation.compose(other.q_nb[-1], rotation.conjugate(path.q_nb[-1]))
+    )
+    k = path.names.index("imu1 levelling north")
+    grown = path.errors[k, -1] * np.radians(1.0) / np.radians(unit.levelling.sd_deg)
+    # Second order of a degree: 1e-4 of the turn, which is 0.017.
+    assert np.allclose(turned, grown[:3], atol=3e-4)
+    moved = (other.table[NED] - path.table[NED]).to_numpy()[-1]
+    assert np.allclose(moved, grown[PLACE], atol=0.03 * np.abs(grown[PLACE]).max())
+
+
+def test_a_bias_does_not_show_while_the_vehicle_does_not_turn():
+    _, imu = crash(change=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0))
+    unit = prepared(imu)
+    effects = unit_effects(unit, (0, 0, 0))
+    path = reconstruct_path(imu, effects, unit.levelling, -0.1, Entry.from_speed(7.1, 0.0))
+    biased = [k for k, c in enumerate(path.contributors) if c == "accelerometer bias"]
+    # 0.2 m/s² over 0.75 s would be 56 mm; levelling hides it to gravity's difference from
+    # 9.80665 at 45 deg (1e-6) and to the Earth's rate.
+    assert np.abs(path.errors[biased][:, -1, PLACE]).max() < 1e-5
+    assert np.abs(path.errors[biased][:, -1, :2]).max() > 0.02
+
+
+def test_linear_covariance_and_monte_carlo_agree(case):
+    *_, path = case
+    runs = 4000
+    samples = sample_paths(path, runs=runs, seed=3)
+    ratio = np.diagonal(samples.covariance, axis1=1, axis2=2)[[0, -1]]
+    linear = np.diagonal(path.covariance, axis1=1, axis2=2)[[0, -1]]
+    # A variance from n runs scatters by sqrt(2/n) = 2.2 %; 18 of them, four deviations, and 2 %
+    # for the second order of tilts of a degree.
+    assert np.abs(ratio / linear - 1.0).max() < 4 * np.sqrt(2 / runs) + 0.02
+    cross = samples.covariance[-1][6:, 6:]
+    assert np.allclose(
+        cross, path.covariance[-1][6:, 6:], atol=0.12 * np.abs(path.covariance[-1][6:, 6:]).max()
+    )
+
+
+def test_monte_carlo_does_not_know_the_cores(case):
+    *_, path = case
+    one = sample_paths(path, runs=200, seed=5, workers=1)
+    three = sample_paths(path, runs=200, seed=5, workers=3)
+    more = sample_paths(path, runs=333, seed=5)
+    assert np.array_equal(one.errors, three.errors)
+    assert np.array_equal(one.errors, more.errors[:200])
+    assert not np.array_equal(one.errors, sample_paths(path, runs=200, seed=6).errors)
+    with pytest.raises(ConfigError, match="runs"):
+        sample_paths(path, runs=1)
+
+
+def test_noise_alone(case):
+    _, imu, unit, effects, _, _ = case
+    silent = replace(
+        effects,
+        names=(),
+        contributors=(),
+        force=effects.force[:0],
+        rate=effects.rate[:0],
+        rest_force=effects.rest_force[:0],
+        tilt=effects.tilt[:0],
+    )
+    level = replace(unit.levelling, sd_deg=0.0)
+    path = reconstruct_path(imu, silent, level, -0.1, Entry.from_speed(7.1, 0.0), window=WINDOW)
+    samples = sample_paths(path, runs=4000, seed=1)
+    have = np.diagonal(samples.covariance, axis1=1, axis2=2)[-1]
+    want = np.diagonal(path.covariance, axis1=1, axis2=2)[-1]
+    assert np.abs(have / want - 1.0).max() < 4 * np.sqrt(2 / 4000)
+
+
+def test_shares_add_up(case):
+    *_, path = case
+    total = path.variances().sum().to_numpy()
+    assert np.allclose(total, np.diagonal(path.covariance[-1]), rtol=1e-12)
+    assert path.variances()["north"].idxmax() == "scale factor"  # as theory says of the paper's
+
+
+def test_combining_a_unit_with_itself_changes_nothing(case):
+    _, _, _, effects, _, _ = case
+    twice = combine_effects([effects, effects], [0.5, 0.5])
+    assert twice.names == effects.names
+    assert np.allclose(twice.force, effects.force)
+    assert np.allclose(twice.force_noise, effects.force_noise / np.sqrt(2.0))
+
+
+def test_speed_from_standing_still():
+    pulses = (
+        HaversinePulse(1.0, 1.5, (5.0, 0.0, 0.0)),
+        HaversinePulse(3.0, LENGTH, CHANGE, TURN),
+    )
+    motion = CrashMotion(4.0, Origin(45.0, 0.0, 0.0), (0.0, 0.0, 0.0), pulses)
+    imu, _ = simulate_imu(motion, ImuErrors(), rate=RATE)
+    imu.index = imu.index - 3.0
+    unit = prepared(imu, mounting=Mounting())
+    unit = replace(unit, levelling=Levelling(0.0, 0.0, 0.0, True))
+    effects = unit_effects(unit, (0, 0, 0))
+    path = reconstruct_path(imu, effects, unit.levelling, -2.1, None, window=(0.0, 0.75))
+    assert path.entry.velocity[0] == pytest.approx(5.0, abs=1e-4)
+    # Scale of 1 % and tilt against bias: two metres per second squared for two seconds.
+    assert 0.02 < path.sd["VN"].iloc[0] < 0.3
+
+
+def test_what_cannot_be_is_told(case):
+    _, imu, unit, effects, entry, _ = case
+    with pytest.raises(DataError, match="not within the record"):
+        reconstruct_path(imu, effects, unit.levelling, -0.1, entry, window=(-0.1, 5.0))
+    with pytest.raises(DataError, match="nothing says how fast"):
+        reconstruct_path(imu, effects, unit.levelling, None, None, window=WINDOW)
+    with pytest.raises(DataError, match="after the entry"):
+        reconstruct_path(imu, effects, unit.levelling, 0.1, entry, window=WINDOW)
+    with pytest.raises(ConfigError, match="km/h"):
+        Entry.from_speed(200.0, 1.0)
+    with pytest.raises(ConfigError, match="speed_sd"):
+        Entry.from_speed(20.0, -1.0)
+    with pytest.raises(ConfigError, match="eigenvalue"):
+        Entry.from_covariance(0.0, (7, 0, 0), (0, 0, 0), -np.eye(6))
+    assert imu[[*GYRO, *ACCEL]].notna().all().all()
+
+
+def test_an_entry_by_covariance_is_one_by_speed():
+    speed = Entry.from_speed(7.1, 0.05, slip_sd_deg=1.0, climb_sd=0.02, heading_sd_deg=0.5)
+    columns = np.array([u[2] for u in speed.unknowns])[:, :6]
+    joint = columns.T @ columns
+    other = Entry.from_covariance(0.0, speed.velocity, (0, 0, 0), joint)
+    again = np.array([u[2] for u in other.unknowns])[:, :6]
+    assert np.allclose(again.T @ again, joint, atol=1e-15)
