@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.lag_correlation import lag_correlation, repeats, top_peaks
 from strapdown.exceptions import DataError
 from strapdown.increments import increments_from_imu
 from strapdown.tables import GYRO, THETA, find_gaps
@@ -173,14 +174,16 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
                 quantity="gyro",
                 remedy="turn both sensors together about two axes or more, not at a steady beat",
             )
-    lags, score = _length_correlation(a, b, min(LEAST_OVERLAP, 0.5 * _shorter(a, b)))
+    x, y = (np.sqrt((g.rate**2).sum(axis=1)) for g in (a, b))
+    least = min(LEAST_OVERLAP, 0.5 * _shorter(a, b)) / step
+    lags, score = lag_correlation(x, y, a.known, b.known, least)
     if not score.size:
         raise DataError(
             f"they share less than {LEAST_OVERLAP:g} s however they are laid",
             quantity="time",
             remedy="use logs that both cover the motion",
         )
-    weighed = [(_vector_share(a, b, lag), lag) for lag in _peaks(lags, score)]
+    weighed = [(_vector_share(a, b, lag), lag) for lag in lags[top_peaks(score, PEAKS)].astype(int)]
     best, at = max(weighed, default=(0.0, 0))
     # What is within half a second is the same peak.
     apart = int(np.ceil(0.5 / step))
@@ -193,8 +196,7 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
             quantity="gyro",
             remedy="check that both sensors sat on one rigid body, and the units and the window",
         )
-    # Twice the best misfit, and a hundredth of the whole, is no clear winner.
-    if 1.0 - found.runner_up < 2.0 * (1.0 - best) + 0.01:
+    if repeats(best, found.runner_up):
         other = next(lag for share, lag in weighed if share == found.runner_up)
         raise DataError(
             f"offsets of {found.offset:.2f} and {b.start - a.start - other * step:.2f} s do "
@@ -207,35 +209,6 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
 
 def _shorter(a: EvenRates, b: EvenRates) -> float:
     return min(len(a.rate) * a.step, len(b.rate) * b.step)
-
-
-def _length_correlation(a: EvenRates, b: EvenRates, overlap: float) -> tuple[Array, Array]:
-    """Correlation coefficient of the lengths for each lag: cell k of b lies at k + lag of a."""
-    from scipy.signal import correlate
-
-    x, y = (np.where(g.known, np.sqrt((g.rate**2).sum(axis=1)), 0.0) for g in (a, b))
-    m, w = a.known.astype(np.float64), b.known.astype(np.float64)
-
-    def slide(p: Array, q: Array) -> Array:
-        return np.asarray(correlate(p, q, mode="full", method="fft"))
-
-    count = np.maximum(np.round(slide(m, w)), 1.0)
-    sum_x, sum_y = slide(x, w), slide(m, y)
-    cross = slide(x, y) - sum_x * sum_y / count
-    var_x = slide(x * x, w) - sum_x**2 / count
-    var_y = slide(m, y * y) - sum_y**2 / count
-    lags = np.arange(-(len(y) - 1), len(x), dtype=np.float64)
-    # A stretch that is nearly still correlates by its noise.
-    floor = 1e-3 * min(float(x.var()) * len(x), float(y.var()) * len(y))
-    good = (count * a.step >= overlap) & (var_x > floor) & (var_y > floor)
-    return lags[good], cross[good] / np.sqrt(var_x[good] * var_y[good])
-
-
-def _peaks(lags: Array, score: Array) -> list[int]:
-    inner = np.r_[-np.inf, score, -np.inf]
-    top = np.flatnonzero((inner[1:-1] >= inner[:-2]) & (inner[1:-1] >= inner[2:]))
-    order = top[np.argsort(score[top])[::-1][:PEAKS]]
-    return [int(lags[k]) for k in order if score[k] > 0.0]
 
 
 def _vector_share(a: EvenRates, b: EvenRates, lag: int) -> float:

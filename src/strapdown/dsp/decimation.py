@@ -1,0 +1,329 @@
+"""To a lower rate without aliasing: a linear-phase low-pass read at the stamps, or true means."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.dsp.local_weights import LocalWeights, mirrored
+from strapdown.dsp.samples import as_channels, positive_step
+from strapdown.exceptions import ConfigError, DataError
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+__all__ = ["LowPassDesign", "Resampled", "decimate", "low_pass_design", "mean_samples"]
+
+# Kaiser's length formula is fitted, and a gain of exactly 1 at zero shifts the passband's ripple to
+# one side; so much in reserve keeps what is stated.
+MARGIN = 5.0  # dB
+# Numbers in one block of weights: 16 MB.
+BLOCK = 2_000_000
+# Stamps off the record by rounding alone.
+SLACK = 1e-6  # steps
+
+
+@dataclass(frozen=True, eq=False)
+class Resampled:
+    """Channels at other stamps.
+
+    Attributes
+    ----------
+    values : ndarray, (m, k)
+    noise_factor : ndarray, (m,)
+        Standard deviation of each output per that of white noise of the samples, exact.
+    whole : ndarray of bool, (m,)
+        False where an end of the record was continued to make the output.
+    touched : ndarray of bool, (m, k)
+        Whether a marked sample counts in the output.
+    """
+
+    values: Array
+    noise_factor: Array
+    whole: Flags
+    touched: Flags
+
+
+@dataclass(frozen=True)
+class LowPassDesign:
+    """A windowed sine cardinal that is symmetric about each output stamp.
+
+    Attributes
+    ----------
+    passband, stopband : float, Hz
+        Up to `passband` the gain is 1, and from `stopband` on 0, both to `ripple`.
+    attenuation : float, dB
+        Of the stopband.
+    reach : float, s
+        Half the length of the kernel.
+    beta : float
+        Of Kaiser's window.
+    """
+
+    passband: float
+    stopband: float
+    attenuation: float
+    reach: float
+    beta: float
+
+    @property
+    def ripple(self) -> float:
+        """Most by which the gain is off, in both bands."""
+        return math.pow(10.0, -self.attenuation / 20.0)
+
+    def kernel(self, u: Array) -> Array:
+        """Weight, not normalised, of what lies `u` seconds from the stamp."""
+        cutoff = 0.5 * (self.passband + self.stopband)
+        inside = np.clip(1.0 - (u / self.reach) ** 2, 0.0, None)
+        window = np.i0(self.beta * np.sqrt(inside)) * (np.abs(u) <= self.reach)
+        return np.asarray(np.sinc(2.0 * cutoff * u) * window)
+
+    def response(self, frequency: ArrayLike, step: float) -> Array:
+        """Gain at frequencies in Hz, for samples of a step in s and stamps that lie on samples."""
+        half = int(self.reach / step)
+        u: Array = step * np.arange(-half, half + 1, dtype=np.float64)
+        weight = self.kernel(u)
+        f = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+        return np.asarray(np.cos(2.0 * np.pi * np.outer(f, u)) @ weight / weight.sum())
+
+
+def low_pass_design(
+    step: float, rate: float, *, passband: float = 0.5, attenuation: float = 80.0
+) -> LowPassDesign:
+    """Design the low-pass before a lower rate.
+
+    Parameters
+    ----------
+    step : float, s
+        Of the samples.
+    rate : float, Hz
+        Of the output; its Nyquist frequency is where the stopband begins.
+    passband : float
+        Its end, as a part of that Nyquist frequency. The kernel's length grows as
+        ``1/(1 - passband)``: at 0.5 and 80 dB it reaches 10.9 output steps to either side.
+    attenuation : float, dB
+        40 to 150.
+
+    Returns
+    -------
+    LowPassDesign
+        By Kaiser (1974): Oppenheim & Schafer, Discrete-Time Signal Processing, 3rd edition,
+        Eqs. (7.75) and (7.76), with five decibels in reserve.
+
+    Raises
+    ------
+    ConfigError
+        An option is out of its range, or the output is not slower than the samples.
+    """
+    step = positive_step(step)
+    if not (math.isfinite(rate) and 0.0 < rate <= (1.0 + 1e-9) / step):
+        raise ConfigError(
+            f"from {1.0 / step:g} Hz there is no decimating to {rate:g} Hz",
+            quantity="rate",
+            remedy="give a positive rate below that of the samples, or interpolate",
+        )
+    if not 0.0 < passband < 1.0:
+        raise ConfigError(
+            f"{passband:g} is no part of the output's Nyquist frequency",
+            quantity="passband",
+            remedy="give a number between 0 and 1, as 0.5",
+        )
+    if not 40.0 <= attenuation <= 150.0:
+        raise ConfigError(
+            f"{attenuation:g} dB are out of reach of a double or hardly a filter",
+            quantity="attenuation",
+            remedy="give 40 to 150 dB, as 80",
+        )
+    from scipy.signal import kaiser_beta
+
+    stop = 0.5 * rate
+    depth = attenuation + MARGIN
+    order = (depth - 7.95) / (2.285 * 2.0 * math.pi * stop * (1.0 - passband) * step)
+    return LowPassDesign(
+        passband * stop, stop, attenuation, 0.5 * order * step, float(kaiser_beta(depth))
+    )
+
+
+def decimate(
+    values: ArrayLike,
+    start: float,
+    step: float,
+    stamps: ArrayLike,
+    design: LowPassDesign,
+    marked: Flags | None = None,
+) -> Resampled:
+    """Bring evenly spaced samples onto stamps, past a low-pass of zero delay.
+
+    Parameters
+    ----------
+    values : array_like, (n,) or (n, k)
+    start, step : float, s
+        Stamp of the first sample, and their distance.
+    stamps : array_like, (m,), s
+        Anywhere in the record; any ratio of rates, no even grid needed.
+    design : LowPassDesign
+        As by `low_pass_design`.
+    marked : ndarray of bool, (n, k), optional
+        Samples whose part in the outputs is to be told.
+
+    Returns
+    -------
+    Resampled
+        Each output is a sum of samples with the kernel centred at its stamp, so that there is no
+        delay to compensate, and of weights that sum to 1. Within `reach` of the ends the record
+        is continued by its point mirror: constants and straight lines pass as they are.
+
+    Raises
+    ------
+    DataError
+        A sample or stamp is not finite, a stamp lies outside the record, or the record is shorter
+        than the reach of the kernel.
+    """
+    channels, at = as_channels(values), as_channels(stamps, "stamps")[:, 0]
+    step = positive_step(step)
+    n = len(channels)
+    _check_within(at, start, start + (n - 1) * step, step)
+    half = math.ceil(design.reach / step) + 1
+    if half > n - 1:
+        raise DataError(
+            f"the low-pass reaches {design.reach:.4g} s to either side, and the record is "
+            f"{(n - 1) * step:.4g} s long",
+            quantity="values",
+            remedy="use a longer record, a lower attenuation, a narrower passband, or means over "
+            "the output's step",
+        )
+    place = (at - start) / step
+
+    def weigh(rows: slice) -> tuple[LocalWeights, Flags]:
+        first = np.round(place[rows]).astype(np.int64) - half
+        u = step * (first[:, None] + np.arange(2 * half + 1) - place[rows, None])
+        weights = design.kernel(u)
+        weights /= weights.sum(axis=1, keepdims=True)
+        reached = np.abs(u) <= design.reach
+        over = first[:, None] + np.arange(2 * half + 1)
+        beyond = ((over < 0) | (over > n - 1)) & reached
+        return mirrored(first, weights, n), np.asarray(~beyond.any(axis=1))
+
+    return in_blocks(channels, len(at), 2 * half + 1, weigh, marked)
+
+
+def mean_samples(
+    values: ArrayLike,
+    start: float,
+    step: float,
+    stamps: ArrayLike,
+    length: float,
+    *,
+    sampling: str = "instantaneous",
+    marked: Flags | None = None,
+) -> Resampled:
+    """True averages over the interval that ends at each stamp.
+
+    Parameters
+    ----------
+    values : array_like, (n,) or (n, k)
+    start, step : float, s
+        Stamp of the first sample, and their distance.
+    stamps : array_like, (m,), s
+    length : float, s
+        Of the intervals; one step of the samples or more.
+    sampling : {'instantaneous', 'mean'}
+        What a sample is: the value at its stamp, straight in between (trapezoids), or the mean
+        over the step that ends there.
+    marked : ndarray of bool, (n, k), optional
+        As in `decimate`.
+
+    Returns
+    -------
+    Resampled
+        Integrals over intervals that follow one another add up to the integral of the whole, to
+        rounding. The gain at f is ``sinc(f length)`` (and ``sinc²(f step)`` of the trapezoids):
+        a mean is no strong low-pass, and its place is the middle of the interval.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is neither, or the intervals are shorter than a step.
+    DataError
+        A sample or stamp is not finite, or an interval does not lie in the record.
+    """
+    channels, at = as_channels(values), as_channels(stamps, "stamps")[:, 0]
+    step = positive_step(step)
+    if sampling not in ("instantaneous", "mean"):
+        raise ConfigError(
+            f"{sampling!r} is no kind of sampling",
+            quantity="sampling",
+            remedy="give 'instantaneous' or 'mean'",
+        )
+    if not length >= step * (1.0 - SLACK):
+        raise ConfigError(
+            f"means over {length:g} s of samples {step:g} s apart say nothing new",
+            quantity="length",
+            remedy="give the step of the output, no shorter than that of the samples",
+        )
+    n = len(channels)
+    before = step if sampling == "mean" else 0.0
+    low = start - before
+    _check_within(np.r_[at - length, at], low, start + (n - 1) * step, step)
+    until = np.clip((at - start) / step, -before / step, n - 1.0)
+    since = np.clip((at - length - start) / step, -before / step, n - 1.0)
+    share = _area_under_step if sampling == "mean" else _area_under_hat
+    width = math.ceil(length / step) + 3
+
+    def weigh(rows: slice) -> tuple[LocalWeights, Flags]:
+        first = np.floor(since[rows]).astype(np.int64)
+        first = np.clip(first, 0, max(n - width, 0))
+        i = first[:, None] + np.arange(min(width, n))
+        weights = share(until[rows, None] - i) - share(since[rows, None] - i)
+        weights /= weights.sum(axis=1, keepdims=True)
+        return LocalWeights(first, weights), np.ones(len(first), dtype=bool)
+
+    return in_blocks(channels, len(at), width, weigh, marked)
+
+
+def _area_under_hat(u: Array) -> Array:
+    """Integral from -1 to u of the triangle that interpolates between samples."""
+    v = np.clip(u, -1.0, 1.0)
+    return np.asarray(0.5 + v - 0.5 * v * np.abs(v))
+
+
+def _area_under_step(u: Array) -> Array:
+    """Integral to u of the step that a mean over the step before its stamp stands for."""
+    return np.asarray(np.clip(u + 1.0, 0.0, 1.0))
+
+
+def in_blocks(
+    channels: Array,
+    m: int,
+    width: int,
+    weigh: Callable[[slice], tuple[LocalWeights, Flags]],
+    marked: Flags | None,
+) -> Resampled:
+    """Apply weights that are made for a block of outputs at a time, so that memory stays small."""
+    values, noise = np.empty((m, channels.shape[1])), np.empty(m)
+    whole, touched = np.empty(m, dtype=bool), np.zeros(values.shape, dtype=bool)
+    for rows in _slices(m, max(1, BLOCK // (width * channels.shape[1]))):
+        local, whole[rows] = weigh(rows)
+        values[rows], noise[rows] = local.apply(channels), local.noise_factor
+        if marked is not None:
+            touched[rows] = local.any_of(marked)
+    return Resampled(values, noise, whole, touched)
+
+
+def _slices(m: int, size: int) -> Iterator[slice]:
+    return (slice(k, min(k + size, m)) for k in range(0, m, size))
+
+
+def _check_within(at: Array, low: float, high: float, step: float) -> None:
+    off = np.maximum(low - at, at - high)
+    if off.max() > SLACK * step:
+        worst = int(np.argmax(off))
+        raise DataError(
+            f"{at[worst]:.9g} s lies outside the record, which goes from {low:.9g} to {high:.9g} s",
+            quantity="stamps",
+            remedy="ask only for stamps within the record",
+        )

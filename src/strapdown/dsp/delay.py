@@ -1,0 +1,289 @@
+"""Delay between two records of one motion, to a part of a sample, and how well it is known."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.dsp.decimation import decimate, low_pass_design
+from strapdown.dsp.lag_correlation import lag_correlation, repeats, top_peaks
+from strapdown.dsp.samples import as_channels, positive_step
+from strapdown.exceptions import DataError
+
+Array = NDArray[np.float64]
+
+__all__ = ["Delay", "EvenSignal", "find_delay"]
+
+# Above, noise adds and hardly any signal: structures of vehicles ring at 30 to 300 Hz.
+COMMON_RATE = 1000.0  # Hz
+# What brings the faster record to the rate of the slower one.
+PASSBAND, ATTENUATION = 0.8, 60.0
+PEAKS = 16
+LEAST_CORRELATION = 0.7
+LEAST_SAMPLES = 16
+# Two maxima are one peak unless the coefficient falls by this between them.
+LEAST_DIP = 0.05
+STEPS = 30
+# Standard deviations of the Gaussian before the fit, in samples. Between unsmoothed samples an
+# interpolated record has less noise than at them, which draws the fit to a grid; wider ones
+# leave less noise and less of the slopes.
+WIDTHS = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+TRUNCATE = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class EvenSignal:
+    """A record on an even grid.
+
+    Attributes
+    ----------
+    start, step : float, s
+        Stamp of the first sample, and their distance, on the record's own clock.
+    values : ndarray, (n, k)
+    """
+
+    start: float
+    step: float
+    values: Array
+
+    @property
+    def time(self) -> Array:
+        """Stamps in s, (n,)."""
+        return np.asarray(self.start + self.step * np.arange(len(self.values)))
+
+
+@dataclass(frozen=True)
+class Delay:
+    """How much later one motion stands on the second clock than on the first.
+
+    Attributes
+    ----------
+    delay : float, s
+        Stamp on the second clock less stamp on the first, of one instant.
+    sd : float, s
+        Standard deviation, from the residuals, their correlation in time, and the slopes.
+    correlation : float
+        Coefficient at the delay.
+    runner_up, runner_up_delay : float, s
+        The best other peak; 0 and NaN where there is none.
+    ambiguous : bool
+        Whether that does about as well.
+    gain : float
+        Second record per first.
+    shared : float, s
+        Length of what both cover.
+    """
+
+    delay: float
+    sd: float
+    correlation: float
+    runner_up: float
+    runner_up_delay: float
+    ambiguous: bool
+    gain: float
+    shared: float
+
+
+def find_delay(
+    first: EvenSignal,
+    second: EvenSignal,
+    *,
+    least_shared: float | None = None,
+    near: tuple[float, float] | None = None,
+    refuse_ambiguous: bool = True,
+) -> Delay:
+    """Find the delay of the second record against the first by correlation.
+
+    Parameters
+    ----------
+    first, second : EvenSignal
+        Of any rates, with equally many channels that show one motion in one unit or in
+        proportion, as lengths of vectors, which do not know of mountings. Channels may be off by a
+        constant each.
+    least_shared : float, s, optional
+        What both must cover; half the shorter record where nothing is given.
+    near : tuple of float, s, optional
+        Guess and its reach: only delays within are looked at.
+    refuse_ambiguous : bool
+        Raise where another peak does about as well; else only say so.
+
+    Returns
+    -------
+    Delay
+        Both are brought to the slower rate, at most 1 kHz. The highest coefficient gives the
+        delay to a sample; least squares, with a gain and constants, from there its parts, after
+        the Gaussian smoothing that leaves the least variance:
+        ``second(t + d) = g first(t) + c``. The variance is ``Σ r_l Σ_i x'_i x'_(i+l)`` over
+        ``(Σ x' y')²``, with the autocovariance r of the residuals; for white residuals it is
+        ``σ²/Σ x'²``, the bound of Cramér and Rao for known shapes (Kay, Fundamentals of
+        Statistical Signal Processing I, Eq. (3.14)). Where the two points of a vehicle do not
+        move alike, the difference stands in the residuals.
+
+    Raises
+    ------
+    DataError
+        Channels differ in number, there is too little in common, nothing varies, or the peak is
+        ambiguous.
+    """
+    one, two = _at_common_rate(first, second)
+    step = one.step
+    x, y = one.values, two.values
+    for signal, name in ((x, "first"), (y, "second")):
+        if not float(np.ptp(signal, axis=0).max()) > 1e-9 * float(np.abs(signal).max()):
+            raise DataError(
+                f"the {name} record does not vary, and constants show no delay",
+                quantity="values",
+                remedy="use records of the motion itself",
+            )
+    least = 0.5 * min(len(x), len(y)) if least_shared is None else least_shared / step
+    lags, score = lag_correlation(
+        x, y, np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool), max(least, LEAST_SAMPLES)
+    )
+    delays = two.start - one.start - lags * step
+    if near is not None:
+        wanted = np.abs(delays - near[0]) <= near[1]
+        delays, lags, score = delays[wanted], lags[wanted], score[wanted]
+    peaks = top_peaks(score, PEAKS) if score.size else np.empty(0, dtype=np.int64)
+    if not peaks.size:
+        raise DataError(
+            f"no delay leaves {max(least, LEAST_SAMPLES) * step:.3g} s in common in which both "
+            "records vary alike",
+            quantity="time",
+            remedy="use records that both cover the motion, or give a smaller least overlap",
+        )
+    best = int(peaks[0])
+    rival = next((int(k) for k in peaks[1:] if _apart(score, best, int(k))), None)
+    runner_up = 0.0 if rival is None else float(score[rival])
+    found = _refine(one, two, float(delays[best]), float(score[best]))
+    result = Delay(
+        found.delay,
+        found.sd,
+        found.correlation,
+        runner_up,
+        math.nan if rival is None else float(delays[rival]),
+        rival is not None and repeats(float(score[best]), runner_up),
+        found.gain,
+        found.shared,
+    )
+    if result.correlation < LEAST_CORRELATION:
+        raise DataError(
+            f"the records have little in common: {result.correlation:.2f} at best, and "
+            f"{LEAST_CORRELATION:g} are needed",
+            quantity="values",
+            remedy="check that both show one motion, and the units and the stretch",
+        )
+    if result.ambiguous and refuse_ambiguous:
+        raise DataError(
+            f"delays of {result.delay:.4f} and {result.runner_up_delay:.4f} s do about as well "
+            f"({score[best]:.3f} and {runner_up:.3f}): the motion repeats itself",
+            quantity="time",
+            remedy="use a stretch in which it does not, or say near which delay to look",
+        )
+    return result
+
+
+def _at_common_rate(first: EvenSignal, second: EvenSignal) -> tuple[EvenSignal, EvenSignal]:
+    signals = [
+        EvenSignal(s.start, positive_step(s.step), as_channels(s.values, name))
+        for s, name in ((first, "first"), (second, "second"))
+    ]
+    widths = [s.values.shape[1] for s in signals]
+    if widths[0] != widths[1]:
+        raise DataError(
+            f"the records have {widths[0]} and {widths[1]} channels",
+            quantity="values",
+            remedy="pass the same channels of both",
+        )
+    step = max(*(s.step for s in signals), 1.0 / COMMON_RATE)
+    return _slower(signals[0], step), _slower(signals[1], step)
+
+
+def _slower(signal: EvenSignal, step: float) -> EvenSignal:
+    if signal.step * (1.0 + 1e-6) > step:
+        # The same to rounding: one step for both, so that lags are lags.
+        return EvenSignal(signal.start, step, signal.values)
+    design = low_pass_design(signal.step, 1.0 / step, passband=PASSBAND, attenuation=ATTENUATION)
+    n = int((len(signal.values) - 1) * signal.step / step * (1.0 + 1e-9)) + 1
+    stamps = signal.start + step * np.arange(n)
+    out = decimate(signal.values, signal.start, signal.step, stamps, design)
+    return EvenSignal(signal.start, step, out.values)
+
+
+def _apart(score: Array, a: int, b: int) -> bool:
+    low, high = min(a, b), max(a, b)
+    return bool(score[low : high + 1].min() < min(score[a], score[b]) - LEAST_DIP)
+
+
+def _refine(one: EvenSignal, two: EvenSignal, delay: float, coarse: float) -> Delay:
+    """Take the smoothing that leaves the least variance, of widths that double."""
+    from scipy.ndimage import gaussian_filter1d
+
+    shorter = min(len(one.values), len(two.values))
+    widths = [w for w in WIDTHS if 2.0 * TRUNCATE * w + LEAST_SAMPLES <= 0.5 * shorter]
+    best: Delay | None = None
+    for width in widths or WIDTHS[:1]:
+        edge = int(TRUNCATE * width) if widths else 0
+        smooth = [
+            EvenSignal(
+                s.start + edge * s.step,
+                s.step,
+                gaussian_filter1d(s.values, width, axis=0, truncate=TRUNCATE)[
+                    edge : len(s.values) - edge
+                ],
+            )
+            for s in (one, two)
+        ]
+        found = _least_squares(smooth[0], smooth[1], delay, coarse, width)
+        if best is None or found.sd < best.sd:
+            best = found
+    assert best is not None
+    return best
+
+
+def _least_squares(
+    one: EvenSignal, two: EvenSignal, delay: float, coarse: float, width: float
+) -> Delay:
+    """Delay, a gain and constants, from the nearest sample on."""
+    from scipy.interpolate import CubicSpline
+
+    shape = CubicSpline(one.time, one.values)
+    slope = CubicSpline(two.time, two.values)(two.time, 1)
+    at, limit = delay, (1.5 + 3.0 * width) * one.step
+    nothing = Delay(delay, math.inf, coarse, 0.0, math.nan, False, 1.0, 0.0)
+    for _ in range(STEPS):
+        inside = (two.time - at >= one.time[0]) & (two.time - at <= one.time[-1])
+        if inside.sum() < LEAST_SAMPLES:
+            return nothing
+        t = two.time[inside] - at
+        x, y, dx, dy = shape(t), two.values[inside], shape(t, 1), slope[inside]
+        x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+        dx, dy = dx - dx.mean(axis=0), dy - dy.mean(axis=0)
+        gain = float((x * y).sum() / (x * x).sum())
+        # Noise of the two records is not common: the product of slopes does not count it.
+        energy = gain * float((dx * dy).sum())
+        if not energy > 0.0:
+            return nothing
+        move = -gain * float((dx * (y - gain * x)).sum()) / energy
+        at = float(np.clip(at + move, delay - limit, delay + limit))
+        if abs(move) < 1e-9 * one.step:
+            break
+    residual = y - gain * x
+    common = float((x * y).sum() / math.sqrt((x * x).sum() * (y * y).sum()))
+    sd = math.sqrt(_variance(gain * dx, residual, width)) / energy
+    return Delay(at, sd, max(common, coarse), 0.0, math.nan, False, gain, len(t) * two.step)
+
+
+def _variance(slope: Array, residual: Array, width: float) -> float:
+    """Variance of ``Σ slope residual`` for residuals that are correlated over up to a tenth."""
+    n = len(residual)
+    reach = min(n, max(n // 10, int(12.0 * width)))
+    total = 0.0
+    for s, e in zip(slope.T, residual.T, strict=True):
+        for lag in range(reach):
+            share = min(1.0, 2.0 - 2.0 * lag / reach) * float(e[: n - lag] @ e[lag:]) / (n - lag)
+            total += (1.0 if lag == 0 else 2.0) * share * float(s[: n - lag] @ s[lag:])
+    # What the gain, the constants and the delay took out of the residuals.
+    return max(total, 0.0) * n / max(n - 3, 1)

@@ -1,0 +1,209 @@
+"""First derivative of noisy samples by sliding polynomials, with its noise, delay and losses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.dsp.local_weights import LocalWeights
+from strapdown.dsp.samples import as_channels, positive_step
+from strapdown.exceptions import ConfigError, DataError
+
+Array = NDArray[np.float64]
+
+__all__ = ["Derivative", "SlidingFit", "derivative", "widest_fit"]
+
+
+@dataclass(frozen=True, eq=False)
+class Derivative:
+    """First derivative of channels.
+
+    Attributes
+    ----------
+    values : ndarray, (n, k), unit of the samples per s
+        The derivative at ``stamp - delay``.
+    noise_gain : ndarray, (n,), 1/s
+        Standard deviation of each output per that of white noise of the samples, exact. Outputs
+        whose windows overlap share their noise.
+    delay : float, s
+    valid : ndarray of bool, (n,)
+        False for the first outputs of a causal fit, whose window is not filled yet; they are 0.
+    """
+
+    values: Array
+    noise_gain: Array
+    delay: float
+    valid: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SlidingFit:
+    """Savitzky and Golay's differentiator: the slope of a polynomial fitted to a window.
+
+    Attributes
+    ----------
+    step : float, s
+        Of the samples.
+    half : int
+        The window has ``2 half + 1`` samples.
+    degree : int
+        1 or 2 give the same slope at the middle, 3 or 4 the same (Savitzky & Golay 1964,
+        doi:10.1021/ac60214a047); up to ``2 half``.
+
+    Raises
+    ------
+    ConfigError
+        There is no such fit.
+    """
+
+    step: float
+    half: int
+    degree: int = 2
+
+    def __post_init__(self) -> None:
+        positive_step(self.step)
+        if not (self.half >= 1 and 1 <= self.degree <= 2 * self.half):
+            raise ConfigError(
+                f"{2 * self.half + 1} samples do not fix a polynomial of degree {self.degree}",
+                quantity="degree",
+                remedy="give half >= 1 and a degree from 1 to 2 half",
+            )
+
+    def weights(self, at: int = 0) -> Array:
+        """Weights of the slope at sample `at` of the window, -half to half, in 1/s."""
+        u = np.arange(-self.half, self.half + 1) / self.half
+        from numpy.polynomial import legendre
+
+        basis = legendre.legvander(u, self.degree)
+        slope = np.array(
+            [
+                legendre.legval(at / self.half, legendre.legder(row))
+                for row in np.eye(self.degree + 1)
+            ]
+        )
+        return np.asarray(slope @ np.linalg.pinv(basis) / (self.half * self.step))
+
+    def noise_gain(self, at: int = 0) -> float:
+        """Standard deviation of the slope per that of white noise of the samples, in 1/s."""
+        return float(np.linalg.norm(self.weights(at)))
+
+    def response(self, frequency: ArrayLike) -> Array:
+        """Output of the centred fit per true derivative of a sine, real: there is no delay.
+
+        Parameters
+        ----------
+        frequency : array_like, Hz
+            Above zero.
+        """
+        omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+        u = self.step * np.arange(-self.half, self.half + 1)
+        return np.asarray(np.sin(np.outer(omega, u)) @ self.weights() / omega)
+
+    def bandwidth(self, loss: float = 0.01) -> float:
+        """Frequency in Hz below which a sine's derivative is off by no more than `loss`."""
+        # The response first leaves 1 before the first zero of the window's transform.
+        grid = np.linspace(0.0, 0.5 / self.step, 64 * (2 * self.half + 1))[1:]
+        over = np.abs(1.0 - self.response(grid)) > loss
+        k = int(np.argmax(over)) if over.any() else len(grid) - 1
+        low, high = (grid[k - 1] if k else 0.0), grid[k]
+        for _ in range(50):
+            middle = 0.5 * (low + high)
+            if abs(1.0 - self.response(middle)[0]) > loss:
+                high = middle
+            else:
+                low = middle
+        return float(low)
+
+    def pulse_loss(self, duration: float) -> float:
+        """What the peak of a haversine pulse of the derivative loses, relative.
+
+        Parameters
+        ----------
+        duration : float, s
+            T of ``sin²(π t/T)``; the samples are its integral, and one lies at the peak.
+        """
+        t = self.step * np.arange(-self.half, self.half + 1)
+        t = np.clip(t, -0.5 * duration, 0.5 * duration)
+        # About the peak the pulse is cos²(π t/T).
+        turned = 0.5 * t + duration / (4.0 * np.pi) * np.sin(2.0 * np.pi * t / duration)
+        return 1.0 - float(self.weights() @ turned)
+
+
+def widest_fit(step: float, duration: float, loss: float = 0.02, degree: int = 2) -> SlidingFit:
+    """Choose the widest window, thus the least noise, that keeps a pulse's peak.
+
+    Parameters
+    ----------
+    step : float, s
+    duration : float, s
+        Of the shortest haversine pulse of the derivative that matters.
+    loss : float
+        Most that its peak may lose, relative.
+    degree : int
+
+    Raises
+    ------
+    ConfigError
+        Even the narrowest window loses more.
+    """
+    half = math.ceil(max(1, degree) / 2)
+    fit = SlidingFit(step, half, degree)
+    if abs(fit.pulse_loss(duration)) > loss:
+        raise ConfigError(
+            f"a pulse of {duration:g} s loses {fit.pulse_loss(duration):.2%} of its peak even over "
+            f"{2 * half + 1} samples of {step:g} s",
+            quantity="duration",
+            remedy="use faster samples, allow a larger loss, or take a higher degree",
+        )
+    while True:
+        wider = SlidingFit(step, half + 1, degree)
+        if abs(wider.pulse_loss(duration)) > loss:
+            return fit
+        half, fit = half + 1, wider
+
+
+def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> Derivative:
+    """First derivative of evenly spaced samples, as an angular acceleration from rates.
+
+    Parameters
+    ----------
+    values : array_like, (n,) or (n, k)
+    fit : SlidingFit
+    causal : bool
+        Use past samples only: the same slopes, each at the stamp of the last sample of its
+        window, thus late by ``half`` steps exactly at every frequency.
+
+    Returns
+    -------
+    Derivative
+        Centred: no delay, and the first and last ``half`` outputs are slopes of the polynomial
+        through the first or last window, away from its middle, with the larger noise that
+        `noise_gain` tells.
+
+    Raises
+    ------
+    DataError
+        A sample is not finite, or there are fewer than a window.
+    """
+    channels = as_channels(values)
+    n, window = len(channels), 2 * fit.half + 1
+    if n < window:
+        raise DataError(
+            f"{n} samples are fewer than the {window} of a window",
+            quantity="values",
+            remedy="pass a longer record, or a narrower fit",
+        )
+    at = np.arange(n)
+    if causal:
+        first = at[window - 1 :] - (window - 1)
+        local = LocalWeights(first, np.tile(fit.weights(), (len(first), 1)))
+        out, gain = np.zeros(channels.shape), np.zeros(n)
+        out[window - 1 :], gain[window - 1 :] = local.apply(channels), local.noise_factor
+        return Derivative(out, gain, fit.half * fit.step, at >= window - 1)
+    first = np.clip(at - fit.half, 0, n - window)
+    table = np.array([fit.weights(k) for k in range(-fit.half, fit.half + 1)])
+    local = LocalWeights(first, table[at - first])
+    return Derivative(local.apply(channels), local.noise_factor, 0.0, np.ones(n, dtype=bool))

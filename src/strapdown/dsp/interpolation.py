@@ -1,0 +1,95 @@
+"""Between samples: polynomials through the six nearest, with the noise that they pass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.dsp.decimation import SLACK, Flags, Resampled, in_blocks
+from strapdown.dsp.local_weights import LocalWeights
+from strapdown.dsp.samples import as_channels
+from strapdown.exceptions import DataError
+
+Array = NDArray[np.float64]
+
+__all__ = ["POINTS", "interpolate"]
+
+POINTS = 6
+
+
+def interpolate(
+    time: ArrayLike, values: ArrayLike, stamps: ArrayLike, marked: Flags | None = None
+) -> Resampled:
+    """Read samples at stamps between them.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Increasing; need not be even.
+    values : array_like, (n,) or (n, k)
+    stamps : array_like, (m,), s
+        Within the record.
+    marked : ndarray of bool, (n, k), optional
+        As in `decimation.decimate`.
+
+    Returns
+    -------
+    Resampled
+        By the polynomial of degree 5 through the six nearest samples, one-sided near the ends:
+        exact for polynomials up to that degree, and at samples themselves. Midway between even
+        samples the gain at f is ``150/128 cos x - 25/128 cos 3x + 3/128 cos 5x`` with
+        ``x = π f step``: 0.9990 at an eighth of the sampling rate, 0.950 at a quarter. The
+        noise factor there is 0.84; between the first two samples it is up to 1.6.
+
+    Raises
+    ------
+    DataError
+        Fewer than six samples, times that do not advance, a stamp outside the record, or a number
+        that is not finite.
+    """
+    t, channels = as_channels(time, "time")[:, 0], as_channels(values)
+    at = as_channels(stamps, "stamps")[:, 0]
+    n = len(t)
+    if n != len(channels) or n < POINTS:
+        raise DataError(
+            f"{n} stamps and {len(channels)} samples cannot be interpolated",
+            quantity="time",
+            remedy=f"pass {POINTS} samples or more, each with its stamp",
+        )
+    if not np.diff(t).min() > 0.0:
+        row = int(np.argmax(np.diff(t) <= 0.0)) + 1
+        raise DataError(
+            f"time does not advance: {t[row - 1]:.9g} s is followed by {t[row]:.9g} s",
+            row=row + 1,
+            quantity="time",
+            remedy="sort the rows and drop repeated stamps",
+        )
+    slack = SLACK * float(np.median(np.diff(t)))
+    off = np.maximum(t[0] - at, at - t[-1])
+    if off.max() > slack:
+        raise DataError(
+            f"{at[int(np.argmax(off))]:.9g} s lies outside the record, which goes from "
+            f"{t[0]:.9g} to {t[-1]:.9g} s",
+            quantity="stamps",
+            remedy="ask only for stamps within the record",
+        )
+    first = np.clip(np.searchsorted(t, at, side="right") - POINTS // 2, 0, n - POINTS)
+
+    def weigh(rows: slice) -> tuple[LocalWeights, Flags]:
+        return (
+            LocalWeights(first[rows], lagrange(t[first[rows, None] + np.arange(POINTS)], at[rows])),
+            np.ones(len(first[rows]), dtype=bool),
+        )
+
+    return in_blocks(channels, len(at), POINTS, weigh, marked)
+
+
+def lagrange(nodes: Array, at: Array) -> Array:
+    """Weights (m, p) that read the polynomial through nodes (m, p) at points (m,)."""
+    p = nodes.shape[1]
+    weights = np.ones_like(nodes)
+    for i in range(p):
+        for j in range(p):
+            if i != j:
+                weights[:, i] *= (at - nodes[:, j]) / (nodes[:, i] - nodes[:, j])
+    return weights
