@@ -24,7 +24,7 @@ def haversine(x):
     return np.where((x > 0) & (x < 1), 2 * np.sin(np.pi * np.clip(x, 0, 1)) ** 2, 0.0)
 
 
-def vehicle(time, *, roll=1.0, pitch=-2.0, peak=13 * G, yaw_rate=math.radians(87.0), driven=True):
+def vehicle(time, *, roll=1.0, pitch=-2.0, peak=13 * G, yaw_rate=1.52, driven=True):
     """Specific force and rates in vehicle axes; the trigger is at zero, the crash 113 ms.
 
     The vehicle drives off at -4 s for 2 s, and turns by nothing before the crash; roll and

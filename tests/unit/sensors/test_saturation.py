@@ -1,0 +1,57 @@
+"""The end of a range is seen, where it was stated and where it was not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown.sensors.saturation import find_limits
+
+TIME = np.arange(400) / 200.0
+
+
+def crash(peak, *, sd=0.3, q=0.0, full=1e9, seed=1, length=0.113):
+    rng = np.random.default_rng(seed)
+    x = np.clip((TIME - 1.0) / length, 0, 1)
+    y = np.outer(np.sin(np.pi * x) ** 2, [-peak, 0.5 * peak, 0.0]) + [0.0, 0.0, -9.8]
+    y = np.clip(y + sd * rng.normal(size=y.shape), -full, full)
+    return np.rint(y / q) * q if q else y
+
+
+def limits(y, full, q=0.0):
+    return find_limits(TIME, y, np.full(3, full), np.full(3, q))
+
+
+@pytest.mark.parametrize("q", [0.0, 0.5])
+def test_the_stated_end(q):
+    y = crash(600.0, full=500.0, q=q)
+    out = limits(y, 500.0, q)
+    assert np.array_equal(out.clipped[:, 0], y[:, 0] <= -500.0 + q)
+    assert not out.clipped[:, 1:].any()
+    assert not out.beyond.any()
+
+
+@pytest.mark.parametrize("stated", [1000.0, np.inf])
+@pytest.mark.parametrize("q", [0.0, 0.5])
+def test_an_end_that_is_not_where_it_was_stated_is_found(stated, q):
+    y = crash(600.0, full=400.0, q=q)
+    out = limits(y, stated, q)
+    assert out.found.tolist() == [True, False, False]
+    assert out.lower[0] == -400.0
+    assert out.upper[0] == stated
+    assert np.array_equal(out.clipped[:, 0], y[:, 0] == -400.0)
+
+
+@pytest.mark.parametrize("q", [0.0, 0.5, 8.0])
+@pytest.mark.parametrize("sd", [0.0, 0.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_top_of_a_pulse_and_a_rest_are_no_ends(q, sd, seed):
+    for peak in (60.0, 130.0, 600.0):
+        out = limits(crash(peak, sd=sd, q=q, seed=seed), 980.0, q)
+        assert not out.clipped.any()
+        assert not out.found.any()
+
+
+def test_more_than_the_stated_full_scale_is_seen():
+    out = limits(crash(600.0), 500.0)
+    assert out.beyond.tolist() == [True, False, False]
