@@ -16,6 +16,8 @@ Quantity = Callable[[Array], Array]
 # Gauss-Legendre nodes in each stretch: exact for polynomials of twice as many orders less one.
 MEAN_NODES = 8
 FILTER_NODES = 6
+# Where a tolerance is given: 5e-7 of the amplitude of what turns by a radian in a time constant.
+ROUGH_NODES = 3
 # exp(-40) is less than the rounding of what it is added to.
 MEMORY = 40.0  # time constants
 # Where a step is looked at: at odd places, which a vibration does not all pass at zero.
@@ -54,7 +56,8 @@ def low_passed(
         -3 dB frequency.
     straight : float
         From one instant to the next, a quantity that is found within this of a straight line is
-        taken to run along it; zero never does so. It saves evaluations where little happens.
+        taken to run along it, and the quadrature has 3 nodes elsewhere; zero never does so. It
+        saves evaluations where little happens.
 
     Returns
     -------
@@ -86,16 +89,17 @@ def low_passed(
     else:
         out[:1] = quantity(instants[:1])
     if curved.size:
-        drive[curved] = _weighted(quantity, instants[1:][curved], steps[curved], tau)
+        nodes = FILTER_NODES if straight == 0.0 else ROUGH_NODES
+        drive[curved] = _weighted(quantity, instants[1:][curved], steps[curved], tau, nodes)
     first_order(np.exp(-steps / tau), drive, out[0].copy(), out[1:])
     return out
 
 
-def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float) -> Array:
+def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float, count: int) -> Array:
     """``∫ exp(-(t1 - s)/τ) u(s) ds/τ`` over the step that ends at each instant, (n, 3)."""
     window = np.minimum(steps, MEMORY * tau)
     stretches = max(1, math.ceil(float(window.max()) / tau))
-    nodes, weights = np.polynomial.legendre.leggauss(FILTER_NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(count)
     # Places within the window from 0 to 1, and their weights.
     place = ((np.arange(stretches)[:, None] + 0.5 * (1.0 + nodes)) / stretches).ravel()
     weight = np.tile(0.5 * weights, stretches) / stretches

@@ -1,0 +1,342 @@
+"""What a crash recorder writes of a motion."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.error_draws import Seed, child
+from strapdown.sensors.triad_errors import Triad, TriadErrors
+from strapdown.sensors.uncertainty_draws import draw_errors
+from strapdown.simulation.between_samples import mean_over
+from strapdown.simulation.imu import sample_accelerometer, sample_gyro
+from strapdown.simulation.motion import Motion
+from strapdown.simulation.recorder_design import (
+    RecorderDesign,
+    RecorderTruth,
+    TriadDesign,
+    WarmUp,
+    shifted,
+)
+from strapdown.tables import ACCEL, GYRO, SAMPLINGS
+
+Array = NDArray[np.float64]
+
+# Places below the seed of a recorder: of errors and noise, each of accelerometers and gyro.
+ACCEL_ERRORS, GYRO_ERRORS, ACCEL_NOISE, GYRO_NOISE, MOUNTING, TRIGGER, WARM_UP, HIGH_G = range(8)
+# From sample to sample the motion is taken to run straight, for the low-pass, where it is found
+# within this: a hundredth of the finest step of a recorder's converter.
+STRAIGHT_FORCE = 1e-4  # m/s²
+STRAIGHT_RATE = 1e-6  # rad/s
+# A sample that rounding puts just outside still belongs.
+SLACK = 1e-6  # of an interval
+
+
+def record_crash(
+    motion: Motion,
+    design: RecorderDesign,
+    *,
+    impact: float,
+    seed: int,
+    start: float | None = None,
+    end: float | None = None,
+    ringing: Sequence[Any] = (),
+    sampling: str = "instantaneous",
+    mounted: bool = False,
+) -> tuple[CrashUnit, RecorderTruth]:
+    """Let a recorder on a vehicle write.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of the vehicle's origin in vehicle axes, or (`mounted`) of the sensors in sensor axes.
+    design : RecorderDesign
+    impact : float, s
+        Instant of the trigger on the motion's clock.
+    seed : int
+        Of everything that is drawn: errors, noise, mounting, trigger. Recorders of different
+        names draw differently from one seed, and every part from a stream of its own.
+    start, end : float, s, optional
+        Of the record, on the motion's clock; the whole motion, if not given.
+    ringing : sequence of Ringing
+        Of the structure where the recorder is mounted.
+    sampling : {'instantaneous', 'mean'}
+    mounted : bool
+        The motion is that of the sensors: mounting and ringing are already in it.
+
+    Returns
+    -------
+    unit : CrashUnit
+        Samples fall on whole multiples of the interval on the unit's own clock. Its mounting
+        and uncertainties are those that the design tells.
+    truth : RecorderTruth
+
+    Raises
+    ------
+    ConfigError
+        The record or the impact is not within the motion, or is shorter than two samples; the
+        message names the recorder.
+    """
+    begin, stop = _bounds(motion, design, impact, start, end, sampling)
+    root = child(seed, zlib.crc32(design.name.encode()))
+    truth = _truth(design, root)
+    felt, vibration = _felt(motion, truth.mounting, tuple(ringing), mounted)
+    felt = _Remembering(felt)
+    accelerometers = tuple(
+        _record_accelerometer(
+            felt, design, k, truth, (begin, stop), sampling, child(root, ACCEL_NOISE, k), vibration
+        )
+        for k in range(len(design.accelerometers))
+    )
+    gyro = None
+    if design.gyro is not None and truth.gyro is not None:
+        told = design.told_gyro()
+        assert told is not None
+        stamps, at = _stamps(motion, design, design.gyro, truth, begin, stop)
+        values = sample_gyro(
+            felt,
+            truth.gyro,
+            at,
+            sampling=sampling,
+            seed=child(root, GYRO_NOISE),
+            straight=STRAIGHT_RATE,
+        )
+        table = _table(stamps, values, GYRO, sampling, design, design.gyro)
+        gyro = RecordedTriad(table, told, design.gyro.part)
+    unit = CrashUnit(
+        design.name,
+        accelerometers,
+        gyro,
+        design.mounting,
+        design.gyro_from,
+        truth.clock(impact) + truth.trigger_error,
+        design.trigger_sd,
+    )
+    return unit, truth
+
+
+class _Remembering:
+    """A motion that is asked the same by every triad, and answers from memory."""
+
+    def __init__(self, motion: Motion) -> None:
+        self.motion = motion
+        self.duration = motion.duration
+        self.found: dict[tuple[str, bytes], Array] = {}
+
+    def _ask(self, name: str, time: ArrayLike) -> Array:
+        key = (name, np.asarray(time).tobytes())
+        if key not in self.found:
+            self.found[key] = getattr(self.motion, name)(time)
+        return self.found[key]
+
+    def rate(self, time: ArrayLike) -> Array:
+        return self._ask("rate", time)
+
+    def specific_force(self, time: ArrayLike) -> Array:
+        return self._ask("specific_force", time)
+
+    def angle(self, time: ArrayLike) -> Array:
+        return self.motion.angle(time)
+
+    def attitude(self, time: ArrayLike) -> Array:
+        return self.motion.attitude(time)
+
+
+def _bounds(
+    motion: Motion,
+    design: RecorderDesign,
+    impact: float,
+    start: float | None,
+    end: float | None,
+    sampling: str,
+) -> tuple[float, float]:
+    begin = 0.0 if start is None else float(start)
+    stop = motion.duration if end is None else float(end)
+    if sampling not in SAMPLINGS:
+        raise ConfigError(
+            f"'{sampling}' is no kind of sampling",
+            quantity="sampling",
+            remedy=f"use {' or '.join(SAMPLINGS)}",
+        )
+    if not 0.0 <= begin < stop <= motion.duration:
+        raise ConfigError(
+            f"recorder '{design.name}': a record from {begin:g} s to {stop:g} s is not within a "
+            f"motion of {motion.duration:g} s",
+            quantity="start, end",
+            remedy="let it begin at zero or later, and end before the motion does",
+        )
+    if not 0.0 <= impact <= motion.duration:
+        raise ConfigError(
+            f"recorder '{design.name}': an impact at {impact:g} s is not within a motion of "
+            f"{motion.duration:g} s",
+            quantity="impact",
+            remedy="give it on the motion's clock",
+        )
+    return begin, stop
+
+
+def _truth(design: RecorderDesign, root: Seed) -> RecorderTruth:
+    accelerometers = []
+    for k, triad in enumerate(design.accelerometers):
+        errors = triad.errors
+        if errors is None:
+            errors = draw_errors(triad.uncertainty, root, ACCEL_ERRORS, k)
+            if k > 0 and design.high_g_bias > 0.0:
+                errors = replace(errors, bias=_uniform(design.high_g_bias, root, k))
+        sd = design.warm_up.accel if design.warm_up else 0.0
+        accelerometers.append(_warmed(errors, design.warm_up, sd, root, k))
+    gyro = None
+    if design.gyro is not None:
+        gyro = design.gyro.errors
+        if gyro is None:
+            gyro = draw_errors(design.gyro.uncertainty, root, GYRO_ERRORS)
+        sd = design.warm_up.gyro if design.warm_up else 0.0
+        gyro = _warmed(gyro, design.warm_up, sd, root, len(accelerometers))
+    told = design.mounting
+    moved = _normal(6, root, MOUNTING)
+    return RecorderTruth(
+        tuple(accelerometers),
+        gyro,
+        Mounting(
+            shifted(told.position, _triad(told.position_sd * moved[:3])),
+            shifted(told.angles_deg, _triad(told.angles_sd_deg * moved[3:])),
+        ),
+        design.clock_offset,
+        design.clock_drift_ppm,
+        float(design.trigger_sd * _normal(1, root, TRIGGER)[0]),
+    )
+
+
+def _warmed(
+    errors: TriadErrors, warm_up: WarmUp | None, sd: float, root: Seed, which: int
+) -> TriadErrors:
+    if warm_up is None or sd == 0.0:
+        return errors
+    drift = sd * warm_up.left * _normal(3, root, WARM_UP, which)
+    return replace(errors, warm_up=_triad(drift), warm_up_time=warm_up.time_constant)
+
+
+def _felt(
+    motion: Motion, mounting: Mounting, ringing: tuple[Any, ...], mounted: bool
+) -> tuple[Motion, Callable[[Array], Array] | None]:
+    """The motion of the sensors, and the vibration in it."""
+    plain = not ringing and not any(mounting.position) and not any(mounting.angles_deg)
+    if mounted or plain:
+        return motion, None
+    from strapdown.simulation.mounted_motion import (  # type: ignore[import-not-found,unused-ignore]
+        MountedMotion,
+    )
+
+    vehicle: Any = motion
+    felt = MountedMotion(vehicle, mounting, ringing)
+    if not ringing:
+        return felt, None
+    still = MountedMotion(vehicle, mounting, ())
+
+    first = min(float(r.start) for r in ringing)
+
+    def vibration(time: Array) -> Array:
+        square = np.zeros((time.size, 3))
+        rings = time > first
+        if rings.any():
+            at = time[rings]
+            square[rings] = (felt.specific_force(at) - still.specific_force(at)) ** 2
+        return square
+
+    return felt, vibration
+
+
+def _record_accelerometer(
+    felt: Motion,
+    design: RecorderDesign,
+    which: int,
+    truth: RecorderTruth,
+    bounds: tuple[float, float],
+    sampling: str,
+    seed: Seed,
+    vibration: Callable[[Array], Array] | None,
+) -> RecordedTriad:
+    triad, errors = design.accelerometers[which], truth.accelerometers[which]
+    stamps, at = _stamps(felt, design, triad, truth, *bounds)
+    shaken = None
+    if vibration is not None and any(errors.axis("vibration_rectification")):
+        shaken = _mean_square(vibration, at, felt.duration)
+    values = sample_accelerometer(
+        felt,
+        errors,
+        at,
+        sampling=sampling,
+        seed=seed,
+        straight=STRAIGHT_FORCE,
+        vibration=shaken,
+    )
+    table = _table(stamps, values, ACCEL, sampling, design, triad)
+    return RecordedTriad(table, design.told(which), triad.part)
+
+
+def _mean_square(vibration: Callable[[Array], Array], at: Array, duration: float) -> Array:
+    """Of an interval about each sample, in two halves: to 1e-3 up to four periods in it."""
+    half = 0.5 * (at[1] - at[0])
+    low, high = np.maximum(at - half, 0.0), np.minimum(at + half, duration)
+    middle = 0.5 * (low + high)
+    return 0.5 * (mean_over(vibration, low, middle) + mean_over(vibration, middle, high))
+
+
+def _stamps(
+    motion: Motion,
+    design: RecorderDesign,
+    triad: TriadDesign,
+    truth: RecorderTruth,
+    begin: float,
+    stop: float,
+) -> tuple[Array, Array]:
+    """Stamps on the recorder's clock, and the instants of the motion, equally spaced."""
+    first = math.ceil(truth.clock(begin) * triad.rate - SLACK)
+    last = math.floor(truth.clock(stop) * triad.rate + SLACK)
+    if last - first < 1:
+        raise ConfigError(
+            f"recorder '{design.name}', {triad.part}: {triad.rate:g} Hz gives fewer than two "
+            f"samples from {begin:g} s to {stop:g} s",
+            quantity="rate",
+            remedy="record for longer, or at a higher rate",
+        )
+    stamps = np.arange(first, last + 1) / triad.rate
+    at = (stamps - truth.clock_offset) / (1.0 + 1e-6 * truth.clock_drift_ppm)
+    return stamps, np.clip(at, 0.0, motion.duration)
+
+
+def _table(
+    stamps: Array,
+    values: Array,
+    columns: list[str],
+    sampling: str,
+    design: RecorderDesign,
+    triad: TriadDesign,
+) -> pd.DataFrame:
+    table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
+    table.attrs = {"sampling": sampling, "source": f"{design.name} {triad.part}"}
+    return table
+
+
+def _normal(count: int, root: Seed, *place: int) -> Array:
+    generator = np.random.Generator(np.random.PCG64(child(root, *place)))
+    return generator.standard_normal(count)
+
+
+def _uniform(bound: float, root: Seed, which: int) -> Triad:
+    generator = np.random.Generator(np.random.PCG64(child(root, HIGH_G, which)))
+    return _triad(generator.uniform(-bound, bound, 3))
+
+
+def _triad(values: Array) -> Triad:
+    x, y, z = (float(v) for v in values)
+    return (x, y, z)
