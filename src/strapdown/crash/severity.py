@@ -1,0 +1,80 @@
+"""Published models of injury risk.
+
+A model is here only if its table can be named. URGENCY and its successors (Malliaris 1997,
+Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger and others (2023)
+are not: their coefficients were found in programs, and no table of a publication was at hand to
+hold them against. `severity_file.load_severity_model` takes them from a user who has the source.
+"""
+
+from __future__ import annotations
+
+from strapdown.crash.severity_model import SeverityModel, Term
+from strapdown.exceptions import ConfigError, nearest
+
+__all__ = ["SEVERITY_MODELS", "find_severity_model"]
+
+WANG_NOTE = (
+    "Logistic regression on NASS-CDS 2010-2015, all occupants together. The coefficients are those "
+    "that four public programs quote alike from the tables; the report itself was not at hand. It "
+    "states no range here: the one given is that in which the curves of one table keep their order "
+    "(a graver injury is less likely), and no more. Front and rear curves are not for side impacts."
+)
+# Where two curves of a table cross first, in mph, rounded down: 56.3, 60.4 and 47.8.
+WANG_RANGE = {"all": 56.0, "front": 60.0, "rear": 47.0}
+WANG_TABLE = {"all": "A-3", "front": "A-6", "rear": "A-9"}
+
+
+def _wang(crash: str, outcome: str, intercept: float, slope: float) -> SeverityModel:
+    return SeverityModel(
+        name=f"wang_2022_{crash}_{outcome.lower().replace('+', '')}",
+        title="MAIS(05/08) injury probability curves as functions of delta V, DOT HS 813 219",
+        author="Wang",
+        year=2022,
+        table=f"Table {WANG_TABLE[crash]}",
+        outcome=outcome,
+        intercept=intercept,
+        terms=(Term("delta_v", slope, "mph"),),
+        validity={"delta_v": (0.0, WANG_RANGE[crash])},
+        applies={} if crash == "all" else {"crash_type": (crash,)},
+        note=WANG_NOTE,
+    )
+
+
+#: By name; what a person asks for.
+SEVERITY_MODELS: dict[str, SeverityModel] = {
+    "wang_2022_all_mais1": _wang("all", "MAIS1+", -1.3925, 0.0815),
+    "wang_2022_all_mais2": _wang("all", "MAIS2+", -5.1331, 0.1479),
+    "wang_2022_all_mais3": _wang("all", "MAIS3+", -6.9540, 0.1637),
+    "wang_2022_all_mais4": _wang("all", "MAIS4+", -8.2070, 0.1564),
+    "wang_2022_all_mais5": _wang("all", "MAIS5+", -8.7927, 0.1598),
+    "wang_2022_all_fatal": _wang("all", "fatal", -8.9819, 0.1603),
+    "wang_2022_front_mais1": _wang("front", "MAIS1+", -1.4930, 0.0854),
+    "wang_2022_front_mais2": _wang("front", "MAIS2+", -4.9429, 0.1425),
+    "wang_2022_front_mais3": _wang("front", "MAIS3+", -6.9774, 0.1620),
+    "wang_2022_front_mais4": _wang("front", "MAIS4+", -8.4254, 0.1586),
+    "wang_2022_front_mais5": _wang("front", "MAIS5+", -8.8355, 0.1566),
+    "wang_2022_front_fatal": _wang("front", "fatal", -9.0422, 0.1571),
+    "wang_2022_rear_mais1": _wang("rear", "MAIS1+", -1.8199, 0.0671),
+    "wang_2022_rear_mais2": _wang("rear", "MAIS2+", -6.1818, 0.1482),
+    "wang_2022_rear_mais3": _wang("rear", "MAIS3+", -8.0329, 0.1793),
+    "wang_2022_rear_mais4": _wang("rear", "MAIS4+", -11.8787, 0.2210),
+    "wang_2022_rear_mais5": _wang("rear", "MAIS5+", -12.1944, 0.2276),
+    "wang_2022_rear_fatal": _wang("rear", "fatal", -12.1982, 0.2255),
+}
+
+
+def find_severity_model(name: str) -> SeverityModel:
+    """Return a model by its name.
+
+    Raises
+    ------
+    ConfigError
+        There is none of that name; the message has the nearest.
+    """
+    if name not in SEVERITY_MODELS:
+        raise ConfigError(
+            f"there is no severity model '{name}'",
+            quantity="severity model",
+            remedy=f"{nearest(name, SEVERITY_MODELS)} Or load a table of your own.",
+        )
+    return SEVERITY_MODELS[name]

@@ -1,0 +1,176 @@
+"""A model of injury risk from a TOML file that a person wrote from a publication."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from strapdown.crash.severity_model import SPEEDS, TRANSFORMS, SeverityModel, Term
+from strapdown.exceptions import ConfigError, nearest
+
+__all__ = ["load_severity_model"]
+
+TEXTS = ("title", "author", "table", "outcome")
+TOP = (*TEXTS, "year", "intercept", "terms", "validity", "applies", "note")
+NUMBER_TERM = ("input", "unit", "coefficient", "transform")
+CATEGORY_TERM = ("input", "equals", "coefficient")
+
+
+def load_severity_model(path: str | Path) -> SeverityModel:
+    """Read a model of injury risk.
+
+    Parameters
+    ----------
+    path : str or Path
+        A TOML file; its name is the model's. ``title``, ``author``, ``year``, ``table`` and
+        ``outcome`` say what it is and where it stands; ``intercept`` and ``[[terms]]``, each with
+        ``input``, ``unit`` and ``coefficient`` (and ``transform``: identity, log or square), or
+        with ``input``, ``equals`` and ``coefficient`` for a category, are the logit.
+        ``[validity]`` gives ``input = [least, greatest]`` in the unit of its term, and
+        ``[applies]`` ``input = ["category", ...]``.
+
+    Returns
+    -------
+    SeverityModel
+
+    Raises
+    ------
+    ConfigError
+        The file is missing or not in this form; the message names the key.
+    """
+    file = Path(path)
+    table = _table(file)
+    _known(file, table, TOP, "")
+    texts = {key: _text(file, table, key) for key in TEXTS}
+    year = table.get("year")
+    if isinstance(year, bool) or not isinstance(year, int):
+        raise _bad(file, "year", f"it is {year!r}", "write the year of publication: year = 2004")
+    note = table.get("note", "")
+    if not isinstance(note, str):
+        raise _bad(file, "note", "it is no text", 'write note = "…"')
+    terms = _terms(file, table)
+    return SeverityModel(
+        name=file.stem,
+        year=year,
+        intercept=_number(file, table.get("intercept"), "intercept"),
+        terms=terms,
+        validity=_validity(file, table.get("validity", {}), terms),
+        applies=_applies(file, table.get("applies", {})),
+        note=note,
+        **texts,
+    )
+
+
+def _table(file: Path) -> dict[str, Any]:
+    if not file.is_file():
+        raise ConfigError("there is no such file", file=str(file), remedy="check the path")
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(
+            f"it is no TOML: {error}", file=file.name, remedy="mend it where it says"
+        ) from None
+
+
+def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
+    rows = table.get("terms")
+    if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) for r in rows):
+        raise _bad(file, "terms", "there are none", "write [[terms]], one for each coefficient")
+    terms: list[Term] = []
+    for k, row in enumerate(rows, start=1):
+        place = f"terms {k}"
+        category = "equals" in row
+        _known(file, row, CATEGORY_TERM if category else NUMBER_TERM, f"{place}.")
+        name = _text(file, row, "input", f"{place}.")
+        coefficient = _number(file, row.get("coefficient"), f"{place}.coefficient")
+        if category:
+            term = Term(name, coefficient, equals=_text(file, row, "equals", f"{place}."))
+        else:
+            transform = row.get("transform", "identity")
+            if transform not in TRANSFORMS:
+                raise _bad(
+                    file,
+                    f"{place}.transform",
+                    f"'{transform}' is none",
+                    nearest(str(transform), TRANSFORMS),
+                )
+            term = Term(name, coefficient, _text(file, row, "unit", f"{place}."), transform)
+        for other in terms:
+            _refuse_clash(file, place, term, other)
+        terms.append(term)
+    return tuple(terms)
+
+
+def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
+    if term.input != other.input:
+        return
+    if (term.equals is None) != (other.equals is None):
+        what, remedy = "is a number in one term and a category in another", "make it one of them"
+    elif term.unit != other.unit:
+        what, remedy = (
+            f"is in {term.unit} here and in {other.unit} before",
+            f"write both in one unit; speeds: {', '.join(SPEEDS)}",
+        )
+    elif (term.transform, term.equals) == (other.transform, other.equals):
+        what, remedy = "has this term twice", "keep one of the two"
+    else:
+        return
+    raise _bad(file, place, f"'{term.input}' {what}", remedy)
+
+
+def _validity(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
+    if not isinstance(given, dict):
+        raise _bad(file, "validity", "it is no table", "write [validity]")
+    numbers = {t.input: t for t in terms if t.equals is None}
+    ranges: dict[str, tuple[float, float]] = {}
+    for name, pair in given.items():
+        place = f"validity.{name}"
+        if name not in numbers:
+            raise _bad(file, place, "no term has this number as its input", nearest(name, numbers))
+        if not isinstance(pair, list) or len(pair) != 2:
+            raise _bad(file, place, f"it is {pair!r}", f"write {name} = [least, greatest]")
+        low, high = (_number(file, value, place) for value in pair)
+        if not low < high:
+            raise _bad(file, place, f"from {low:g} to {high:g} is no range", "least first")
+        ranges[name] = (low, high)
+    return ranges
+
+
+def _applies(file: Path, given: Any) -> dict[str, tuple[str, ...]]:
+    if not isinstance(given, dict):
+        raise _bad(file, "applies", "it is no table", "write [applies]")
+    for name, words in given.items():
+        if not isinstance(words, list) or not words or not all(isinstance(w, str) for w in words):
+            raise _bad(file, f"applies.{name}", f"it is {words!r}", f'write {name} = ["front"]')
+    return {name: tuple(words) for name, words in given.items()}
+
+
+def _number(file: Path, value: Any, key: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise _bad(file, key, f"it is {value!r}", "write the number of the table")
+    return float(value)
+
+
+def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> str:
+    value = table.get(key)
+    if not isinstance(value, str) or not value.strip():
+        why = {
+            "table": 'name where in the publication the coefficients stand: table = "Table 3"',
+            "unit": f'write unit = "…"; speeds: {", ".join(SPEEDS)}',
+        }
+        remedy = why.get(key, f'write {key} = "…"')
+        raise _bad(file, f"{prefix}{key}", "it is missing, or no text", remedy)
+    return value
+
+
+def _known(file: Path, table: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
+    for key in table:
+        if key not in known:
+            raise _bad(file, f"{prefix}{key}", "there is no such key", nearest(key, known))
+
+
+def _bad(file: Path, key: str, what: str, remedy: str) -> ConfigError:
+    return ConfigError(what, file=file.name, quantity=key, remedy=remedy)

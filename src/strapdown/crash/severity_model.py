@@ -1,0 +1,293 @@
+"""What a model of injury risk is, and the probability that it gives, with a bound."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+
+__all__ = ["SPEEDS", "InjuryRisk", "SeverityModel", "Term", "injury_risk"]
+
+#: Units of speed, in m/s. An input in one of them is given in m/s; any other as its unit says.
+SPEEDS: dict[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+TRANSFORMS = ("identity", "log", "square")
+OUTSIDE = ("refuse", "tell")
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of the logit.
+
+    Attributes
+    ----------
+    input : str
+        Name of what is known of the crash: ``delta_v``, ``age``, ``crash_type``.
+    coefficient : float
+        Per unit of the transformed input; of a category, added where it is met.
+    unit : str
+        Of the input in the source's table; empty for a category.
+    transform : {'identity', 'log', 'square'}
+        Of the input in its unit; log is natural.
+    equals : str, optional
+        The category that is meant; such a term has no unit.
+    """
+
+    input: str
+    coefficient: float
+    unit: str = ""
+    transform: str = "identity"
+    equals: str | None = None
+
+
+@dataclass(frozen=True)
+class SeverityModel:
+    """A published model of the probability of an injury: ``1/(1 + exp(-w))``.
+
+    Attributes
+    ----------
+    name, title : str
+    author, year, table : str
+        Where it was published, and where in it the coefficients stand.
+    outcome : str
+        What is predicted: ``MAIS3+``.
+    intercept : float
+    terms : tuple of Term
+    validity : dict
+        By input, the least and the greatest value that the model is good for, in the unit of
+        its term.
+    applies : dict
+        By input, the categories that it is good for: ``{"crash_type": ("front",)}``.
+    note : str
+        How the coefficients were come by, and where the range is from.
+    """
+
+    name: str
+    title: str
+    author: str
+    year: int
+    table: str
+    outcome: str
+    intercept: float
+    terms: tuple[Term, ...]
+    validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    applies: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    note: str = ""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of what it needs."""
+        return tuple(dict.fromkeys(term.input for term in self.terms))
+
+    def unit(self, name: str) -> str:
+        """Unit of an input in the table; empty for a category."""
+        return next((t.unit for t in self.terms if t.input == name and t.equals is None), "")
+
+    @property
+    def source(self) -> str:
+        """Author, year, title and table in one line."""
+        return f"{self.author} ({self.year}): {self.title}, {self.table}"
+
+
+@dataclass(frozen=True)
+class InjuryRisk:
+    """Probability of an injury by one model.
+
+    Attributes
+    ----------
+    model : SeverityModel
+    probability : float
+    low, high : float
+        Bound by the uncertainty of the inputs alone, not of the model's coefficients.
+    coverage : float
+        Of the bound.
+    logit, logit_sd : float
+    findings : tuple of Finding
+    """
+
+    model: SeverityModel
+    probability: float
+    low: float
+    high: float
+    coverage: float
+    logit: float
+    logit_sd: float
+    findings: tuple[Finding, ...] = ()
+
+
+def injury_risk(
+    model: SeverityModel,
+    inputs: Mapping[str, float | str],
+    sd: Mapping[str, float] | None = None,
+    *,
+    coverage: float = 0.95,
+    outside: str = "refuse",
+) -> InjuryRisk:
+    """Probability of an injury, with the bound that the uncertainty of the inputs makes.
+
+    Parameters
+    ----------
+    model : SeverityModel
+    inputs : dict
+        By name: speeds in m/s, others in the unit of the model's table, categories as words.
+    sd : dict, optional
+        Standard deviations in the same units, taken as independent.
+    coverage : float
+        Of the bound, between 0 and 1.
+    outside : {'refuse', 'tell'}
+        What happens where the model is not valid: an error, or a finding beside the number.
+
+    Returns
+    -------
+    InjuryRisk
+
+    Raises
+    ------
+    DataError
+        An input is missing or no number, or the model is not valid there.
+    ConfigError
+        An option or an sd is none.
+
+    Notes
+    -----
+    The logistic function is monotone, so the bound is that of the logit carried through it; with
+    the inputs' own scale (no log, no square) and normal errors it is exact.
+    """
+    from scipy.special import expit, ndtri
+
+    spread = dict(sd or {})
+    _check_options(model, spread, coverage, outside)
+    findings = list(_validity(model, inputs, spread, float(ndtri(0.5 + 0.5 * coverage)), outside))
+    logit, variance = model.intercept, 0.0
+    slopes: dict[str, float] = {}
+    for term in model.terms:
+        given = _given(model, inputs, term.input)
+        if term.equals is not None:
+            logit += term.coefficient if given == term.equals else 0.0
+            continue
+        value = _value(model, term.input, given)
+        made, slope = _transformed(model, term, value)
+        logit += term.coefficient * made
+        slopes[term.input] = slopes.get(term.input, 0.0) + term.coefficient * slope
+    for name, slope in slopes.items():
+        factor = SPEEDS.get(model.unit(name), 1.0)
+        variance += (slope * spread.get(name, 0.0) / factor) ** 2
+    reach = float(ndtri(0.5 + 0.5 * coverage)) * math.sqrt(variance)
+    return InjuryRisk(
+        model,
+        float(expit(logit)),
+        float(expit(logit - reach)),
+        float(expit(logit + reach)),
+        coverage,
+        logit,
+        math.sqrt(variance),
+        tuple(findings),
+    )
+
+
+def _check_options(
+    model: SeverityModel, sd: Mapping[str, float], coverage: float, outside: str
+) -> None:
+    if outside not in OUTSIDE:
+        raise ConfigError(
+            f"'{outside}' is no option", quantity="outside", remedy=nearest(outside, OUTSIDE)
+        )
+    if not 0.0 < coverage < 1.0:
+        raise ConfigError(
+            f"a coverage of {coverage} is none",
+            quantity="coverage",
+            remedy="give a share between 0 and 1, such as 0.95",
+        )
+    for name, value in sd.items():
+        if not (math.isfinite(value) and value >= 0.0):
+            raise ConfigError(
+                f"{value} is no standard deviation",
+                quantity=f"sd of {name}",
+                remedy="give zero or more",
+            )
+
+
+def _given(model: SeverityModel, inputs: Mapping[str, float | str], name: str) -> float | str:
+    if name not in inputs:
+        unit = model.unit(name)
+        how = "a word" if not unit else "m/s" if unit in SPEEDS else unit
+        raise DataError(
+            f"{model.name} needs {name}, and it is not given",
+            quantity=name,
+            remedy=f"give {name} ({how}), or take a model that does without it",
+        )
+    return inputs[name]
+
+
+def _value(model: SeverityModel, name: str, given: float | str) -> float:
+    """Return a number in the unit of the model's table."""
+    if isinstance(given, str) or not math.isfinite(given):
+        raise DataError(
+            f"{given!r} is no finite number",
+            quantity=name,
+            remedy=f"give {name} in {'m/s' if model.unit(name) in SPEEDS else model.unit(name)}",
+        )
+    return float(given) / SPEEDS.get(model.unit(name), 1.0)
+
+
+def _transformed(model: SeverityModel, term: Term, value: float) -> tuple[float, float]:
+    """The term's value and its slope, by the input in its unit."""
+    if term.transform == "square":
+        return value * value, 2.0 * value
+    if term.transform == "log":
+        if value <= 0.0:
+            raise DataError(
+                f"{model.name} takes the logarithm, and the value is {value:g} {term.unit}",
+                quantity=term.input,
+                remedy="there is no risk by this model at zero; give a value above it",
+            )
+        return math.log(value), 1.0 / value
+    return value, 1.0
+
+
+def _validity(
+    model: SeverityModel,
+    inputs: Mapping[str, float | str],
+    sd: Mapping[str, float],
+    reach: float,
+    outside: str,
+) -> list[Finding]:
+    findings = []
+    for name, categories in model.applies.items():
+        if name not in inputs:
+            findings.append(
+                Finding(
+                    f"{model.name} is for {' and '.join(categories)}, and it is not stated",
+                    quantity=name,
+                    remedy=f"state {name}",
+                )
+            )
+        elif inputs[name] not in categories:
+            what = f"{model.name} is for {' and '.join(categories)}, and this is {inputs[name]}"
+            findings.append(_outside(what, name, "take a model for it", outside))
+    for name, (low, high) in model.validity.items():
+        value = _value(model, name, _given(model, inputs, name))
+        error = reach * sd.get(name, 0.0) / SPEEDS.get(model.unit(name), 1.0)
+        limits = f"valid from {low:g} to {high:g} {model.unit(name)}"
+        if not low <= value <= high:
+            what = f"{value:.4g} {model.unit(name)}: {model.name} is {limits}"
+            findings.append(
+                _outside(what, name, "take another model; this one is not extrapolated", outside)
+            )
+        elif not low <= value - error <= value + error <= high:
+            findings.append(
+                Finding(
+                    f"{value:.4g} ± {error:.2g} {model.unit(name)}: the bound leaves the range in "
+                    f"which {model.name} is {limits}",
+                    quantity=name,
+                    remedy="read the ends of the bound with that in mind",
+                )
+            )
+    return findings
+
+
+def _outside(what: str, name: str, remedy: str, outside: str) -> Finding:
+    if outside == "refuse":
+        raise DataError(what, quantity=name, remedy=f"{remedy}; or pass outside='tell'")
+    return Finding(what, quantity=name, remedy=remedy)
