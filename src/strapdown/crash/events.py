@@ -1,0 +1,213 @@
+"""Events of a whole record, after 49 CFR Part 563, and what a person should know of them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.event_detector import CrashEvent, EventDetector
+from strapdown.crash.event_rule import KMH, PART_563, EventRule
+from strapdown.exceptions import ConfigError, DataError, Finding
+
+__all__ = ["PART_563", "CrashEvent", "CrashEvents", "EventDetector", "EventRule", "detect_events"]
+
+
+@dataclass(frozen=True)
+class CrashEvents:
+    """What was found in a record.
+
+    Attributes
+    ----------
+    events : tuple of CrashEvent
+        In order of time; the last one may last beyond the record.
+    rule : EventRule
+    woken : int
+        How often the wake threshold was exceeded without an event: potholes, kerbs, doors.
+    largest_change : float, m/s
+        Largest change of the longitudinal or lateral velocity within the trigger's window,
+        without what led to an event.
+    largest_axis : {'longitudinal', 'lateral'}
+    largest_time : float, s
+        Where that window ends; NaN where nothing changed.
+    source : str or None
+    findings : tuple of Finding
+    """
+
+    events: tuple[CrashEvent, ...]
+    rule: EventRule
+    woken: int
+    largest_change: float
+    largest_axis: str
+    largest_time: float
+    source: str | None = None
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def first(self) -> CrashEvent:
+        """The first event.
+
+        Raises
+        ------
+        DataError
+            There is none; the message tells the largest change that was found.
+        """
+        if not self.events:
+            finding = self.findings[-1]
+            raise DataError(
+                finding.what,
+                file=finding.file,
+                quantity=finding.quantity,
+                remedy=finding.remedy,
+            )
+        return self.events[0]
+
+    @property
+    def strongest(self) -> CrashEvent:
+        """The event with the largest peak.
+
+        Raises
+        ------
+        DataError
+            There is none.
+        """
+        return max(self.events, key=lambda e: e.peak) if self.events else self.first
+
+    @property
+    def times_between(self) -> tuple[float, ...]:
+        """From time zero of each event to that of the next, s (49 CFR 563.5(b))."""
+        zeros = [e.time_zero for e in self.events]
+        return tuple(b - a for a, b in itertools.pairwise(zeros))
+
+    @property
+    def crashes(self) -> tuple[tuple[CrashEvent, ...], ...]:
+        """The events by crash: those that begin within 5 s of the first belong to one."""
+        groups: list[list[CrashEvent]] = []
+        for event in self.events:
+            if groups and event.time_zero - groups[-1][0].time_zero <= self.rule.multi_event:
+                groups[-1].append(event)
+            else:
+                groups.append([event])
+        return tuple(tuple(g) for g in groups)
+
+
+def detect_events(
+    acceleration: Acceleration,
+    rule: EventRule = PART_563,
+    *,
+    noise: float | Sequence[float] = 0.0,
+    bias_sd: float | Sequence[float] = 0.0,
+) -> CrashEvents:
+    """Find the events of a record, in retrospect.
+
+    Parameters
+    ----------
+    acceleration : Acceleration
+        In the frame ``body`` (`body_acceleration`: the mean at rest taken off) or ``impact``
+        (resolved in north-east-down, gravity taken off, then `Acceleration.along` a heading).
+    rule : EventRule
+    noise : float or (3,), m/s²
+        Standard deviation of a sample, white.
+    bias_sd : float or (3,), m/s²
+        Of the resting value.
+
+    Returns
+    -------
+    CrashEvents
+        The same events, to the last bit, as an `EventDetector` gives sample by sample.
+        Crossings are solved between the samples: with instantaneous sampling the acceleration is
+        a line there, which leaves an error of the second order in the step.
+
+    Raises
+    ------
+    ConfigError
+        The record is in north-east-down, where forward and right mean nothing.
+
+    Notes
+    -----
+    49 CFR 563.5(b): event, trigger threshold, time zero, end of event time, multi-event crash;
+    `EventRule` says how each is read. Braking at 0.9 g changes the velocity by 4.8 km/h within
+    150 ms and by 0.64 km/h within 20 ms, and is neither an event nor a wake.
+    """
+    source = acceleration.source
+    if acceleration.frame == "ned":
+        raise ConfigError(
+            "the record is in north-east-down, and an event is told forward and right",
+            file=source,
+            quantity="frame",
+            remedy="turn it with Acceleration.along(heading at the impact)",
+        )
+    detector = EventDetector(
+        rule, sampling=acceleration.sampling, noise=noise, bias_sd=bias_sd, source=source
+    )
+    detector.extend(acceleration.time, acceleration.values)
+    open_event = detector.current
+    events = detector.events + ((open_event,) if open_event is not None else ())
+    size, axis, when = detector.largest_change
+    findings = [f for e in events for f in _findings(e, acceleration, rule)]
+    if not events:
+        findings.append(_no_event(size, axis, when, detector.woken, rule, source))
+    return CrashEvents(
+        events, rule, detector.woken, size, axis, when, source, findings=tuple(findings)
+    )
+
+
+def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) -> list[Finding]:
+    found = []
+    source = acceleration.source
+    if event.starts_before_record:
+        found.append(
+            Finding(
+                f"the record begins in the event: {rule.wake / KMH:g} km/h are reached "
+                f"{event.woken - acceleration.begin:.4f} s after its first sample at "
+                f"{acceleration.begin:.6g} s, so that time zero and all changes of velocity count "
+                "from there and are too small",
+                file=source,
+                quantity="time zero",
+                remedy="use a record that begins at least 20 ms before the impact, or state the "
+                "velocity at which this one begins",
+            )
+        )
+    if event.lasts_beyond_record:
+        found.append(
+            Finding(
+                f"the record ends at {acceleration.end:.6g} s, "
+                f"{acceleration.end - event.time_zero:.4f} s after time zero, while the velocity "
+                f"still changes by more than {rule.wake / KMH:g} km/h within "
+                f"{rule.wake_window * 1e3:g} ms",
+                file=source,
+                quantity="end of event",
+                remedy="take its delta-V for that up to the end of the record",
+            )
+        )
+    for gap in acceleration.gaps(event.time_zero, event.end):
+        found.append(
+            Finding(
+                f"no sample for {gap.length * 1e3:.4g} ms within the event, from {gap.start:.6g} "
+                f"to {gap.end:.6g} s; it was bridged by a straight line",
+                file=source,
+                row=gap.sample + 1,
+                quantity="acceleration",
+                remedy="use another unit's record for this event, or distrust its delta-V by the "
+                "acceleration beside the gap times its length",
+            )
+        )
+    return found
+
+
+def _no_event(
+    size: float, axis: str, when: float, woken: int, rule: EventRule, source: str | None
+) -> Finding:
+    remedy = "check that the record holds the crash, and its axes and units"
+    if size * STANDARD_GRAVITY >= rule.trigger:
+        remedy = "if the record is in g, multiply it by 9.80665; otherwise " + remedy
+    return Finding(
+        f"no crash in it: the largest change of velocity in {rule.trigger_window * 1e3:g} ms is "
+        f"{size / KMH:.2f} km/h ({axis}, up to {when:.4f} s), and an event needs "
+        f"{rule.trigger / KMH:g} km/h; the wake threshold was exceeded {woken} times",
+        file=source,
+        quantity="delta-V",
+        remedy=remedy,
+    )
