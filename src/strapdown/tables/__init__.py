@@ -23,6 +23,10 @@ Trajectory              ``time`` s             ``lat lon`` deg, ``alt`` m (ellip
 TrajectoryError         ``time`` s             ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch
                                                heading`` deg: errors (estimate minus truth), or
                                                standard deviations
+Gnss                    ``time`` s             ``lat lon`` deg, ``alt`` m, ``VN VE VD`` m/s, of the
+                                               antenna; ``north_sd east_sd down_sd`` m, ``VN_sd
+                                               VE_sd VD_sd`` m/s: inf where not measured;
+                                               ``quality``: 0 no fix, else as NMEA 0183 GGA
 Attitude                ``time`` s             ``q_w q_x q_y q_z`` (body to local level) and
                                                ``roll pitch heading`` deg
 References              none                   ``time`` s, ``kind`` (``known``, ``tilt``,
@@ -45,12 +49,15 @@ from strapdown.tables.columns import (
     MAG,
     NED,
     PHI,
+    POSITION_SD,
     QUATERNION,
     REFERENCE,
     THETA,
     VELOCITY,
+    VELOCITY_SD,
 )
 from strapdown.tables.gaps import Gap, find_gaps
+from strapdown.tables.gnss import GNSS, check_gnss, gnss_table
 from strapdown.tables.imu import SAMPLINGS, check_imu, imu_table
 from strapdown.tables.increments import check_increments, increments_table
 from strapdown.tables.motion_increments import (
@@ -74,11 +81,13 @@ __all__ = [
     "DV",
     "EULER",
     "GEODETIC",
+    "GNSS",
     "GYRO",
     "MAG",
     "MOTION",
     "NED",
     "PHI",
+    "POSITION_SD",
     "QUATERNION",
     "REFERENCE",
     "REFERENCE_KINDS",
@@ -87,9 +96,11 @@ __all__ = [
     "TRAJECTORY",
     "TRAJECTORY_ERROR",
     "VELOCITY",
+    "VELOCITY_SD",
     "Gap",
     "attitude_table",
     "check_attitude",
+    "check_gnss",
     "check_imu",
     "check_increments",
     "check_motion_increments",
@@ -98,6 +109,7 @@ __all__ = [
     "check_trajectory_error",
     "check_trajectory_sd",
     "find_gaps",
+    "gnss_table",
     "imu_table",
     "increments_table",
     "motion_increments_table",

@@ -1,0 +1,236 @@
+"""A satellite receiver that rides on a motion, and what a crash does to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.antenna import antenna_motion
+from strapdown.sensors.error_draws import Seed, child, gauss_markov, normal
+from strapdown.sensors.triad_errors import ZERO, Triad, TriadLike
+from strapdown.simulation.earth_motion import EarthMotion
+from strapdown.tables import GEODETIC, VELOCITY, gnss_table
+
+Array = NDArray[np.float64]
+
+#: What a receiver does beyond its limits: gives no fix, gives false ones, or bears it.
+ON_EXCESS = ("lost", "garbage", "unaffected")
+
+# Streams below the seed of the receiver. A number is never given to another.
+_POSITION, _DRIFT, _VELOCITY, _FALSE = range(4)
+# What the tracking loops have in mind, s: acceleration and jerk are means over it.
+LOOP_MEMORY = 0.05
+# So finely the motion is searched for what is beyond the limits, s.
+_SEARCH = 0.005
+# Standard deviations of the fixes of a receiver that has lost its way.
+FALSE_POSITION, FALSE_VELOCITY = 100.0, 30.0  # m, m/s
+_MOST_FIXES = 1_000_000
+
+
+@dataclass(frozen=True)
+class GnssReceiver:
+    """What a receiver does to the truth. Triads are north, east, down.
+
+    Attributes
+    ----------
+    rate : float, Hz
+        Of fixes, 1 to 10 usually.
+    position_noise : triad, m
+        Standard deviation, new with each fix.
+    position_drift : triad, m
+        Standard deviation of a stationary Gauss-Markov process: orbits, clocks, atmosphere.
+    correlation_time : float, s
+        Of that process.
+    velocity_noise : triad, m/s
+    antenna : triad, m
+        In body axes, from the point that the motion describes.
+    time_offset : float, s
+        A fix that is stamped t is of the instant ``t - time_offset``.
+    largest_acceleration : float, m/s²
+    largest_jerk : float, m/s³
+        Of the antenna, as means over 50 ms, the memory of tracking loops.
+    on_excess : {'lost', 'garbage', 'unaffected'}
+        What comes of the fixes from the first instant beyond a limit until `outage` after the
+        last: none; false ones, with the usual claims of precision; or fixes as ever.
+    outage : float, s
+    stated_position_sd, stated_velocity_sd : triad, optional
+        What the receiver claims; where it is left out, the truth.
+
+    Raises
+    ------
+    ConfigError
+        A number is out of range, or `on_excess` is unknown.
+    """
+
+    rate: float = 10.0
+    position_noise: TriadLike = ZERO
+    position_drift: TriadLike = ZERO
+    correlation_time: float = 60.0
+    velocity_noise: TriadLike = ZERO
+    antenna: TriadLike = ZERO
+    time_offset: float = 0.0
+    largest_acceleration: float = 50.0
+    largest_jerk: float = 20.0
+    on_excess: str = "lost"
+    outage: float = 2.0
+    stated_position_sd: TriadLike | None = None
+    stated_velocity_sd: TriadLike | None = None
+
+    def __post_init__(self) -> None:
+        if self.on_excess not in ON_EXCESS:
+            raise ConfigError(
+                f"'{self.on_excess}' is nothing that a receiver does",
+                quantity="on_excess",
+                remedy=f"use one of {', '.join(ON_EXCESS)}",
+            )
+        for f in fields(self):
+            given = getattr(self, f.name)
+            if f.name == "on_excess" or given is None:
+                continue
+            triad = not isinstance(f.default, float)
+            value = np.atleast_1d(np.asarray(given, dtype=np.float64))
+            value = np.repeat(value, 3) if triad and value.size == 1 else value
+            if value.shape != ((3,) if triad else (1,)):
+                raise ConfigError(
+                    f"{given!r} has not the right shape",
+                    quantity=f.name,
+                    remedy="give one number, or three" if triad else "give one number",
+                )
+            signed = f.name in ("antenna", "time_offset")
+            positive = f.name in ("rate", "correlation_time")
+            limit = f.name in ("largest_acceleration", "largest_jerk", "correlation_time")
+            if (
+                not (np.isfinite(value) | (limit & (value == math.inf))).all()
+                or (not signed and (value < 0.0).any())
+                or (positive and (value == 0.0).any())
+            ):
+                raise ConfigError(
+                    f"{given!r} is out of range",
+                    quantity=f.name,
+                    remedy="give a finite number"
+                    if signed
+                    else f"give a number {'above zero' if positive else 'of zero or more'}",
+                )
+            kept = tuple(value.tolist()) if triad else float(value[0])
+            object.__setattr__(self, f.name, kept)
+
+    def triad(self, name: str) -> Triad:
+        """Return a per-axis attribute as three numbers."""
+        value: Triad = getattr(self, name)
+        return value
+
+
+def simulate_gnss(
+    motion: EarthMotion,
+    receiver: GnssReceiver,
+    *,
+    seed: Seed = 0,
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Fixes of a receiver over a motion.
+
+    Parameters
+    ----------
+    motion : EarthMotion
+    receiver : GnssReceiver
+    seed : int or SeedSequence
+        Of everything that is random. What a seed draws for a fix does not depend on whether
+        others were lost.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+        Gnss table; fixes fall on the instants ``k / rate`` within the motion.
+
+    Raises
+    ------
+    ConfigError
+        There is no more than a fix, or there are too many.
+    """
+    count = math.floor(receiver.rate * motion.duration * (1.0 + 1e-12)) + 1
+    if not 2 <= count <= _MOST_FIXES:
+        raise ConfigError(
+            f"{receiver.rate:g} Hz gives {count} fixes in {motion.duration:g} s",
+            quantity="rate",
+            remedy=f"use a rate that gives 2 to {_MOST_FIXES}",
+        )
+    instants = np.minimum(np.arange(count) / receiver.rate, motion.duration)
+    place, velocity = _antenna(motion, instants, receiver)
+    noise, drift = receiver.triad("position_noise"), receiver.triad("position_drift")
+    off = normal(seed, _POSITION, count) * noise
+    off += gauss_markov(
+        child(seed, _DRIFT),
+        np.full(count, 1.0 / receiver.rate),
+        drift,
+        receiver.correlation_time,
+        mean=False,
+    )
+    fast = normal(seed, _VELOCITY, count) * np.asarray(receiver.triad("velocity_noise"))
+    kept = np.ones(count, dtype=np.bool_)
+    if receiver.on_excess != "unaffected":
+        struck = _beyond(motion, receiver, instants)
+        if receiver.on_excess == "lost":
+            kept = ~struck
+        else:
+            wild = normal(seed, _FALSE, count, axes=6) * struck[:, None]
+            off += FALSE_POSITION * wild[:, :3]
+            fast += FALSE_VELOCITY * wild[:, 3:]
+    position_sd = receiver.stated_position_sd or tuple(np.hypot(noise, drift))
+    velocity_sd = receiver.stated_velocity_sd or receiver.velocity_noise
+    return gnss_table(
+        (instants + receiver.time_offset)[kept],
+        _moved(motion, place, off)[kept],
+        (velocity + fast)[kept],
+        position_sd,
+        velocity_sd,
+        source=source,
+    )
+
+
+def _antenna(motion: EarthMotion, time: Array, receiver: GnssReceiver) -> tuple[Array, Array]:
+    truth = motion.trajectory(time)
+    return antenna_motion(
+        truth[GEODETIC].to_numpy(dtype=np.float64),
+        truth[VELOCITY].to_numpy(dtype=np.float64),
+        motion.attitude(time),
+        motion.rate(time),
+        receiver.triad("antenna"),
+        ellipsoid=motion.ellipsoid,
+    )
+
+
+def _moved(motion: EarthMotion, place: Array, off: Array) -> Array:
+    """Places that are wrong by metres north, east, down."""
+    from strapdown.earth import radii_of_curvature
+
+    meridian, transverse = radii_of_curvature(place[:, 0], ellipsoid=motion.ellipsoid)
+    out = place.copy()
+    out[:, 0] += np.degrees(off[:, 0] / (meridian + place[:, 2]))
+    parallel = (transverse + place[:, 2]) * np.cos(np.radians(place[:, 0]))
+    out[:, 1] += np.degrees(off[:, 1] / parallel)
+    out[:, 2] -= off[:, 2]
+    return out
+
+
+def _beyond(motion: EarthMotion, receiver: GnssReceiver, instants: Array) -> NDArray[np.bool_]:
+    """Fixes within reach of an instant beyond the limits."""
+    per = round(LOOP_MEMORY / _SEARCH)
+    time = np.arange(math.floor(motion.duration / _SEARCH) + 1) * _SEARCH
+    struck = np.zeros(len(instants), dtype=np.bool_)
+    if len(time) <= 2 * per:
+        return struck
+    _, velocity = _antenna(motion, time, receiver)
+    acceleration = (velocity[per:] - velocity[:-per]) / LOOP_MEMORY
+    jerk = (acceleration[per:] - acceleration[:-per]) / LOOP_MEMORY
+    excess = np.linalg.norm(acceleration, axis=1) > receiver.largest_acceleration
+    excess[per:] |= np.linalg.norm(jerk, axis=1) > receiver.largest_jerk
+    for at in time[per:][excess]:
+        struck |= (instants >= at) & (instants <= at + receiver.outage)
+    return struck

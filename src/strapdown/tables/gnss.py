@@ -1,0 +1,217 @@
+"""Gnss tables: fixes of a satellite receiver, with what it says of their precision."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.frames import place_difference
+from strapdown.tables.checks import (
+    check_columns,
+    check_rows,
+    check_time,
+    index_of,
+    joined,
+    source_of,
+    values_of,
+)
+from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+
+Array = NDArray[np.float64]
+
+GNSS = [*GEODETIC, *VELOCITY, *POSITION_SD, *VELOCITY_SD, "quality"]
+
+# Quality indicators of NMEA 0183 GGA: 0 no fix, 1 autonomous, 2 differential, 3 precise, 4 and 5
+# carrier phase, 6 estimated, 7 and 8 manual and simulated.
+QUALITIES = range(9)
+# A step from fix to fix tells a speed where it is this many times longer than its places are
+# uncertain, and faster than a walk.
+CLEAR = 5.0
+LEAST_SPEED = 3.0  # m/s
+LEAST_STEPS = 4
+# The velocity is not that of the places beyond the one misfit, and another reading is right
+# below the other; both relative to the speed.
+UNLIKE, ALIKE = 0.3, 0.15
+
+
+def gnss_table(
+    time: ArrayLike,
+    place: ArrayLike,
+    velocity: ArrayLike,
+    position_sd: ArrayLike,
+    velocity_sd: ArrayLike,
+    quality: ArrayLike | None = None,
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Make a Gnss table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Increasing stamps, on the clock of the inertial sensors.
+    place : array_like, (n, 3)
+        Of the antenna: geodetic latitude and longitude in deg, height over the ellipsoid in m.
+    velocity : array_like, (n, 3), m/s
+        Of the antenna relative to the Earth: north, east, down.
+    position_sd : array_like, (n, 3) or (3,), m
+        Standard deviations north, east, down, with what stays the same from fix to fix; infinite
+        where it was not measured, whatever number stands there.
+    velocity_sd : array_like, (n, 3) or (3,), m/s
+        The same of the velocity.
+    quality : array_like, (n,), optional
+        0 no fix, 1 autonomous, 2 differential, 4 and 5 carrier phase: as field 6 of NMEA 0183
+        GGA. Where it is left out, 1.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_gnss`.
+    """
+    count = np.size(time)
+    blocks = {
+        "place": (place, 3),
+        "velocity": (velocity, 3),
+        "position_sd": (_each_row(position_sd, count), 3),
+        "velocity_sd": (_each_row(velocity_sd, count), 3),
+        "quality": (np.ones(count) if quality is None else quality, None),
+    }
+    table = joined(time, GNSS, source, **blocks)
+    check_gnss(table)
+    return table
+
+
+def check_gnss(table: pd.DataFrame) -> None:
+    """Check a Gnss table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a latitude is beyond
+        90 deg, a standard deviation is negative or not a number, a quality is unknown, or the
+        velocity is not that of the places but would be in km/h or knots, with north and east, or
+        latitude and longitude, exchanged.
+    """
+    source = source_of(table)
+    check_columns(table, GNSS, source)
+    check_time(index_of(table), source)
+    plain = [*GEODETIC, *VELOCITY, "quality"]
+    check_rows(values_of(table, plain), plain, source)
+    _check_latitude(table, source)
+    _check_sd(table, source)
+    quality = values_of(table, ["quality"])[:, 0]
+    unknown = np.flatnonzero(~np.isin(quality, list(QUALITIES)))
+    if unknown.size:
+        row = int(unknown[0])
+        raise DataError(
+            f"a quality of {quality[row]:g} is unknown",
+            file=source,
+            row=row + 1,
+            quantity="quality",
+            remedy="use the indicators of NMEA 0183 GGA: 0 no fix, 1 autonomous, 2 differential, "
+            "4 and 5 carrier phase",
+        )
+    _check_velocity_fits(table, source)
+
+
+def _each_row(sd: ArrayLike, count: int) -> ArrayLike:
+    """One triple stands for all rows."""
+    return np.tile(np.asarray(sd), (count, 1)) if np.shape(sd) == (3,) else sd
+
+
+def _check_latitude(table: pd.DataFrame, source: str | None) -> None:
+    lat, lon = values_of(table, ["lat", "lon"]).T
+    beyond = np.flatnonzero(np.abs(lat) > 90.0)
+    if beyond.size:
+        row = int(beyond[0])
+        raise DataError(
+            f"a latitude of {lat[row]:.9g} deg is beyond the pole",
+            file=source,
+            row=row + 1,
+            quantity="lat",
+            remedy="latitude and longitude seem to be swapped: exchange the columns"
+            if np.all(np.abs(lon) <= 90.0)
+            else "give geodetic latitude in degrees, north positive, within -90 to 90",
+        )
+
+
+def _check_sd(table: pd.DataFrame, source: str | None) -> None:
+    columns = [*POSITION_SD, *VELOCITY_SD]
+    values = values_of(table, columns)
+    bad = ~(values >= 0.0)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise DataError(
+            f"{values[row, column]:.9g} is no standard deviation",
+            file=source,
+            row=row + 1,
+            quantity=columns[column],
+            remedy="give zero or more, and inf where the receiver does not measure it",
+        )
+
+
+def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
+    """Refuse velocities that are those of the places in another unit or order."""
+    good = values_of(table, ["quality"])[:, 0] > 0.0
+    good &= np.isfinite(values_of(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])).all(axis=1)
+    if good.sum() <= LEAST_STEPS:
+        return
+    time = index_of(table)[good]
+    place, velocity = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good, :2]
+    # Steps as far apart as makes them clear; what is slow is not judged.
+    sd = values_of(table, POSITION_SD[:2])[good].max()
+    apart = max(1, len(time) // (2 * LEAST_STEPS))
+    lasted = (time[apart:] - time[:-apart])[:, None]
+    moved = place_difference(place[apart:], place[:-apart])[:, :2]
+    mean = _mean_between(velocity, time, apart)
+    clear = (np.hypot(*moved.T) > CLEAR * sd) & (np.hypot(*moved.T) > LEAST_SPEED * lasted[:, 0])
+    if clear.sum() < LEAST_STEPS:
+        return
+    track, told = (moved / lasted)[clear], mean[clear]
+
+    def misfit(reading: Array, way: Array = track) -> float:
+        return float(np.median(np.hypot(*(reading - way).T) / np.hypot(*way.T)))
+
+    if misfit(told) < UNLIKE:
+        return
+    kmh, knots = 3.6, 3600.0 / 1852.0
+    readings = {
+        "they are km/h: divide them by 3.6": misfit(told / kmh),
+        "they are knots: multiply them by 0.514444": misfit(told / knots),
+        "north and east are exchanged: exchange VN and VE": misfit(told[:, ::-1]),
+    }
+    if np.abs(place[:, 1]).max() < 90.0:
+        other = place_difference(place[apart:][:, [1, 0, 2]], place[:-apart][:, [1, 0, 2]])[:, :2]
+        readings["latitude and longitude are swapped: exchange the columns"] = misfit(
+            told, (other / lasted)[clear]
+        )
+    remedy = min(readings, key=lambda name: readings[name])
+    if readings[remedy] > ALIKE:
+        return
+    row = int(np.flatnonzero(good)[np.flatnonzero(clear)[0]])
+    raise DataError(
+        f"the velocity ({np.hypot(*told.T)[0]:.4g} m/s) is not that of the places, which move at "
+        f"{np.hypot(*track.T)[0]:.4g} m/s",
+        file=source,
+        row=row + 1,
+        quantity="lat, lon" if "latitude" in remedy else "VN, VE",
+        remedy=remedy,
+    )
+
+
+def _mean_between(velocity: Array, time: Array, apart: int) -> Array:
+    """Mean velocity between rows so far apart."""
+    steps = np.diff(time)[:, None]
+    way = np.vstack([np.zeros((1, 2)), np.cumsum(0.5 * steps * (velocity[1:] + velocity[:-1]), 0)])
+    return np.asarray((way[apart:] - way[:-apart]) / (time[apart:] - time[:-apart])[:, None])
