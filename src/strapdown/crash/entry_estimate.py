@@ -180,9 +180,7 @@ class _Search:
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
         )
         before = np.concatenate([np.zeros(6), away, -self.bias, -self.further])
-        return Problem(
-            residuals, self.jacobian, self.noise, self.prior_sd, before, self.blocks
-        )
+        return Problem(residuals, self.jacobian, self.noise, self.prior_sd, before, self.blocks)
 
     def take(self, adjustment: Adjustment) -> bool:
         """Add a step; return whether it was too small to go on."""
@@ -249,7 +247,10 @@ class _Search:
         kept = slice(len(imu) - len(run.time), None)
         sensed = values_of(imu, [*GYRO, *ACCEL])[kept]
         course = Course(
-            run.time, rotation.dcm_from_quaternion(run.history[:, 6:10]), sensed[:, :3], sensed[:, 3:]
+            run.time,
+            rotation.dcm_from_quaternion(run.history[:, 6:10]),
+            sensed[:, :3],
+            sensed[:, 3:],
         )
         return course, _at_fixes(run, course, self.fixes.instants)
 
@@ -340,9 +341,7 @@ class _AtFixes:
 
 def _at_fixes(run: NavigationRun, course: Course, instants: Array) -> _AtFixes:
     """Between two samples: place by Hermite's cubic, velocity and attitude by their rates."""
-    there = trajectory_at(
-        run.trajectory, instants, find_ellipsoid(run.mechanization.ellipsoid)
-    )
+    there = trajectory_at(run.trajectory, instants, find_ellipsoid(run.mechanization.ellipsoid))
     pushed = np.gradient(run.history[:, 3:6], run.time, axis=0)
     return _AtFixes(
         there[GEODETIC].to_numpy(dtype=np.float64),

@@ -185,9 +185,7 @@ def entry_state_from_gnss(
     )
 
 
-def _turn_only(
-    mechanization: NorthEastDown, imu: pd.DataFrame, first: pd.Series
-) -> NavigationRun:
+def _turn_only(mechanization: NorthEastDown, imu: pd.DataFrame, first: pd.Series) -> NavigationRun:
     """Navigate from a stand, level and to the north: only what changes means something."""
     increments = motion_increments(imu)
     begin = float(increments.index[0] - increments["dt"].iloc[0])

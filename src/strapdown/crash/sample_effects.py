@@ -12,7 +12,7 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.exceptions import DataError
 from strapdown.sensors.crash_unit import RecordedTriad
-from strapdown.sensors.lever_arm import angular_acceleration
+from strapdown.sensors.lever_arm import MovedImu, lever_matrix, rate_effect
 from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
 from strapdown.tables import ACCEL, GYRO
 
@@ -57,16 +57,14 @@ class SampleEffects:
     rate_noise: Array
 
 
-def unit_effects(
-    prepared: PreparedUnit, point: Sequence[float], *, time_sd: float = 0.0
-) -> SampleEffects:
+def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.0) -> SampleEffects:
     """List the unknowns of a unit and what each does at a point.
 
     Parameters
     ----------
     prepared : PreparedUnit
-    point : sequence of float, (3,), m
-        Vehicle axes, from the vehicle's origin.
+    moved : MovedImu
+        The same moved to the point: `move_unit`.
     time_sd : float, s
         How well the unit's clock is known against the common one.
 
@@ -86,11 +84,11 @@ def unit_effects(
     that its sensitivity to specific force acts on ``f - f_rest``. Vibration is the variance about
     a moving mean of 25 ms.
     """
-    return _UnitEffects(prepared, np.asarray(point, dtype=np.float64), time_sd).collect()
+    return _UnitEffects(prepared, moved, time_sd).collect()
 
 
 class _UnitEffects:
-    def __init__(self, prepared: PreparedUnit, point: Array, time_sd: float) -> None:
+    def __init__(self, prepared: PreparedUnit, moved: MovedImu, time_sd: float) -> None:
         unit = prepared.unit
         if unit.gyro is None:
             raise DataError(
@@ -113,7 +111,9 @@ class _UnitEffects:
             np.asarray(rest.accel_mean) @ self.turn if has_rest and rest else np.zeros(3)
         )
         self.has_rest = has_rest
-        self.arm = point - np.asarray(unit.mounting.position)
+        self.moved = moved
+        self.turning = moved.slope.value_of(self.rate)
+        self.lever = lever_matrix(moved.angular_acceleration, self.turning)
         self.names: list[str] = []
         self.contributors: list[str] = []
         self.forces: list[Array] = []
@@ -139,7 +139,12 @@ class _UnitEffects:
             np.array(self.rests).reshape(count, 3),
             np.array(self.tilts).reshape(count, 3),
             # Axes of the vehicle see what those of the sensors have, by the squares.
-            np.sqrt(self.prepared.noise**2 @ (self.turn.T**2)),
+            # What the gyro's noise adds through the arm is told as if each sample had its own:
+            # more than there is, since a slope's noise comes back with the other sign.
+            np.sqrt(
+                self.prepared.noise**2 @ (self.turn.T**2)
+                + np.diagonal(self.moved.added, axis1=1, axis2=2)
+            ),
             np.sqrt(self.prepared.gyro_noise**2 @ (self.turn.T**2)),
         )
 
@@ -152,21 +157,22 @@ class _UnitEffects:
         rest: Array,
         owner: str = "",
         tilt: Array | None = None,
+        through_arm: bool = True,
     ) -> None:
         n = len(self.time)
-        moved = np.zeros((n, 3)) if force is None else force
-        if rate is not None and self.arm.any():
-            moved = moved + self._through_arm(rate)
+        added = np.zeros((n, 3)) if force is None else force
+        if rate is not None and through_arm and self.moved.lever_arm.any():
+            added = added + self._through_arm(rate)
         # The correction that makes the force at rest as long as gravity takes back what an
         # unknown adds along it.
         if self.prepared.gravity_matched and self.has_rest and rest.any():
             along = self.turn @ self.rest_felt
             along = along / np.sqrt(along @ along)
             taken = (rest @ along) * along
-            moved, rest = moved - taken, rest - taken
+            added, rest = added - taken, rest - taken
         self.names.append(f"{owner or self.prepared.unit.name} {name}")
         self.contributors.append(contributor)
-        self.forces.append(moved)
+        self.forces.append(added)
         self.rates.append(np.zeros((n, 3)) if rate is None else rate)
         self.rests.append(rest)
         self.tilts.append(self._tilted(rest) if tilt is None else tilt)
@@ -179,9 +185,10 @@ class _UnitEffects:
         return np.array([-east, north, 0.0])
 
     def _through_arm(self, rate: Array) -> Array:
-        own = np.cross(rate, np.cross(self.rate, self.arm))
-        other = np.cross(self.rate, np.cross(rate, self.arm))
-        return np.cross(angular_acceleration(self.time, rate), self.arm) + own + other
+        """What an error of the rate adds to the force at the point."""
+        arm, slope = self.moved.lever_arm, self.moved.slope
+        turned = np.einsum("nij,nj->ni", rate_effect(self.turning, arm), slope.value_of(rate))
+        return np.asarray(np.cross(slope.slope_of(rate), arm) + turned)
 
     def _range(self, number: int) -> None:
         triad = self.prepared.unit.accelerometers[number]
@@ -318,9 +325,7 @@ class _UnitEffects:
                 )
             if mounting.position_sd > 0.0:
                 # The sensor sits further along the axis, so that the arm is shorter there.
-                arm = -mounting.position_sd * unit
-                alpha = angular_acceleration(self.time, self.rate)
-                force = np.cross(alpha, arm) + np.cross(self.rate, np.cross(self.rate, arm))
+                force = self.lever @ (-mounting.position_sd * unit)
                 self._add(f"lever arm {AXES[axis]}", "lever arm", force, None, np.zeros(3))
 
     def _levelling(self) -> None:
@@ -344,17 +349,11 @@ class _UnitEffects:
 
     def _timing(self) -> None:
         if self.time_sd > 0.0:
-            force = self.time_sd * np.gradient(self.force, self.time, axis=0)
+            # Force and rate are late together, and with them what the arm makes of the rate.
+            at_point = self.moved.imu[ACCEL].to_numpy(dtype=np.float64)
+            force = self.time_sd * np.gradient(at_point, self.time, axis=0)
             rate = self.time_sd * np.gradient(self.rate, self.time, axis=0)
-            # Force and rate are late together: the arm's part is in both already.
-            arm, self.arm = self.arm, np.zeros(3)
-            own = force + self.time_sd * np.gradient(self._arm_force(arm), self.time, axis=0)
-            self._add("timing", "timing", own, rate, np.zeros(3))
-            self.arm = arm
-
-    def _arm_force(self, arm: Array) -> Array:
-        alpha = angular_acceleration(self.time, self.rate)
-        return np.cross(alpha, arm) + np.cross(self.rate, np.cross(self.rate, arm))
+            self._add("timing", "timing", force, rate, np.zeros(3), through_arm=False)
 
 
 Effect = tuple[int, str, Callable[[Array], Array]]

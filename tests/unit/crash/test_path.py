@@ -16,6 +16,7 @@ from strapdown.crash.path import reconstruct_path
 from strapdown.crash.sample_effects import combine_effects, unit_effects
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
+from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.prepared_unit import Levelling
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
@@ -54,7 +55,7 @@ def truth(motion, time):
 def case():
     motion, imu = crash()
     unit = prepared(imu)
-    effects = unit_effects(unit, (0.0, 0.0, 0.0), time_sd=5e-4)
+    effects = unit_effects(unit, move_unit(unit, (0.0, 0.0, 0.0)), time_sd=5e-4)
     entry = Entry.from_speed(7.1, 0.05, slip_sd_deg=1.0, climb_sd=0.02)
     path = reconstruct_path(imu, effects, unit.levelling, -0.1, entry, window=WINDOW)
     return motion, imu, unit, effects, entry, path
@@ -75,7 +76,13 @@ def test_exact_samples_give_the_truth(case):
 def _again(rate):
     _, imu = crash(rate=rate)
     unit = prepared(imu)
-    return imu, unit_effects(unit, (0, 0, 0)), unit.levelling, -0.1, Entry.from_speed(7.1, 0.05)
+    return (
+        imu,
+        unit_effects(unit, move_unit(unit, (0, 0, 0))),
+        unit.levelling,
+        -0.1,
+        Entry.from_speed(7.1, 0.05),
+    )
 
 
 def test_backward_and_forward_meet(case):
@@ -157,7 +164,7 @@ def test_an_error_is_truth_less_computed(case):
 def test_a_bias_does_not_show_while_the_vehicle_does_not_turn():
     _, imu = crash(change=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0))
     unit = prepared(imu)
-    effects = unit_effects(unit, (0, 0, 0))
+    effects = unit_effects(unit, move_unit(unit, (0, 0, 0)))
     path = reconstruct_path(imu, effects, unit.levelling, -0.1, Entry.from_speed(7.1, 0.0))
     biased = [k for k, c in enumerate(path.contributors) if c == "accelerometer bias"]
     # 0.2 m/s² over 0.75 s would be 56 mm; levelling hides it to gravity's difference from
@@ -237,7 +244,7 @@ def test_speed_from_standing_still():
     imu.index = imu.index - 3.0
     unit = prepared(imu, mounting=Mounting())
     unit = replace(unit, levelling=Levelling(0.0, 0.0, 0.0, True))
-    effects = unit_effects(unit, (0, 0, 0))
+    effects = unit_effects(unit, move_unit(unit, (0, 0, 0)))
     path = reconstruct_path(imu, effects, unit.levelling, -2.1, None, window=(0.0, 0.75))
     assert path.entry.velocity[0] == pytest.approx(5.0, abs=1e-4)
     # Scale of 1 % and tilt against bias: two metres per second squared for two seconds.
