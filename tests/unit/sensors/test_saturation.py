@@ -13,7 +13,7 @@ TIME = np.arange(400) / 200.0
 def crash(peak, *, sd=0.3, q=0.0, full=1e9, seed=1, length=0.113):
     rng = np.random.default_rng(seed)
     x = np.clip((TIME - 1.0) / length, 0, 1)
-    y = np.outer(np.sin(np.pi * x) ** 2, [-peak, 0.5 * peak, 0.0]) + [0.0, 0.0, -9.8]
+    y = np.outer(np.sin(np.pi * x) ** 2, [-peak, 0.5 * peak, 0.0]) + np.array([0.0, 0.0, -9.8])
     y = np.clip(y + sd * rng.normal(size=y.shape), -full, full)
     return np.rint(y / q) * q if q else y
 

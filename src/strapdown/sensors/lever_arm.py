@@ -1,0 +1,238 @@
+"""Specific force at another point of a rigid body."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.local_slope import LocalSlope, local_slope
+from strapdown.sensors.prepared_unit import PreparedUnit
+from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
+from strapdown.tables.checks import check_columns
+
+Array = NDArray[np.float64]
+
+__all__ = ["MovedImu", "lever_matrix", "move_imu", "move_unit"]
+
+
+@dataclass(frozen=True, eq=False)
+class MovedImu:
+    """What an ideal accelerometer at another point of the body would read.
+
+    Attributes
+    ----------
+    imu : DataFrame
+        Imu table; the rates are those that were given.
+    lever_arm : ndarray, (3,), m
+        From where it was to where it is, body axes.
+    angular_acceleration : ndarray, (n, 3), rad/s²
+    added : ndarray, (n, 3, 3), (m/s²)²
+        Covariance that the noise of the gyro adds to each sample. Neighbours are correlated:
+        `slope` has the weights.
+    bandwidth : float, Hz
+        Of the angular acceleration: what turns faster is moved by less than it should be.
+    slope : LocalSlope
+        The filter that made it.
+    """
+
+    imu: pd.DataFrame
+    lever_arm: Array
+    angular_acceleration: Array
+    added: Array
+    bandwidth: float
+    slope: LocalSlope
+
+    @property
+    def added_sd(self) -> Array:
+        """Standard deviation that is added to each sample, (n, 3), m/s²."""
+        return np.asarray(np.sqrt(np.diagonal(self.added, axis1=1, axis2=2)), dtype=np.float64)
+
+
+def move_imu(
+    imu: pd.DataFrame,
+    lever_arm: ArrayLike,
+    *,
+    gyro_noise: ArrayLike = 0.0,
+    window: float | None = None,
+    gyro_delay: float = 0.0,
+) -> MovedImu:
+    """Move the specific force of an Imu table from S to P.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table with acceleration, any axes fixed in the body.
+    lever_arm : array_like, (3,), m
+        From S to P in those axes.
+    gyro_noise : array_like, rad/s
+        Of a sample: a number, (3,), (n, 3) standard deviations, or (n, 3, 3) covariances; white.
+        Of a gyro that was interpolated from a slower one, multiply it by the root of the ratio
+        of the steps, and let the window cover several steps of the slower one.
+    window : float, s, optional
+        As `local_slope`: of the parabola whose slope is the angular acceleration.
+    gyro_delay : float, s
+        By how much the gyro lags the accelerometer: the difference of the group delays of their
+        filters, ``1 / (2 pi bandwidth)`` for a single pole.
+
+    Returns
+    -------
+    MovedImu
+
+    Notes
+    -----
+    ``f_P = f_S + dω/dt × r + ω × (ω × r)``. It is linear in r: with the same window, S to P to S
+    gives back what there was, to rounding. With means over the samples, ``ω × (ω × r)`` of the
+    mean rate is short of its mean by ``|r| α² dt² / 12``. The body must be rigid between S and
+    P.
+
+    Raises
+    ------
+    DataError
+        The table is no Imu table with acceleration.
+    ConfigError
+        The lever arm is not three finite numbers; as `local_slope`.
+    """
+    check_imu(imu)
+    check_columns(imu, ACCEL, imu.attrs.get("source"))
+    r = np.asarray(lever_arm, dtype=np.float64)
+    if r.shape != (3,) or not np.isfinite(r).all():
+        raise ConfigError(
+            f"{lever_arm!r} are not three finite numbers",
+            quantity="lever arm",
+            remedy="give forward, right, down in m from the sensor to the point",
+        )
+    time = imu.index.to_numpy(dtype=np.float64)
+    gyro = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float64))
+    slope = local_slope(time, window=window, delay=gyro_delay)
+    alpha, omega = slope.slope_of(gyro), slope.value_of(gyro)
+    force = imu[ACCEL].to_numpy(dtype=np.float64) + lever_matrix(alpha, omega) @ r
+    moved = imu_table(
+        time,
+        gyro,
+        force,
+        sampling=str(imu.attrs["sampling"]),
+        source=imu.attrs.get("source"),
+    )
+    noise = _covariances(gyro_noise, time.size)
+    return MovedImu(moved, r, alpha, _added(slope, omega, r, noise), slope.bandwidth, slope)
+
+
+def move_unit(
+    prepared: PreparedUnit,
+    point: ArrayLike,
+    *,
+    window: float | None = None,
+    gyro_delay: float = 0.0,
+) -> MovedImu:
+    """Move a prepared unit from its place to a point of the vehicle.
+
+    Parameters
+    ----------
+    prepared : PreparedUnit
+    point : array_like, (3,), m
+        In vehicle axes from the vehicle's origin.
+    window, gyro_delay
+        As `move_imu`.
+
+    Returns
+    -------
+    MovedImu
+        In vehicle axes.
+    """
+    C = prepared.unit.mounting.C_vs
+    noise = np.einsum("ij,nj,kj->nik", C, prepared.gyro_noise**2, C)
+    arm = np.asarray(point, dtype=np.float64) - np.asarray(prepared.unit.mounting.position)
+    return move_imu(prepared.imu, arm, gyro_noise=noise, window=window, gyro_delay=gyro_delay)
+
+
+def lever_matrix(alpha: Array, omega: Array) -> Array:
+    """The matrices with which a lever arm makes a difference of specific force.
+
+    Parameters
+    ----------
+    alpha, omega : ndarray, (n, 3), rad/s² and rad/s
+
+    Returns
+    -------
+    ndarray, (n, 3, 3), 1/s²
+        ``[α×] + [ω×]²``: times r it is ``α × r + ω × (ω × r)``.
+    """
+    turning = cross_matrix(omega)
+    return cross_matrix(alpha) + turning @ turning
+
+
+def cross_matrix(v: Array) -> Array:
+    """``[v×]`` of each row.
+
+    Parameters
+    ----------
+    v : ndarray, (..., 3)
+
+    Returns
+    -------
+    ndarray, (..., 3, 3)
+    """
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    return out - np.swapaxes(out, -1, -2)
+
+
+def rate_effect(omega: Array, r: Array) -> Array:
+    """What an error of the rate does to ``ω × (ω × r)``.
+
+    Parameters
+    ----------
+    omega : ndarray, (n, 3), rad/s
+    r : ndarray, (3,), m
+
+    Returns
+    -------
+    ndarray, (n, 3, 3), m/s
+        ``(ω·r) I + ω rᵀ - 2 r ωᵀ``.
+    """
+    along = np.einsum("ni,i->n", omega, r)[:, None, None] * np.eye(3)
+    return np.asarray(along + omega[:, :, None] * r - 2.0 * r[:, None] * omega[:, None, :])
+
+
+def _added(slope: LocalSlope, omega: Array, r: Array, noise: Array) -> Array:
+    by_slope, by_rate = -cross_matrix(r), rate_effect(omega, r)
+    gains = (slope.slope**2).sum(axis=1), (slope.value**2).sum(axis=1)
+    both = (slope.slope * slope.value).sum(axis=1)
+    mixed = by_slope @ noise @ by_rate.transpose(0, 2, 1)
+    return np.asarray(
+        gains[0][:, None, None] * (by_slope @ noise @ by_slope.T)
+        + gains[1][:, None, None] * (by_rate @ noise @ by_rate.transpose(0, 2, 1))
+        + both[:, None, None] * (mixed + mixed.transpose(0, 2, 1))
+    )
+
+
+def _covariances(noise: ArrayLike, n: int) -> Array:
+    given = np.asarray(noise, dtype=np.float64)
+    if given.ndim == 3:
+        if given.shape != (n, 3, 3):
+            raise ConfigError(
+                f"covariances of shape {given.shape} do not go with {n} samples",
+                quantity="gyro_noise",
+                remedy="give (n, 3, 3)",
+            )
+        return given
+    try:
+        sd = np.broadcast_to(given, (n, 3))
+    except ValueError:
+        raise ConfigError(
+            f"standard deviations of shape {given.shape} do not go with {n} samples",
+            quantity="gyro_noise",
+            remedy="give one number, three, or one row a sample",
+        ) from None
+    if not (np.isfinite(sd).all() and (sd >= 0.0).all() and math.isfinite(float(sd.sum()))):
+        raise ConfigError(
+            "a standard deviation is negative or not finite",
+            quantity="gyro_noise",
+            remedy="give zero or more",
+        )
+    return np.asarray(sd[:, :, None] ** 2 * np.eye(3), dtype=np.float64)
