@@ -65,11 +65,14 @@ class Leg:
     def errors(self, start: Array) -> Array:
         """Grow the unknowns' errors from (p, 9) at the start to (p, k + 1, 9)."""
         out = np.empty((len(start), len(self.time), 9))
+        theta = self.effects[:, :3].transpose(0, 2, 1)
+        # What is added to a rotation vector turns the end of the step by this.
+        theta = theta + 0.5 * np.cross(self.rows[:, 1:4], theta)
         grow_errors(
             self._attitude(),
             self.rows,
             self._met(start),
-            np.ascontiguousarray(self.effects[:, :3]),
+            np.ascontiguousarray(theta.transpose(0, 2, 1)),
             np.ascontiguousarray(self.effects[:, 3:]),
             out,
         )

@@ -34,7 +34,7 @@ TURN = TriadUncertainty(
 MOUNTING = Mounting((0.6, -0.5, 0.2), (0.0, 0.0, 0.0), 0.02, 0.5)
 
 
-def prepared(imu, *, mounting=MOUNTING, low=LOW, high=HIGH, gyro=TURN, name="imu1"):
+def prepared(imu, *, mounting=MOUNTING, low=LOW, high=HIGH, gyro=TURN, rest=(-1.9, -0.1)):
     """What preparation makes of exact samples `imu`, vehicle axes, impact at zero."""
     spoken = (np.abs(imu[ACCEL].to_numpy()) > 18.0).astype(np.int8)
     never = np.zeros((len(imu), 3), dtype=bool)
@@ -42,7 +42,7 @@ def prepared(imu, *, mounting=MOUNTING, low=LOW, high=HIGH, gyro=TURN, name="imu
         spoken > 0, np.asarray(high.noise_density), np.asarray(low.noise_density)
     ) * np.sqrt(RATE)
     unit = CrashUnit(
-        name,
+        "imu1",
         (
             RecordedTriad(imu[ACCEL], low, "low-g"),
             RecordedTriad(imu[ACCEL], high, "high-g"),
@@ -58,7 +58,7 @@ def prepared(imu, *, mounting=MOUNTING, low=LOW, high=HIGH, gyro=TURN, name="imu
         gyro_clipped=never,
         noise=noise,
         gyro_noise=np.tile(np.asarray(gyro.noise_density) * np.sqrt(RATE), (len(imu), 1)),
-        rest=rest_between(imu, -1.9, -0.1),
+        rest=rest_between(imu, *rest),
         rest_accel_sd=0.0,
         levelling=Levelling(0.0, 0.0, 0.02, True),
         gyro_bias_sd=(5e-4, 5e-4, 5e-4),
