@@ -19,6 +19,7 @@ def modules() -> None:
     from strapdown.mechanization import MECHANIZATIONS, Mechanization
     from strapdown.sensors.catalogue import SENSORS, load_sensor
     from strapdown.simulation import SCENARIOS
+    from strapdown.simulation.crash_scenarios import CRASHES
 
     out = console()
     out.print("Attitude algorithms", style="bold")
@@ -62,6 +63,14 @@ def modules() -> None:
         [
             [name, f"{s.motion.duration:g}", f"{s.title} ({s.origin})"]
             for name, s in SCENARIOS.items()
+        ],
+    )
+    out.print("Crashes with exact truth, and what is none", style="bold")
+    print_table(
+        ["name", "s", "kind", "what it is"],
+        [
+            [name, f"{c.motion.duration:.3g}", c.kind or "–", f"{c.summary} ({c.source})"]
+            for name, c in CRASHES.items()
         ],
     )
     out.print("Sensors that can be simulated", style="bold")

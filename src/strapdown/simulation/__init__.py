@@ -2,7 +2,9 @@
 
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.coning import Coning
+from strapdown.simulation.crash_course import CrashScenario, Setting
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
+from strapdown.simulation.crash_scenarios import CRASHES, find_crash
 from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.gesture import Gesture, gesture
 from strapdown.simulation.handling import Handling
@@ -24,9 +26,11 @@ from strapdown.simulation.waves import Wave
 from strapdown.simulation.waypoints import through_waypoints
 
 __all__ = [
+    "CRASHES",
     "SCENARIOS",
     "Coning",
     "CrashMotion",
+    "CrashScenario",
     "EarthMotion",
     "Gesture",
     "Handling",
@@ -42,6 +46,7 @@ __all__ = [
     "Ringing",
     "Scenario",
     "Sculling",
+    "Setting",
     "SineVelocityMotion",
     "SmoothRandom",
     "SplineMotion",
@@ -51,6 +56,7 @@ __all__ = [
     "Wave",
     "aircraft",
     "car",
+    "find_crash",
     "find_scenario",
     "gesture",
     "point_kinematics",

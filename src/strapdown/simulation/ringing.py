@@ -33,7 +33,8 @@ class Ringing:
         On the clock of the motion.
     amplitude : float, m/s²
         Of the acceleration, on the envelope ``amplitude exp(-t/decay)`` that it follows after the
-        first period: ``X (w² + 1/decay²)``.
+        first period: ``X (w² + 1/decay²)``. The largest value falls into the onset, and is within
+        6 % of it where the ringing lasts (``w decay`` above 20).
     frequency : float, Hz
         Of the damped oscillation.
     decay : float, s
