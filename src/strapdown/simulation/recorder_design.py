@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.sensors.triad_errors import Triad, TriadErrors
+from strapdown.sensors.triad_errors import TriadErrors
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 # Faster than this, a crystal is broken.
@@ -194,12 +194,6 @@ class RecorderTruth:
     def clock(self, time: float) -> float:
         """What the recorder's clock shows at an instant of the motion, s."""
         return self.clock_offset + (1.0 + 1e-6 * self.clock_drift_ppm) * time
-
-
-def shifted(triad: Triad, by: Triad) -> Triad:
-    """Sum of two triads."""
-    x, y, z = (float(a + b) for a, b in zip(triad, by, strict=True))
-    return (x, y, z)
 
 
 def _out(design: RecorderDesign, name: str, remedy: str) -> ConfigError:
