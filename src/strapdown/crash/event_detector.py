@@ -173,7 +173,10 @@ class EventDetector:
             return None
         state = self._state
         pending = state[kernel.PENDING]
-        return self._event(float(state[kernel.NOW] if math.isnan(pending) else pending), True)
+        if math.isnan(pending):
+            return self._event(float(state[kernel.NOW]), True)
+        # It has become quiet, though not yet for long enough.
+        return self._event(float(pending), False)
 
     @property
     def samples(self) -> int:

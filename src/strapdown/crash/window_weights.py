@@ -1,0 +1,131 @@
+"""Weights with which samples make the integral over a window: the gradient of a delta-V."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.crash.acceleration import attitude_of_samples
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.tables.checks import as_array, check_time
+from strapdown.tables.imu import SAMPLINGS
+
+Array = NDArray[np.float64]
+
+__all__ = ["resolved_weights", "window_weights"]
+
+
+def window_weights(
+    time: ArrayLike, start: float, end: float, sampling: str = "instantaneous"
+) -> Array:
+    """Weights of the samples in the integral from one instant to another.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Increasing stamps.
+    start, end : float, s
+        Within the record; where `end` is before `start`, the integral is negative.
+    sampling : {'instantaneous', 'mean'}
+        Values at the stamps: between two of them the signal is a line (trapezoids, and parts of
+        trapezoids at the ends; error of the second order in the step). Means over the interval
+        that ends at the stamp: exact from stamp to stamp; within an interval its mean is taken
+        all over it (an end inside one: at most h²/8 of the slope there). The first row of means
+        tells of the time before the record and has no weight.
+
+    Returns
+    -------
+    ndarray, (n,), s
+        ``w``, such that the integral is ``w @ values``.
+
+    Raises
+    ------
+    ConfigError
+        `sampling` is unknown.
+    DataError
+        The window reaches beyond the record, or time does not advance.
+    """
+    stamps = as_array(time, None, "time")
+    check_time(stamps, None)
+    if sampling not in SAMPLINGS:
+        raise ConfigError(
+            f"'{sampling}' is no kind of sampling",
+            quantity="sampling",
+            remedy=f"use {' or '.join(SAMPLINGS)}",
+        )
+    check_within(stamps, start, end, None)
+    return _upto(stamps, end, sampling) - _upto(stamps, start, sampling)
+
+
+def check_within(time: Array, start: float, end: float, source: str | None) -> None:
+    """Refuse a window that is not within a record.
+
+    Raises
+    ------
+    DataError
+        It is not, or the record has fewer than two samples.
+    """
+    if len(time) < 2:
+        raise DataError(
+            f"{len(time)} sample: a change of velocity needs at least two",
+            file=source,
+            quantity="time",
+            remedy="record for longer, or check that the right file was given",
+        )
+    # Instants that were computed from stamps may lie a rounding beyond the last.
+    slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))
+    for instant in (start, end):
+        if not time[0] - slack <= instant <= time[-1] + slack:
+            raise DataError(
+                f"the window from {start:.6g} to {end:.6g} s is not within the record, which has "
+                f"{time[0]:.6g} to {time[-1]:.6g} s",
+                file=source,
+                quantity="time",
+                remedy="take a shorter or later window, or a record that holds it",
+            )
+
+
+def _upto(time: Array, instant: float, sampling: str) -> Array:
+    """Weights of the integral from the first stamp."""
+    weights = np.zeros(len(time))
+    k = int(np.clip(np.searchsorted(time, instant, side="right"), 1, len(time) - 1))
+    steps = np.diff(time[:k])
+    step = time[k] - time[k - 1]
+    u = (instant - time[k - 1]) / step
+    if sampling == "mean":
+        weights[1:k] = steps
+        weights[k] = step * u
+    else:
+        weights[: k - 1] += 0.5 * steps
+        weights[1:k] += 0.5 * steps
+        weights[k - 1] += step * (u - 0.5 * u * u)
+        weights[k] += step * 0.5 * u * u
+    return weights
+
+
+def resolved_weights(weights: ArrayLike, q_nb: ArrayLike, sampling: str) -> Array:
+    """Gradient of a delta-V in north-east-down with respect to the samples in body axes.
+
+    Parameters
+    ----------
+    weights : array_like, (n,), s
+        As `window_weights`.
+    q_nb : array_like, (n, 4)
+        Attitude at every stamp, as `resolved_acceleration` takes it.
+    sampling : {'instantaneous', 'mean'}
+
+    Returns
+    -------
+    ndarray, (n, 3, 3), s
+        ``G``: an error ``e[k]`` of the samples, (3,), moves the delta-V by ``sum G[k] @ e[k]``.
+
+    Raises
+    ------
+    DataError
+        There is not one rotation a sample.
+    """
+    w = as_array(weights, None, "weights")
+    q = attitude_of_samples(q_nb, sampling, len(w))
+    turned: Array = w[:, None, None] * rotation.dcm_from_quaternion(q)
+    return turned
