@@ -44,7 +44,7 @@ class PathSamples:
     def covariance(self) -> Array:
         """About their mean, (n, 9, 9)."""
         centred = self.errors - self.errors.mean(axis=0)
-        return np.einsum("rni,rnj->nij", centred, centred) / (len(centred) - 1)
+        return np.asarray(np.einsum("rni,rnj->nij", centred, centred) / (len(centred) - 1))
 
     def interval(self, share: float = 0.95) -> tuple[Array, Array]:
         """Bounds between which the middle `share` of the runs lie, each (n, 9)."""
@@ -96,8 +96,8 @@ def sample_paths(
         start = path.start.copy()
         if leg.backward:
             start[:, VELOCITY] *= -1.0
-        used = leg.effects.any(axis=2)
-        active = start.any(axis=1) | used.any(axis=1)
+        used: NDArray[np.bool_] = np.asarray(leg.effects != 0.0).any(axis=2)
+        active: NDArray[np.bool_] = np.asarray(start != 0.0).any(axis=1) | used.any(axis=1)
         prepared.append(
             (
                 leg,

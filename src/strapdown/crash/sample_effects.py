@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.triad_curves import AXES, Curve, constant, triad_curves
 from strapdown.exceptions import DataError
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.lever_arm import MovedImu, lever_matrix, rate_effect
@@ -20,7 +21,6 @@ Array = NDArray[np.float64]
 
 # What is faster than this part of a record is vibration to it.
 VIBRATION = 0.025  # s
-AXES = "xyz"
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,13 +199,13 @@ class _UnitEffects:
         if not (spoke.any() or heirs.any()):
             return
         sd = triad.uncertainty
-        bias = sd.bias if source is None else self.prepared.bias_sd[number]
+        bias = sd.axis("bias") if source is None else self.prepared.bias_sd[number]
         for axis in range(3):
-            if bias[axis] > 0.0:  # type: ignore[index]
-                one = lambda f, a=axis, b=bias: np.full(len(f), b[a])  # noqa: E731
+            if bias[axis] > 0.0:
                 what = "bias" if source is None else "bias against the lower range"
+                what, one = f"{what} {AXES[axis]}", constant(bias[axis])
                 self._axis_effect(number, axis, spoke, heirs, one, what, "accelerometer bias", True)
-        for name, contributor, effects in _curves(triad):
+        for name, contributor, effects in triad_curves(triad):
             for axis, label, effect in effects:
                 self._axis_effect(
                     number, axis, spoke, heirs, effect, f"{name}{label}", contributor, False
@@ -225,7 +225,7 @@ class _UnitEffects:
         axis: int,
         spoke: NDArray[np.bool_],
         heirs: NDArray[np.bool_],
-        effect: Callable[[Array], Array],
+        effect: Curve,
         name: str,
         contributor: str,
         constant: bool,
@@ -242,10 +242,7 @@ class _UnitEffects:
         direction = self.turn[:, axis]
         rest = at_rest * direction if not calibrated and self.has_rest else np.zeros(3)
         triad = self.prepared.unit.accelerometers[number]
-        label = f"{triad.name} {name}"
-        if "→" not in name:
-            label += f" {AXES[axis]}"
-        self._add(label, contributor, np.outer(one, direction), None, rest)
+        self._add(f"{triad.name} {name}", contributor, np.outer(one, direction), None, rest)
 
     def _vibration(self, triad: RecordedTriad, spoke: NDArray[np.bool_]) -> None:
         sd = triad.uncertainty.axis("vibration_rectification")
@@ -300,11 +297,10 @@ class _UnitEffects:
                     )
 
     def _gyro_curves(self, axis: int) -> Iterator[tuple[str, str, Array]]:
-        for name, contributor, effects in _curves(self.gyro):
+        for name, contributor, effects in triad_curves(self.gyro):
             for a, label, effect in effects:
                 if a == axis:
-                    end = "" if "→" in label else f" {AXES[axis]}"
-                    yield f"gyro {name}{label}{end}", f"gyro {contributor}", effect(self.turned)
+                    yield f"gyro {name}{label}", f"gyro {contributor}", effect(self.turned)
 
     def _mounting(self) -> None:
         mounting = self.prepared.unit.mounting
@@ -354,32 +350,6 @@ class _UnitEffects:
             force = self.time_sd * np.gradient(at_point, self.time, axis=0)
             rate = self.time_sd * np.gradient(self.rate, self.time, axis=0)
             self._add("timing", "timing", force, rate, np.zeros(3), through_arm=False)
-
-
-Effect = tuple[int, str, Callable[[Array], Array]]
-
-
-def _curves(triad: RecordedTriad) -> Iterator[tuple[str, str, list[Effect]]]:
-    """Errors that follow from the input: one standard deviation of each, by axis."""
-    sd = triad.uncertainty
-    scale, skew = sd.axis("scale"), sd.axis("misalignment")
-    bend, full = sd.axis("nonlinearity_2"), sd.axis("full_scale")
-    scales: list[Effect] = []
-    skews: list[Effect] = []
-    bends: list[Effect] = []
-    for a in range(3):
-        if scale[a] > 0.0:
-            scales.append((a, "", lambda f, a=a: scale[a] * f[:, a]))
-        if skew[a] > 0.0:
-            for j in range(3):
-                if j != a:
-                    label = f" {AXES[j]}→{AXES[a]}"
-                    skews.append((a, label, lambda f, a=a, j=j: skew[a] * f[:, j]))
-        if bend[a] > 0.0:
-            bends.append((a, "", lambda f, a=a: bend[a] * f[:, a] ** 2 / full[a]))
-    yield "scale", "scale factor", scales
-    yield "misalignment", "misalignment", skews
-    yield "nonlinearity", "nonlinearity", bends
 
 
 def combine_effects(parts: Sequence[SampleEffects], weights: Sequence[float]) -> SampleEffects:

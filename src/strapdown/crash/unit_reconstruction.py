@@ -1,0 +1,226 @@
+"""One unit, or the mean of several, from what it says at the reference point to its answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
+from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
+from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
+from strapdown.crash.entry import Entry
+from strapdown.crash.event_rule import PART_563, EventRule
+from strapdown.crash.events import CrashEvents, detect_events
+from strapdown.crash.path import WINDOW, CrashPath, reconstruct_path
+from strapdown.crash.sample_effects import SampleEffects
+from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
+from strapdown.exceptions import Finding
+from strapdown.results import RestStretch
+from strapdown.sensors.prepared_unit import Levelling
+from strapdown.tables import ACCEL
+
+Array = NDArray[np.float64]
+
+#: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
+PEAK_WINDOW = 0.030
+
+
+@dataclass(frozen=True, eq=False)
+class AtPoint:
+    """What a unit says at the reference point.
+
+    Attributes
+    ----------
+    name : str
+    imu : DataFrame
+        Imu table in vehicle axes, time from the common trigger.
+    effects : SampleEffects
+    levelling : Levelling
+    rest : RestStretch, optional
+    rest_accel_sd : float, m/s²
+        What is not known of the vehicle's own acceleration over the rest.
+    """
+
+    name: str
+    imu: pd.DataFrame = field(repr=False)
+    effects: SampleEffects = field(repr=False)
+    levelling: Levelling
+    rest: RestStretch | None
+    rest_accel_sd: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class UnitReconstruction:
+    """The answers of one unit, or of the mean of several.
+
+    Attributes
+    ----------
+    name : str
+    at_point : AtPoint
+    acceleration : Acceleration
+        Along the turning axes of the vehicle, the resting value taken off.
+    resolved : Acceleration
+        In the axes of the path, gravity taken off; over the path's window.
+    events : CrashEvents
+    path : CrashPath
+    body, ned : tuple of EventChanges
+        Of every event, along the turning axes and resolved. An event that reaches beyond the
+        path's window has no resolved change.
+    findings : tuple of Finding
+    """
+
+    name: str
+    at_point: AtPoint = field(repr=False)
+    acceleration: Acceleration = field(repr=False)
+    resolved: Acceleration = field(repr=False)
+    events: CrashEvents
+    path: CrashPath = field(repr=False)
+    body: tuple[EventChanges, ...]
+    ned: tuple[EventChanges | None, ...]
+    findings: tuple[Finding, ...] = ()
+
+
+def reconstruct_unit(
+    at_point: AtPoint,
+    entry: Entry | None,
+    *,
+    window: Sequence[float] = WINDOW,
+    peak_window: float = PEAK_WINDOW,
+    rule: EventRule = PART_563,
+    gravity: float = 9.80665,
+) -> UnitReconstruction:
+    """Find the events of a unit, its changes of velocity and its path.
+
+    Parameters
+    ----------
+    at_point : AtPoint
+    entry : Entry or None
+        As `reconstruct_path`.
+    window : (float, float), s
+        Of the path.
+    peak_window : float, s
+    rule : EventRule
+    gravity : float, m/s²
+        At the place.
+
+    Returns
+    -------
+    UnitReconstruction
+        Without any event where there is no crash in the record: `events` says how near it came.
+
+    Raises
+    ------
+    DataError, DivergenceError
+        As `reconstruct_path`.
+    """
+    at_rest, rest_sd = resting_force(at_point, gravity)
+    acceleration = body_acceleration(at_point.imu, at_rest.tolist())
+    effects = at_point.effects
+    events = detect_events(
+        acceleration,
+        rule,
+        noise=tuple(float(x) for x in np.median(effects.force_noise, axis=0)),
+        bias_sd=tuple(float(x) for x in rest_sd),
+    )
+    path = reconstruct_path(
+        at_point.imu,
+        effects,
+        at_point.levelling,
+        None if at_point.rest is None else at_point.rest.end,
+        entry,
+        window=window,
+    )
+    first = int(np.searchsorted(at_point.imu.index, path.time[0] - 1e-9))
+    part = at_point.imu.iloc[first : first + len(path.time)]
+    part.attrs = dict(at_point.imu.attrs)
+    resolved = resolved_acceleration(part, path.q_nb, gravity)
+    body: list[EventChanges] = []
+    ned: list[EventChanges | None] = []
+    findings = list(events.findings)
+    for event in events.events:
+        ends = event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
+        start, end = event.time_zero, min(event.end, acceleration.end)
+        peak = trailing_delta_v(acceleration, peak_window, min(start + peak_window, end), end).peak
+        whole = delta_v(acceleration, start, end, across_gaps=True)
+        body.append(
+            EventChanges(
+                _along(effects, peak, "peak", rest_sd, None),
+                _along(effects, whole, "event", rest_sd, _moved(whole, ends)),
+            )
+        )
+        if path.time[0] <= min(start, peak.start) and max(end, peak.end) <= path.time[-1]:
+            course = np.unwrap(path.table["heading"], period=360.0)
+            heading = float(np.interp(start, path.time, course)) % 360.0
+            spans = (peak.start, peak.end), (start, end)
+            peak, whole = (delta_v(resolved, *span, across_gaps=True) for span in spans)
+            ned.append(
+                EventChanges(
+                    _resolved(path, peak, "peak", heading, None),
+                    _resolved(path, whole, "event", heading, _moved(whole, ends)),
+                )
+            )
+        else:
+            ned.append(None)
+            findings.append(
+                Finding(
+                    f"the event from {start:.6g} s to {end:.6g} s is not within the path, "
+                    f"which has {path.time[0]:.6g} s to {path.time[-1]:.6g} s: its change of "
+                    "velocity is told along the turning axes alone",
+                    file=at_point.name,
+                    quantity="window",
+                    remedy="choose a window that holds the whole event",
+                )
+            )
+    return UnitReconstruction(
+        at_point.name,
+        at_point,
+        acceleration,
+        resolved,
+        events,
+        path,
+        tuple(body),
+        tuple(ned),
+        tuple(findings),
+    )
+
+
+def resting_force(at_point: AtPoint, gravity: float) -> tuple[Array, Array]:
+    """Mean specific force before the crash and how well it is known, (3,) each, m/s².
+
+    Where there is no rest, gravity in the attitude that was stated.
+    """
+    rest, level = at_point.rest, at_point.levelling
+    if rest is None:
+        C_bn = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0]).T
+        tilt = gravity * math.radians(level.sd_deg)
+        return C_bn @ np.array([0.0, 0.0, -gravity]), np.array([tilt, tilt, 0.0])
+    imu = at_point.imu
+    within = (imu.index >= rest.start - 1e-9) & (imu.index <= rest.end + 1e-9)
+    mean = imu.loc[within, ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
+    noise = np.zeros(3) if rest.accel_mean_sd is None else np.asarray(rest.accel_mean_sd)
+    return mean, np.hypot(noise, at_point.rest_accel_sd)
+
+
+def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:
+    """What one standard deviation of either end of an event does to its change."""
+    return np.array([-change.start_rate * ends[0], change.end_rate * ends[1]])
+
+
+def _along(
+    effects: SampleEffects, change: DeltaV, window: str, rest_sd: Array, at_ends: Array | None
+) -> VelocityChange:
+    bound = body_delta_v_bound(effects, change.weights, rest_sd=rest_sd, at_ends=at_ends)
+    return velocity_change(window, change, bound)
+
+
+def _resolved(
+    path: CrashPath, change: DeltaV, window: str, heading: float, at_ends: Array | None
+) -> VelocityChange:
+    bound = resolved_delta_v_bound(path, change.start, change.end, at_ends=at_ends)
+    return velocity_change(window, change, bound, heading)
