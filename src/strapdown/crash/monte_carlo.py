@@ -96,8 +96,8 @@ def sample_paths(
         start = path.start.copy()
         if leg.backward:
             start[:, VELOCITY] *= -1.0
-        used: NDArray[np.bool_] = np.asarray(leg.effects != 0.0).any(axis=2)
-        active: NDArray[np.bool_] = np.asarray(start != 0.0).any(axis=1) | used.any(axis=1)
+        used = np.abs(leg.effects).max(axis=2, initial=0.0) > 0.0
+        active = (np.abs(start).max(axis=1) > 0.0) | (used.sum(axis=1) > 0)
         prepared.append(
             (
                 leg,
