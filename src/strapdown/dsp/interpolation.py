@@ -12,7 +12,7 @@ from strapdown.exceptions import DataError
 
 Array = NDArray[np.float64]
 
-__all__ = ["POINTS", "interpolate"]
+__all__ = ["POINTS", "interpolate", "interpolated_means"]
 
 POINTS = 6
 
@@ -93,3 +93,47 @@ def lagrange(nodes: Array, at: Array) -> Array:
             if i != j:
                 weights[:, i] *= (at - nodes[:, j]) / (nodes[:, i] - nodes[:, j])
     return weights
+
+
+def interpolated_means(
+    time: ArrayLike,
+    values: ArrayLike,
+    stamps: ArrayLike,
+    length: float,
+    marked: Flags | None = None,
+) -> Resampled:
+    """Means of `interpolate` over intervals that end at stamps, by Gauss with three points.
+
+    Parameters
+    ----------
+    time, values, stamps, marked
+        As in `interpolate`; the intervals lie within the record.
+    length : float, s
+        Of the intervals, no longer than two steps of the samples.
+
+    Returns
+    -------
+    Resampled
+        Exact for polynomials up to degree 5.
+    """
+    t, channels = as_channels(time, "time")[:, 0], as_channels(values)
+    at = as_channels(stamps, "stamps")[:, 0]
+    node, share = np.polynomial.legendre.leggauss(3)
+    points = at[:, None] + 0.5 * length * (node - 1.0)
+    interpolate(t, channels, [points.min(), points.max()])
+    n, width = len(t), min(POINTS + 4, len(t))
+    low = np.clip(np.searchsorted(t, points[:, 0], side="right") - POINTS // 2, 0, n - width)
+
+    def weigh(rows: slice) -> tuple[LocalWeights, Flags]:
+        m = len(low[rows])
+        weights = np.zeros((m, width))
+        for k in range(3):
+            x = points[rows, k]
+            first = np.searchsorted(t, x, side="right") - POINTS // 2
+            first = np.clip(first, low[rows], low[rows] + width - POINTS)
+            at_node = lagrange(t[first[:, None] + np.arange(POINTS)], x)
+            place = (first - low[rows])[:, None] + np.arange(POINTS)
+            weights[np.arange(m)[:, None], place] += 0.5 * share[k] * at_node
+        return LocalWeights(low[rows], weights), np.ones(m, dtype=bool)
+
+    return in_blocks(channels, len(at), width, weigh, marked)

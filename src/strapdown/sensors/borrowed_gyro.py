@@ -1,0 +1,110 @@
+"""A gyro of another unit on the same rigid body, as it would have read in one's own axes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.onto_stamps import TriadAtStamps
+from strapdown.sensors.triad_errors import Triad
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.tables import GYRO
+
+Array = NDArray[np.float64]
+
+__all__ = ["check_lenders", "turned_gyro"]
+
+# A component that takes less than this of an axis does not feel that axis's end of range.
+FEELS = 1e-3
+
+
+def check_lenders(units: dict[str, CrashUnit]) -> None:
+    """Check that every borrowed gyro is there.
+
+    Raises
+    ------
+    ConfigError
+        A unit borrows from itself, from a unit that is not there, or from one that has none.
+    """
+    for unit in units.values():
+        if unit.gyro is not None or unit.gyro_from is None:
+            continue
+        having = [u.name for u in units.values() if u.gyro is not None]
+        if unit.gyro_from not in units:
+            raise ConfigError(
+                f"unit {unit.name} borrows the gyro of {unit.gyro_from!r}, which is not among the "
+                "units",
+                quantity="gyro_from",
+                remedy=nearest(unit.gyro_from, having) if having else "give a unit with a gyro",
+            )
+        if units[unit.gyro_from].gyro is None:
+            raise ConfigError(
+                f"unit {unit.name} borrows the gyro of {unit.gyro_from}, which has none either",
+                quantity="gyro_from",
+                remedy=f"borrow from a unit that has one: {', '.join(having)}"
+                if having
+                else "give a unit with a gyro",
+            )
+
+
+def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> TriadAtStamps:
+    """Turn a gyro through both mountings into the borrower's sensor axes.
+
+    Parameters
+    ----------
+    lent : TriadAtStamps
+        In the lender's sensor axes.
+    lender, borrower : Mounting
+
+    Returns
+    -------
+    TriadAtStamps
+        ``ω_b = C_vb^T C_va ω_a``. Standard deviations are turned as of independent axes,
+        ``sd_b² = (C ∘ C) sd_a²``; the range of an axis is the least of those it feels, and it is
+        clipped where one of them is.
+    """
+    C_ba = borrower.C_vs.T @ lender.C_vs
+    square = C_ba**2
+    feels = np.abs(C_ba) > FEELS
+    table = lent.triad.table
+    turned = pd.DataFrame(table[GYRO].to_numpy() @ C_ba.T, index=table.index, columns=GYRO)
+    turned.attrs = dict(table.attrs)
+    return TriadAtStamps(
+        RecordedTriad(turned, _turned(lent.triad.uncertainty, square, feels), lent.triad.name),
+        np.sqrt(lent.noise_factor**2 @ square.T),
+        np.sqrt(lent.noise**2 @ square.T),
+        np.asarray((lent.clipped[:, None, :] & feels).any(axis=2)),
+        lent.whole,
+        lent.method,
+    )
+
+
+def _turned(
+    uncertainty: TriadUncertainty, square: Array, feels: NDArray[np.bool_]
+) -> TriadUncertainty:
+    def turned(name: str) -> Triad:
+        return _three(np.sqrt(square @ np.square(uncertainty.axis(name))))
+
+    limits = np.array(uncertainty.axis("full_scale"))
+    return replace(
+        uncertainty,
+        noise_density=turned("noise_density"),
+        bias=turned("bias"),
+        scale=turned("scale"),
+        misalignment=turned("misalignment"),
+        nonlinearity_2=turned("nonlinearity_2"),
+        g_sensitivity=turned("g_sensitivity"),
+        vibration_rectification=turned("vibration_rectification"),
+        quantization=turned("quantization"),
+        full_scale=_three(np.where(feels, limits, np.inf).min(axis=1)),
+    )
+
+
+def _three(values: Array) -> Triad:
+    x, y, z = (float(v) for v in values)
+    return x, y, z

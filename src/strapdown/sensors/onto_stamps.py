@@ -1,0 +1,236 @@
+"""Channels of a triad at common stamps: a faster one without aliasing, a slower interpolated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.dsp.decimation import Resampled, decimate, low_pass_design, mean_samples
+from strapdown.dsp.interpolation import interpolate, interpolated_means
+from strapdown.dsp.samples import even_step
+from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.crash_unit import RecordedTriad
+from strapdown.sensors.triad_channels import AxisGroup, TriadChannels
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+__all__ = ["TriadAtStamps", "allowed_stamps", "onto_stamps"]
+
+# Stamps that agree to this part of a step are the same.
+SAME_STAMP = 1e-3
+# A rate that is higher by less is the same, of a clock that is off.
+SAME_RATE = 1.01
+# A sample at this part of the range was held there.
+AT_END = 0.999
+
+
+@dataclass(frozen=True, eq=False)
+class TriadAtStamps:
+    """A triad at the common stamps.
+
+    Attributes
+    ----------
+    triad : RecordedTriad
+        Its `uncertainty` is the recorded one: the density of the noise at low frequencies, which
+        is what integrals see, is as it was. What a single sample scatters by is `noise`.
+    noise_factor : ndarray, (n, 3)
+        Standard deviation of a sample per that of a recorded sample, exact for white noise.
+    noise : ndarray, (n, 3), u
+        Standard deviation of each sample by the stated density: ``density/√dt``, dt the recorded
+        step, times `noise_factor`.
+    clipped : ndarray of bool, (n, 3)
+        Whether a recorded sample at the end of the range counts in the sample.
+    whole : ndarray of bool, (n,)
+        False where the end of the record was continued to make the sample.
+    method : str
+        'as recorded', 'decimated', 'averaged' or 'interpolated'.
+    """
+
+    triad: RecordedTriad
+    noise_factor: Array
+    noise: Array
+    clipped: Flags
+    whole: Flags
+    method: str
+
+
+def allowed_stamps(
+    channels: TriadChannels, offset: float, rate: float, sampling: str
+) -> tuple[float, float]:
+    """First and last common stamp that a triad can serve.
+
+    Parameters
+    ----------
+    channels : TriadChannels
+    offset : float, s
+        Common time is the unit's stamp less this.
+    rate : float, Hz
+    sampling : {'instantaneous', 'mean'}
+        Of the output.
+    """
+    lows, highs = [], []
+    for g in channels.groups:
+        own = g.step if channels.sampling == "mean" else 0.0
+        low, high = g.time[0], g.time[-1]
+        if _is_faster(g, rate):
+            # Means of means need the whole of the first step; a kernel its middle.
+            low, high = (low - own, high) if sampling == "mean" else (low - own / 2, high - own / 2)
+            low += 1.0 / rate if sampling == "mean" else 0.0
+        elif not _same_kind_and_rate(g, channels.sampling, rate, sampling):
+            low, high = low - own / 2, high - own / 2
+            if sampling == "mean":
+                shift = 1.0 / rate if own == 0.0 else 0.5 / rate
+                low, high = low + shift, high + (0.0 if own == 0.0 else 0.5 / rate)
+        lows.append(low - offset)
+        highs.append(high - offset)
+    return float(max(lows)), float(min(highs))
+
+
+def onto_stamps(
+    channels: TriadChannels,
+    triad: RecordedTriad,
+    columns: list[str],
+    offset: float,
+    stamps: Array,
+    rate: float,
+    sampling: str,
+    attenuation: float,
+) -> tuple[TriadAtStamps, list[Finding]]:
+    """Bring a triad to common stamps.
+
+    Parameters
+    ----------
+    channels : TriadChannels
+    triad : RecordedTriad
+        What `channels` are of.
+    columns : list of str
+    offset : float, s
+        Common time is the unit's stamp less this.
+    stamps : ndarray, (n,), s
+        On the common clock, within `allowed_stamps`.
+    rate : float, Hz
+    sampling : {'instantaneous', 'mean'}
+    attenuation : float, dB
+        Of what would be aliased, for instantaneous output.
+
+    Raises
+    ------
+    DataError
+        Faster samples are not even, or the record is shorter than the low-pass.
+    """
+    n = len(stamps)
+    values, factor, noise = (np.empty((n, 3)) for _ in range(3))
+    clipped, whole = np.zeros((n, 3), dtype=bool), np.ones(n, dtype=bool)
+    limits = np.array(triad.uncertainty.axis("full_scale"))
+    density = np.array(triad.uncertainty.axis("noise_density"))
+    methods, findings = [], []
+    for g in channels.groups:
+        axes = list(g.axes)
+        held = np.abs(g.values) >= AT_END * limits[axes]
+        at, method = _resample(channels, g, held, offset, stamps, rate, sampling, attenuation)
+        values[:, axes], factor[:, axes] = at.values, at.noise_factor[:, None]
+        noise[:, axes] = at.noise_factor[:, None] * density[axes] / np.sqrt(g.step)
+        clipped[:, axes] = at.touched
+        whole &= at.whole
+        methods.append(method)
+        findings += _said(channels.source, [columns[a] for a in axes], g, method, rate)
+    table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
+    table.attrs = {**triad.table.attrs, "sampling": sampling, "source": channels.source}
+    order = ("decimated", "averaged", "interpolated", "as recorded")
+    result = TriadAtStamps(
+        RecordedTriad(table, triad.uncertainty, triad.name),
+        factor,
+        noise,
+        clipped,
+        whole,
+        next(m for m in order if m in methods),
+    )
+    return result, findings
+
+
+def _is_faster(g: AxisGroup, rate: float) -> bool:
+    return 1.0 / g.step > SAME_RATE * rate
+
+
+def _same_kind_and_rate(g: AxisGroup, own: str, rate: float, wanted: str) -> bool:
+    return own == wanted and abs(g.step * rate - 1.0) < SAME_RATE - 1.0
+
+
+def _resample(
+    channels: TriadChannels,
+    g: AxisGroup,
+    held: Flags,
+    offset: float,
+    stamps: Array,
+    rate: float,
+    sampling: str,
+    attenuation: float,
+) -> tuple[Resampled, str]:
+    own = g.step if channels.sampling == "mean" else 0.0
+    at = stamps + offset
+    if _is_faster(g, rate):
+        try:
+            step = even_step(g.time)
+        except DataError as error:
+            raise _named(error, channels.source) from None
+        try:
+            if sampling == "mean":
+                return mean_samples(
+                    g.values,
+                    g.time[0],
+                    step,
+                    at,
+                    1.0 / rate,
+                    sampling=channels.sampling,
+                    marked=held,
+                ), "averaged"
+            design = low_pass_design(step, rate, attenuation=attenuation)
+            return decimate(
+                g.values, g.time[0] - 0.5 * own, step, at, design, marked=held
+            ), "decimated"
+        except DataError as error:
+            raise _named(error, channels.source) from None
+    if _same_kind_and_rate(g, channels.sampling, rate, sampling):
+        first = int(np.argmin(np.abs(g.time - at[0])))
+        near = g.time[first : first + len(at)]
+        if len(near) == len(at) and np.abs(near - at).max() < SAME_STAMP * g.step:
+            rows = slice(first, first + len(at))
+            one = np.ones(len(at))
+            return Resampled(g.values[rows], one, one > 0.0, held[rows]), "as recorded"
+        return interpolate(g.time, g.values, at, marked=held), "interpolated"
+    centred = g.time - 0.5 * own
+    if sampling == "mean" and own == 0.0:
+        return interpolated_means(centred, g.values, at, 1.0 / rate, marked=held), "interpolated"
+    middle = at - (0.5 / rate if sampling == "mean" else 0.0)
+    return interpolate(centred, g.values, middle, marked=held), "interpolated"
+
+
+def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float) -> list[Finding]:
+    if method != "interpolated":
+        return []
+    own = 1.0 / g.step
+    slower = own * SAME_RATE < rate
+    why = "slower than" if slower else "at other instants than"
+    return [
+        Finding(
+            f"{', '.join(names)} at {own:.5g} Hz, {why} the common stamps at {rate:g} Hz, "
+            "interpolated by polynomials through six samples",
+            file=source,
+            quantity="time",
+            remedy=f"nothing above some {own / 8.0:.3g} Hz is kept to a part in a thousand; "
+            + (
+                "use a lower rate if that matters"
+                if slower
+                else "give `rate` or the trigger so that stamps coincide if that matters"
+            ),
+        )
+    ]
+
+
+def _named(error: DataError, source: str) -> DataError:
+    f = error.finding
+    return DataError(f.what, file=source, row=f.row, quantity=f.quantity, remedy=f.remedy)

@@ -1,0 +1,299 @@
+"""All channels of all units at common stamps of one clock, zero at the trigger."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, onto_stamps
+from strapdown.sensors.triad_channels import TriadChannels, triad_channels
+from strapdown.sensors.unit_clocks import (
+    UnitChannels,
+    UnitClock,
+    clocks_by_correlation,
+    clocks_by_trigger,
+)
+from strapdown.sensors.units_together import check_options, compare_sizes
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+__all__ = ["SynchronisedUnit", "SynchronisedUnits", "synchronise"]
+
+LEAST_STAMPS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class SynchronisedUnit:
+    """A unit at the common stamps.
+
+    Attributes
+    ----------
+    unit : CrashUnit
+        Tables on the common clock, all at the same stamps; `trigger` 0 and `trigger_sd` that of
+        the clock. A borrowed gyro stands in `gyro`, in the unit's own sensor axes, and `gyro_from`
+        says whose it was.
+    accelerometers : tuple of TriadAtStamps
+        The same triads with noise, clipping and ends.
+    gyro : TriadAtStamps or None
+    offset : float, s
+        Common time is the recorded stamp less this.
+    time_sd : float, s
+        How well `offset` is known.
+    how : str
+        From what.
+    lender : str or None
+        Name of the unit whose gyro is borrowed.
+    gyro_time_sd : float, s
+        Of the borrowed gyro against this unit's accelerometers; 0 for an own one.
+    """
+
+    unit: CrashUnit
+    accelerometers: tuple[TriadAtStamps, ...]
+    gyro: TriadAtStamps | None
+    offset: float
+    time_sd: float
+    how: str
+    lender: str | None
+    gyro_time_sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class SynchronisedUnits:
+    """Units on one clock.
+
+    Attributes
+    ----------
+    units : tuple of SynchronisedUnit
+        In the order given.
+    time : ndarray, (n,), s
+        Common stamps ``k/rate``, zero at the trigger.
+    rate : float, Hz
+    reference : str or None
+        Unit whose clock is the common one, with method 'correlation'.
+    trigger_sd : float, s
+        How well the zero is known where all units share its error; else 0, and each unit's
+        `time_sd` has it.
+    findings : tuple of Finding
+    """
+
+    units: tuple[SynchronisedUnit, ...]
+    time: Array
+    rate: float
+    reference: str | None
+    trigger_sd: float
+    findings: tuple[Finding, ...]
+
+    def unit(self, name: str) -> SynchronisedUnit:
+        """Find a unit by its name.
+
+        Raises
+        ------
+        ConfigError
+            There is none of that name.
+        """
+        for u in self.units:
+            if u.unit.name == name:
+                return u
+        raise ConfigError(
+            f"there is no unit {name!r}",
+            quantity="name",
+            remedy=nearest(name, [u.unit.name for u in self.units]),
+        )
+
+
+def synchronise(
+    units: Sequence[CrashUnit],
+    *,
+    method: str = "trigger",
+    rate: float = 200.0,
+    reference: str | None = None,
+    sampling: str = "instantaneous",
+    attenuation: float = 80.0,
+) -> SynchronisedUnits:
+    """Bring units onto one clock and common stamps.
+
+    Parameters
+    ----------
+    units : sequence of CrashUnit
+        On one rigid vehicle, of any rates and starts, each on its own clock.
+    method : {'trigger', 'correlation'}
+        Zero is each unit's own trigger; or the reference unit's, and the others are laid over it by
+        the lengths of their specific forces or rates, whichever says more.
+    rate : float, Hz
+        Of the common stamps.
+    reference : str, optional
+        Name of that unit; the first with a trigger where nothing is given.
+    sampling : {'instantaneous', 'mean'}
+        What the samples shall be: values of a signal that is limited to half the output's Nyquist
+        frequency (to twice of that the low-pass falls by `attenuation`), or true means over the
+        step that ends at the stamp, whose sums are the integral.
+    attenuation : float, dB
+
+    Returns
+    -------
+    SynchronisedUnits
+        Cut to what all units cover. Faster channels are decimated (or averaged), without delay;
+        others are interpolated where they were not sampled at the common stamps, and a finding
+        says so.
+
+    Raises
+    ------
+    ConfigError
+        `method`, `rate`, `reference`, `sampling` or a unit's `gyro_from` is not understood, or two
+        units have one name.
+    DataError
+        A unit has no trigger, a bad table, or no stretch in common with the others.
+    """
+    check_options(units, method, rate, reference, sampling)
+    by_name = {u.name: u for u in units}
+    check_lenders(by_name)
+    given = [_channels(u) for u in units]
+    findings = [f for u in given for t in _triads(u) for f in t.findings]
+    findings += compare_sizes([(u.gyro, u.accelerometers) for u in given])
+    zero_sd = 0.0
+    if method == "trigger":
+        clocks, reference = clocks_by_trigger(given), None
+    else:
+        chosen = _reference(given, reference)
+        clocks, said = clocks_by_correlation(given, chosen)
+        findings += said
+        reference, zero_sd = chosen.unit.name, chosen.unit.trigger_sd
+    time = _common_stamps(given, clocks, rate, sampling)
+    done: dict[str, SynchronisedUnit] = {}
+    # Lenders first: borrowers take what has been made of theirs.
+    for u, clock in sorted(zip(given, clocks, strict=True), key=lambda p: p[0].gyro is None):
+        triads = []
+        for channels, triad, columns in _parts(u):
+            at, said = onto_stamps(
+                channels, triad, columns, clock.offset, time, rate, sampling, attenuation
+            )
+            triads.append(at)
+            findings += said
+        gyro, gyro_sd = (triads.pop() if u.gyro is not None else None), 0.0
+        borrowed = u.unit.gyro_from if gyro is None else None
+        if borrowed is not None:
+            lender = done[borrowed]
+            assert lender.gyro is not None
+            gyro = turned_gyro(lender.gyro, lender.unit.mounting, u.unit.mounting)
+            gyro_sd = math.hypot(clock.sd, lender.time_sd)
+        done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, borrowed, gyro_sd)
+    ordered = tuple(done[u.name] for u in units)
+    findings += _ends(ordered, time)
+    return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
+
+
+def _made(
+    unit: CrashUnit,
+    clock: UnitClock,
+    accelerometers: tuple[TriadAtStamps, ...],
+    gyro: TriadAtStamps | None,
+    lender: str | None,
+    gyro_time_sd: float,
+) -> SynchronisedUnit:
+    made = replace(
+        unit,
+        accelerometers=tuple(a.triad for a in accelerometers),
+        gyro=None if gyro is None else gyro.triad,
+        trigger=0.0,
+        trigger_sd=clock.sd,
+    )
+    return SynchronisedUnit(
+        made, accelerometers, gyro, clock.offset, clock.sd, clock.how, lender, gyro_time_sd
+    )
+
+
+def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str]]]:
+    parts = [(c, t, ACCEL) for c, t in zip(u.accelerometers, u.unit.accelerometers, strict=True)]
+    if u.gyro is not None and u.unit.gyro is not None:
+        parts.append((u.gyro, u.unit.gyro, GYRO))
+    return parts
+
+
+def _triads(u: UnitChannels) -> tuple[TriadChannels, ...]:
+    return (*u.accelerometers, *(() if u.gyro is None else (u.gyro,)))
+
+
+def _channels(unit: CrashUnit) -> UnitChannels:
+    if not unit.accelerometers and unit.gyro is None:
+        raise DataError(
+            "it has neither accelerometers nor a gyro",
+            file=unit.name,
+            quantity="accelerometers",
+            remedy="give it a triad, or leave the unit out",
+        )
+    return UnitChannels(
+        unit,
+        tuple(triad_channels(unit, t, ACCEL) for t in unit.accelerometers),
+        None if unit.gyro is None else triad_channels(unit, unit.gyro, GYRO),
+    )
+
+
+def _reference(given: list[UnitChannels], name: str | None) -> UnitChannels:
+    if name is not None:
+        return next(u for u in given if u.unit.name == name)
+    having = [u for u in given if u.unit.trigger is not None]
+    if not having:
+        raise DataError(
+            "no unit has a trigger, and time is counted from it",
+            file=", ".join(u.unit.name for u in given),
+            quantity="trigger",
+            remedy="give one unit the instant of the trigger on its clock, in s",
+        )
+    return having[0]
+
+
+def _common_stamps(
+    given: list[UnitChannels], clocks: list[UnitClock], rate: float, sampling: str
+) -> Array:
+    spans = [
+        (channels.source, *allowed_stamps(channels, clock.offset, rate, sampling))
+        for u, clock in zip(given, clocks, strict=True)
+        for channels in _triads(u)
+    ]
+    latest = max(spans, key=lambda s: s[1])
+    earliest = min(spans, key=lambda s: s[2])
+    first = math.ceil(latest[1] * rate - 1e-6)
+    last = math.floor(earliest[2] * rate + 1e-6)
+    if last - first + 1 < LEAST_STAMPS:
+        raise DataError(
+            f"on the common clock it begins at {latest[1]:.6g} s, and {earliest[0]} ends at "
+            f"{earliest[2]:.6g} s: they share no stretch of {LEAST_STAMPS} samples at {rate:g} Hz",
+            file=latest[0],
+            quantity="time",
+            remedy="check the triggers, and that all records are of one crash",
+        )
+    return np.arange(first, last + 1) / rate
+
+
+def _ends(units: tuple[SynchronisedUnit, ...], time: Array) -> list[Finding]:
+    found = []
+    for u in units:
+        own = (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
+        for t in own:
+            if t.whole.all():
+                continue
+            inner = np.flatnonzero(t.whole)
+            kept = (
+                f"whole from {time[inner[0]]:.4g} to {time[inner[-1]]:.4g} s"
+                if inner.size
+                else "nowhere whole"
+            )
+            found.append(
+                Finding(
+                    f"the low-pass is {kept}: outside, the record's ends were continued by their "
+                    "point mirror, and samples scatter up to "
+                    f"{float(t.noise_factor.max() / np.median(t.noise_factor)):.2g} times as much",
+                    file=f"{u.unit.name}, {t.triad.name}",
+                    quantity="time",
+                    remedy="record longer before and after, or use means (sampling='mean')",
+                )
+            )
+    return found

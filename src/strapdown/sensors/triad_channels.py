@@ -1,0 +1,288 @@
+"""The channels of a recorded triad, checked: axes, stamps, numbers, units."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
+from strapdown.tables.checks import check_rows, check_time
+
+Array = NDArray[np.float64]
+
+__all__ = ["AxisGroup", "TriadChannels", "triad_channels"]
+
+LEAST_SAMPLES = 6
+# Length of the mean specific force at rest that is gravity in g, and none at all.
+IN_G = (0.85, 1.15)
+NO_GRAVITY = 2.0  # m/s²
+# A bias that could look like either.
+BIAS_SPEAKS = 1.0  # m/s²
+# No vehicle turns so fast; 100 deg/s is what a hard crash does.
+FASTEST_TURN = 50.0  # rad/s
+OVER_RANGE = 1.05
+DEGREES = 180.0 / math.pi
+
+
+@dataclass(frozen=True, eq=False)
+class AxisGroup:
+    """Axes that share their stamps.
+
+    Attributes
+    ----------
+    axes : tuple of int
+        0, 1, 2 for x, y, z.
+    time : ndarray, (n,), s
+    values : ndarray, (n, len(axes))
+    step : float, s
+        The usual one.
+    """
+
+    axes: tuple[int, ...]
+    time: Array
+    values: Array
+    step: float
+
+
+@dataclass(frozen=True, eq=False)
+class TriadChannels:
+    """A triad as it can be brought to other stamps.
+
+    Attributes
+    ----------
+    source : str
+        Unit and part, for messages.
+    groups : tuple of AxisGroup
+        One, where all axes were sampled together.
+    sampling : str
+    findings : tuple of Finding
+    """
+
+    source: str
+    groups: tuple[AxisGroup, ...]
+    sampling: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def start(self) -> float:
+        """First stamp that all axes have, s."""
+        return float(max(g.time[0] for g in self.groups))
+
+    @property
+    def end(self) -> float:
+        """Last stamp that all axes have, s."""
+        return float(min(g.time[-1] for g in self.groups))
+
+
+def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> TriadChannels:
+    """Check a triad and take out its channels.
+
+    Parameters
+    ----------
+    unit : CrashUnit
+    triad : RecordedTriad
+        Its table may hold axes of different rates and starts: rows that an axis does not have are
+        NaN then.
+    columns : list of str
+        `ACCEL` or `GYRO`.
+
+    Returns
+    -------
+    TriadChannels
+
+    Raises
+    ------
+    DataError
+        An axis is missing, time does not advance, a number is not finite, there is a gap or there
+        are fewer than six samples, or the units are evidently others.
+    """
+    source = f"{unit.name}, {triad.name}"
+    table = triad.table
+    missing = [c for c in columns if c not in table.columns]
+    if missing:
+        raise DataError(
+            f"it has no {' and no '.join(missing)}; it has {', '.join(map(str, table.columns))}",
+            file=source,
+            quantity=missing[0],
+            remedy="give all three axes, or leave this part out",
+        )
+    sampling = table.attrs.get("sampling")
+    if sampling not in SAMPLINGS:
+        raise DataError(
+            f"attrs['sampling'] is {sampling!r}",
+            file=source,
+            quantity="sampling",
+            remedy=f"say {' or '.join(SAMPLINGS)}",
+        )
+    stamps = np.asarray(table.index.to_numpy(), dtype=np.float64)
+    check_time(stamps, source)
+    values = table[columns].to_numpy(dtype=np.float64)
+    groups, findings = _groups(source, stamps, values, columns)
+    judge = _judge_force if columns == ACCEL else _judge_rate
+    return TriadChannels(
+        source,
+        groups,
+        str(sampling),
+        (*findings, *judge(source, unit, triad, groups)),
+    )
+
+
+def _groups(
+    source: str, stamps: Array, values: Array, columns: list[str]
+) -> tuple[tuple[AxisGroup, ...], list[Finding]]:
+    there = ~np.isnan(values)
+    patterns: dict[bytes, list[int]] = {}
+    for axis in range(3):
+        patterns.setdefault(there[:, axis].tobytes(), []).append(axis)
+    groups = tuple(
+        _group(source, stamps, values, columns, tuple(axes)) for axes in patterns.values()
+    )
+    if len(groups) == 1:
+        return groups, []
+    said = "; ".join(
+        f"{', '.join(columns[a] for a in g.axes)} {1.0 / g.step:.5g} Hz from {g.time[0]:.6g} to "
+        f"{g.time[-1]:.6g} s"
+        for g in groups
+    )
+    return groups, [
+        Finding(
+            f"its axes were not sampled together: {said}",
+            file=source,
+            quantity="time",
+            remedy="each axis is brought to the common stamps by itself, and the record is cut to "
+            "what all have; check that a slow axis has the bandwidth that is needed",
+        )
+    ]
+
+
+def _group(
+    source: str, stamps: Array, values: Array, columns: list[str], axes: tuple[int, ...]
+) -> AxisGroup:
+    names = [columns[a] for a in axes]
+    block = values[:, list(axes)]
+    rows = np.flatnonzero(~np.isnan(block[:, 0]))
+    if rows.size >= 2:
+        # Rows that a slower or later axis does not have come at a steady beat; others are holes.
+        skips = np.diff(rows)
+        odd = skips != np.median(skips)
+        if odd.any():
+            row = int(rows[int(np.argmax(odd))]) + 1
+            check_rows(block[row : row + 1], names, source)
+            raise DataError(
+                f"nan at {stamps[row]:.9g} s, between samples of the axis",
+                file=source,
+                row=row + 1,
+                quantity=names[0],
+                remedy="fill it with what is known, or cut the record before it",
+            )
+        time, block = stamps[rows], np.ascontiguousarray(block[rows])
+    else:
+        time, block = stamps[rows], block[rows]
+    if len(time) < LEAST_SAMPLES:
+        raise DataError(
+            f"it has {len(time)} samples, and {LEAST_SAMPLES} are needed",
+            file=source,
+            quantity=names[0],
+            remedy="give a record of the crash, or leave this part out",
+        )
+    check_rows(block, names, source)
+    gaps = find_gaps(time)
+    if gaps:
+        worst = max(gaps, key=lambda g: g.length)
+        raise DataError(
+            f"{len(gaps)} gap{'s' * (len(gaps) > 1)}, the longest of {1e3 * worst.length:.4g} ms "
+            f"from {worst.start:.6g} s, where {1e3 * worst.usual:.4g} ms are usual",
+            file=source,
+            row=worst.sample + 1,
+            quantity="time",
+            remedy="cut the record before or after it, or fill it with what is known",
+        )
+    return AxisGroup(axes, time, block, float(np.median(np.diff(time))))
+
+
+def _quiet_mean(unit: CrashUnit, groups: tuple[AxisGroup, ...]) -> Array:
+    """Mean before the trigger; of the first tenth where there is none, or little before it."""
+    out = np.zeros(3)
+    for g in groups:
+        before = g.time < (math.inf if unit.trigger is None else unit.trigger - 10.0 * g.step)
+        if unit.trigger is None or before.sum() < 10:
+            before = np.arange(len(g.time)) < max(10, len(g.time) // 10)
+        out[list(g.axes)] = g.values[before].mean(axis=0)
+    return out
+
+
+def _judge_force(
+    source: str, unit: CrashUnit, triad: RecordedTriad, groups: tuple[AxisGroup, ...]
+) -> list[Finding]:
+    found = _over_range(source, triad, groups, "m/s²", "g instead of m/s²? 1 g is 9.80665 m/s²")
+    length = float(np.linalg.norm(_quiet_mean(unit, groups)))
+    if IN_G[0] <= length <= IN_G[1]:
+        what = f"its specific force before the crash is {length:.3f} in length: gravity in g"
+        remedy = "multiply the columns by 9.80665, so that they are in m/s²"
+        if max(triad.uncertainty.axis("bias")) < BIAS_SPEAKS:
+            raise DataError(what, file=source, quantity="accel", remedy=remedy)
+        found.append(
+            Finding(f"{what}, or a bias", file=source, quantity="accel", remedy=f"if g: {remedy}")
+        )
+    elif length < NO_GRAVITY:
+        found.append(
+            Finding(
+                f"its specific force before the crash is {length:.2f} m/s² in length: gravity is "
+                "not in it",
+                file=source,
+                quantity="accel",
+                remedy="where the channels were zeroed before the impact, add the specific force "
+                "at rest back; else check the units",
+            )
+        )
+    return found
+
+
+def _judge_rate(
+    source: str, unit: CrashUnit, triad: RecordedTriad, groups: tuple[AxisGroup, ...]
+) -> list[Finding]:
+    largest = max(float(np.abs(g.values).max()) for g in groups)
+    limit = max(triad.uncertainty.axis("full_scale"))
+    stated = math.isfinite(limit)
+    if largest > (5.0 * limit if stated else FASTEST_TURN):
+        bound = f"its range of {limit:.4g} rad/s" if stated else "what a vehicle does"
+        raise DataError(
+            f"rates up to {largest:.4g} are far beyond {bound}; as deg/s they would be "
+            f"{largest / DEGREES:.4g} rad/s",
+            file=source,
+            quantity="gyro",
+            remedy="multiply the columns by π/180, so that they are in rad/s",
+        )
+    return _over_range(source, triad, groups, "rad/s", "deg/s instead of rad/s?")
+
+
+def _over_range(
+    source: str, triad: RecordedTriad, groups: tuple[AxisGroup, ...], unit: str, hint: str
+) -> list[Finding]:
+    limits = np.array(triad.uncertainty.axis("full_scale"))
+    peak = np.zeros(3)
+    for g in groups:
+        peak[list(g.axes)] = np.abs(g.values).max(axis=0)
+    over = peak > OVER_RANGE * limits
+    if not over.any():
+        return []
+    axis = int(np.argmax(peak / limits))
+    return [
+        Finding(
+            f"{'xyz'[axis]} reaches {peak[axis]:.4g} {unit}, and the stated range is "
+            f"{limits[axis]:.4g} {unit}",
+            file=source,
+            quantity="full_scale",
+            remedy=f"check the units of the table and of the range ({hint})",
+        )
+    ]
+
+
+def columns_of(unit: CrashUnit, triad: RecordedTriad) -> list[str]:
+    """Column names of one of the unit's triads."""
+    return GYRO if triad is unit.gyro else ACCEL

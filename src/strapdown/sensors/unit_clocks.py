@@ -1,0 +1,167 @@
+"""How the clocks of units on one vehicle relate: by the common trigger, or by what they felt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.dsp.delay import Delay, EvenSignal, find_delay
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.triad_channels import TriadChannels
+
+Array = NDArray[np.float64]
+
+__all__ = ["UnitClock", "clocks_by_correlation", "clocks_by_trigger"]
+
+# Triggers and correlation that differ by more standard deviations contradict each other.
+CONTRADICTION = 4.0
+
+
+@dataclass(frozen=True)
+class UnitClock:
+    """A unit's clock against the common one.
+
+    Attributes
+    ----------
+    offset : float, s
+        Common time is the unit's stamp less this.
+    sd : float, s
+    how : str
+        For people.
+    """
+
+    offset: float
+    sd: float
+    how: str
+
+
+@dataclass(frozen=True, eq=False)
+class UnitChannels:
+    """A unit and the channels of its triads."""
+
+    unit: CrashUnit
+    accelerometers: tuple[TriadChannels, ...]
+    gyro: TriadChannels | None
+
+
+def clocks_by_trigger(units: Sequence[UnitChannels]) -> list[UnitClock]:
+    """Take each unit's own trigger as zero.
+
+    Raises
+    ------
+    DataError
+        A unit has none.
+    """
+    return [UnitClock(_trigger(u.unit), u.unit.trigger_sd, "trigger") for u in units]
+
+
+def clocks_by_correlation(
+    units: Sequence[UnitChannels], reference: UnitChannels
+) -> tuple[list[UnitClock], list[Finding]]:
+    """Lay each unit's specific force, or rates, over the reference unit's.
+
+    Parameters
+    ----------
+    units : sequence of UnitChannels
+    reference : UnitChannels
+        One of them; its trigger is the common zero.
+
+    Returns
+    -------
+    clocks : list of UnitClock
+        The reference unit's has the standard deviation 0: what its trigger is off by, all share.
+    findings : list of Finding
+
+    Raises
+    ------
+    DataError
+        The reference unit has no trigger, or a unit has too little in common with it, or the
+        motion repeats itself.
+    """
+    zero = _trigger(reference.unit)
+    clocks, findings = [], []
+    for u in units:
+        if u is reference:
+            clocks.append(UnitClock(zero, 0.0, "reference"))
+            continue
+        delay, what = _delay(reference, u)
+        clock = UnitClock(zero + delay.delay, delay.sd, f"correlation of the {what}")
+        clocks.append(clock)
+        if u.unit.trigger is None:
+            continue
+        off = u.unit.trigger - clock.offset
+        sd = math.hypot(clock.sd, math.hypot(u.unit.trigger_sd, reference.unit.trigger_sd))
+        if abs(off) > CONTRADICTION * sd:
+            findings.append(
+                Finding(
+                    f"its trigger lies {1e3 * off:.4g} ms from where the {what} put it, with a "
+                    f"standard deviation of {1e3 * sd:.2g} ms",
+                    file=u.unit.name,
+                    quantity="trigger",
+                    remedy="the correlation is used; check which instant the trigger marks, and "
+                    "trigger_sd",
+                )
+            )
+    return clocks, findings
+
+
+def _trigger(unit: CrashUnit) -> float:
+    if unit.trigger is None or not math.isfinite(unit.trigger):
+        raise DataError(
+            f"its trigger is {unit.trigger}",
+            file=unit.name,
+            quantity="trigger",
+            remedy="give the instant of the common trigger on this unit's clock, in s, or "
+            "synchronise by correlation with a reference unit that has one",
+        )
+    if not (math.isfinite(unit.trigger_sd) and unit.trigger_sd >= 0.0):
+        raise ConfigError(
+            f"{unit.trigger_sd!r} s is no standard deviation",
+            quantity=f"trigger_sd of {unit.name}",
+            remedy="give zero or more",
+        )
+    return unit.trigger
+
+
+def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
+    """Best of what both have: lengths do not know of mountings, and bodies turn everywhere alike.
+
+    The widest range is used, as what is held at the end of a range has no shape.
+    """
+    pairs = [("specific force", reference.accelerometers, u.accelerometers)]
+    if reference.gyro is not None and u.gyro is not None:
+        pairs.append(("rates", (reference.gyro,), (u.gyro,)))
+    found, errors = [], []
+    for what, first, second in pairs:
+        if not (first and second):
+            continue
+        try:
+            found.append((find_delay(_length(first[-1]), _length(second[-1])), what))
+        except DataError as error:
+            errors.append(f"{what}: {error.finding.what}")
+    if not found:
+        raise DataError(
+            f"it cannot be laid over {reference.unit.name}: {'; '.join(errors) or 'no triads'}",
+            file=u.unit.name,
+            quantity="time",
+            remedy="give its trigger and synchronise by trigger, or take another reference unit",
+        )
+    return min(found, key=lambda f: f[0].sd)
+
+
+def _length(channels: TriadChannels) -> EvenSignal:
+    """Length of the vector on an even grid, on the unit's clock."""
+    step = max(g.step for g in channels.groups)
+    n = int((channels.end - channels.start) / step * (1.0 + 1e-9)) + 1
+    time = channels.start + step * np.arange(n)
+    square = np.zeros(n)
+    for g in channels.groups:
+        for values in g.values.T:
+            square += np.interp(time, g.time, values) ** 2
+    shift = 0.5 * step if channels.sampling == "mean" else 0.0
+    return EvenSignal(channels.start - shift, step, np.sqrt(square)[:, None])

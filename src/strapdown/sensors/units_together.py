@@ -1,0 +1,111 @@
+"""What units of one vehicle must be together: names, options, sizes of what they measured."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.triad_channels import TriadChannels
+from strapdown.tables import SAMPLINGS
+
+__all__ = ["METHODS", "check_options", "compare_sizes"]
+
+METHODS = ("trigger", "correlation")
+# Rates of one rigid body differ by this factor when one is in deg/s.
+DEGREES_APART = (40.0, 80.0)
+# And specific forces by this when one is in g; they differ from place to place, too.
+G_APART = (8.0, 12.0)
+
+
+def check_options(
+    units: Sequence[CrashUnit], method: str, rate: float, reference: str | None, sampling: str
+) -> None:
+    """Check what was asked of `synchronise`.
+
+    Raises
+    ------
+    ConfigError
+        There is no unit, two have one name, or an option is not understood.
+    """
+    if not units:
+        raise ConfigError("there is no unit", quantity="units", remedy="give one or more")
+    names = [u.name for u in units]
+    twice = sorted({n for n in names if names.count(n) > 1})
+    if twice:
+        raise ConfigError(
+            f"two units are called {twice[0]!r}",
+            quantity="name",
+            remedy="give each unit a name of its own",
+        )
+    if method not in METHODS:
+        raise ConfigError(
+            f"{method!r} is no way to synchronise",
+            quantity="method",
+            remedy=nearest(str(method), METHODS),
+        )
+    if sampling not in SAMPLINGS:
+        raise ConfigError(
+            f"{sampling!r} is no kind of sampling",
+            quantity="sampling",
+            remedy=nearest(str(sampling), SAMPLINGS),
+        )
+    if not (math.isfinite(rate) and rate > 0.0):
+        raise ConfigError(
+            f"{rate!r} Hz is no rate", quantity="rate", remedy="give samples per second, as 200"
+        )
+    if reference is not None and reference not in names:
+        raise ConfigError(
+            f"there is no unit {reference!r}",
+            quantity="reference",
+            remedy=nearest(reference, names),
+        )
+
+
+def compare_sizes(
+    units: Sequence[tuple[TriadChannels | None, tuple[TriadChannels, ...]]],
+) -> list[Finding]:
+    """Compare what units of one rigid body measured, for units of measurement.
+
+    Parameters
+    ----------
+    units : sequence of (gyro or None, accelerometers)
+
+    Returns
+    -------
+    list of Finding
+        Specific forces that differ by about 9.8.
+
+    Raises
+    ------
+    DataError
+        Rates differ by about 57, and they are the same everywhere on the body.
+    """
+    turning = [(gyro.source, _spread(gyro)) for gyro, _ in units if gyro is not None]
+    for one, size in turning:
+        for other, more in turning:
+            if size > 0.0 and DEGREES_APART[0] < more / size < DEGREES_APART[1]:
+                raise DataError(
+                    f"its rates are {more / size:.3g} times those of {one} on the same body, and "
+                    "deg/s would be 57.3 times as many",
+                    file=other,
+                    quantity="gyro",
+                    remedy="multiply the columns by π/180, so that they are in rad/s",
+                )
+    forces = [(force[-1].source, _spread(force[-1])) for _, force in units if force]
+    return [
+        Finding(
+            f"its specific force varies {more / size:.3g} times as much as that of {one}",
+            file=other,
+            quantity="accel",
+            remedy=f"check that {one} is in m/s² and not in g",
+        )
+        for one, size in forces
+        for other, more in forces
+        if size > 0.0 and G_APART[0] < more / size < G_APART[1]
+    ]
+
+
+def _spread(channels: TriadChannels) -> float:
+    return math.sqrt(sum(float(g.values.var(axis=0).sum()) for g in channels.groups))
