@@ -98,7 +98,9 @@ class EntryState:
         if level == 0.0:
             return math.inf
         across = np.array([-east, north, 0.0]) / level
-        return math.degrees(math.sqrt(across @ self.covariance[VELOCITY, VELOCITY] @ across) / level)
+        return math.degrees(
+            math.sqrt(across @ self.covariance[VELOCITY, VELOCITY] @ across) / level
+        )
 
     @property
     def roll_pitch_heading(self) -> Array:

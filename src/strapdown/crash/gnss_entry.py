@@ -159,10 +159,12 @@ def entry_state_from_gnss(
 
     guesses, found = first_guesses(turned, fixes, priors)
     arm = np.asarray(antenna, dtype=np.float64)
-    best = min(
-        (estimate(mechanization, piece, fixes, g, priors, arm) for g in guesses),
-        key=lambda e: e.cost,
-    )
+    best = estimate(mechanization, piece, fixes, guesses[0], priors, arm)
+    for other in guesses[1:]:
+        # A drive backward, or with the axes turned, fits from the other heading alone.
+        if _unlikely(best.cost, best.degrees_of_freedom):
+            next_best = estimate(mechanization, piece, fixes, other, priors, arm)
+            best = min(best, next_best, key=lambda e: e.cost)
     for name, weights, misfits in (
         ("position", best.weights[:, 0], best.misfits[:, 0]),
         ("velocity", best.weights[:, 1], best.misfits[:, 1]),
@@ -185,9 +187,7 @@ def entry_state_from_gnss(
     )
 
 
-def _turn_only(
-    mechanization: NorthEastDown, imu: pd.DataFrame, first: pd.Series
-) -> NavigationRun:
+def _turn_only(mechanization: NorthEastDown, imu: pd.DataFrame, first: pd.Series) -> NavigationRun:
     """Navigate from a stand, level and to the north: only what changes means something."""
     increments = motion_increments(imu)
     begin = float(increments.index[0] - increments["dt"].iloc[0])
@@ -268,8 +268,8 @@ def _check_enough(fixes: Fixes, why: list[str], source: str | None) -> None:
         f"them with a place; not used: {told}",
         file=source,
         quantity="fixes",
-        remedy=f"at least {LEAST_FIXES} with a place over {LEAST_SPAN:g} s are needed: use a longer "
-        "window, or take the entry speed from elsewhere",
+        remedy=f"at least {LEAST_FIXES} with a place over {LEAST_SPAN:g} s are needed: use a "
+        "longer window, or take the entry speed from elsewhere",
     )
 
 
@@ -277,7 +277,7 @@ def _say_outliers(record: pd.DataFrame) -> None:
     """Say of each fix that lost weight how far it is off."""
     for name in ("position", "velocity"):
         lower = record["used"] & (record[f"{name}_weight"] < 1.0)
-        for t in record.index[lower]:
+        for t in record.index[lower].tolist():
             said = str(record.at[t, "why"])
             what = f"{name} {record.at[t, f'{name}_misfit']:.3g} sd from what the others say"
             record.at[t, "why"] = f"{said}; {what}" if said else what
@@ -321,7 +321,7 @@ def _findings(
                 remedy="nothing, if this is expected: the standard deviations have grown with it",
             )
         )
-    if priors.side_slip_sd_deg is not None and best.slip_fixes is None:
+    if priors.side_slip_sd_deg is not None and not best.slip_fixes:
         found.append(
             Finding(
                 "the side slip was not used: at no fix is the vehicle faster than 3 m/s and nearly "
@@ -343,9 +343,7 @@ def _findings(
                 "from elsewhere; or use a longer window",
             )
         )
-    from scipy.stats import chi2
-
-    if chi2.sf(best.chi_square, best.degrees_of_freedom) < UNLIKELY:
+    if _unlikely(best.chi_square, best.degrees_of_freedom):
         found.append(
             Finding(
                 f"the fixes fit worse than their standard deviations say: chi-square "
@@ -358,3 +356,9 @@ def _findings(
             )
         )
     return found
+
+
+def _unlikely(chi_square: float, degrees_of_freedom: int) -> bool:
+    from scipy.stats import chi2
+
+    return bool(chi2.sf(chi_square, degrees_of_freedom) < UNLIKELY)

@@ -52,7 +52,5 @@ def antenna_motion(
     to_level = q_ne(p[:, 0], p[:, 1])
     earth = rotation.rotate(rotation.conjugate(q), earth_rate(p[:, 0], ellipsoid=ellipsoid))
     moved = rotation.rotate(rotation.conjugate(to_level), rotation.rotate(q, r))
-    at = geodetic_from_ecef(
-        ecef_from_geodetic(p, ellipsoid=ellipsoid) + moved, ellipsoid=ellipsoid
-    )
+    at = geodetic_from_ecef(ecef_from_geodetic(p, ellipsoid=ellipsoid) + moved, ellipsoid=ellipsoid)
     return at, v + rotation.rotate(q, np.cross(np.asarray(rate) - earth, r))
