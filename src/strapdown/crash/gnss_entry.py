@@ -277,10 +277,12 @@ def _say_outliers(record: pd.DataFrame) -> None:
     """Say of each fix that lost weight how far it is off."""
     for name in ("position", "velocity"):
         lower = record["used"] & (record[f"{name}_weight"] < 1.0)
-        for t in record.index[lower].tolist():
-            said = str(record.at[t, "why"])
-            what = f"{name} {record.at[t, f'{name}_misfit']:.3g} sd from what the others say"
-            record.at[t, "why"] = f"{said}; {what}" if said else what
+        misfits = record.loc[lower, f"{name}_misfit"].to_numpy(dtype=np.float64)
+        before = record.loc[lower, "why"].tolist()
+        record.loc[lower, "why"] = [
+            f"{said}{'; ' if said else ''}{name} {t:.3g} sd from what the others say"
+            for said, t in zip(before, misfits.tolist(), strict=True)
+        ]
 
 
 def _findings(
