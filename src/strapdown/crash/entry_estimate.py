@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.entry_adjust import Adjustment, Problem, Rows, adjust, weigh
-from strapdown.crash.entry_priors import EntryPriors, FixCorrelation
+from strapdown.crash.entry_adjust import Adjustment, Problem, adjust, weigh
+from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_sensitivity import (
     Course,
     at_fixes,
     between,
-    noise_at_fixes,
+    noise_between_fixes,
     sensor_errors,
     skew,
 )
@@ -41,6 +41,14 @@ CONVERGED = 1e-3
 _TINY = 1e-10
 # Of a heading of which nothing is known: a uniform one over the circle.
 ANY_HEADING = 180.0 / math.sqrt(3.0)  # deg
+# Sensitivities are made anew when the attitude has turned by this since, rad: they are wrong by
+# that share.
+STALE = 0.01
+# Of weights.
+MOST_WEIGHINGS, SAME_WEIGHT = 15, 0.01
+# What is not known before, in standard deviations of the fixes: no more than rounding bears, and
+# about the parameters as they are, so that it draws them nowhere.
+UNKNOWN = 1e3
 # Where the side slip is looked at.
 LEAST_SLIP_SPEED, MOST_LATERAL = 3.0, 2.0  # m/s, m/s²
 # A longer step of attitude is cut, rad: beyond, the linear model says nothing.
@@ -87,7 +95,7 @@ class Estimate:
     chi_square: float
     degrees_of_freedom: int
     iterations: int
-    slip_fixes: int | None
+    slip_fixes: int
     cost: float
 
 
@@ -123,25 +131,26 @@ def estimate(
         The search does not come to rest, or a run diverges.
     """
     search = _Search(mechanization, imu, fixes, guess, priors, arm)
-    weights, settled = np.ones(len(search.blocks)), 0
-    misfits = np.zeros(len(weights))
+    weights, settled = np.ones((len(fixes.instants), 2)), 0
     for iteration in range(1, MOST_ITERATIONS + 1):
         problem = search.problem()
+        step = adjust(problem, weights)
         # Outliers are told where the rest is nearly linear; weights that go on changing are
         # those of fixes at the brink, and are kept as they are after a while.
-        if search.near and settled < 4:
-            found, misfits = weigh(problem)
-            settled = 4 if np.abs(found - weights).max(initial=0.0) < 0.01 else settled + 1
-            weights = found
-        step = adjust(problem, weights)
-        if search.take(step) and settled >= 4:
-            return search.result(weights, misfits, iteration)
+        changed = not search.near
+        if search.near and settled < MOST_WEIGHINGS:
+            found, _ = weigh(problem, step, weights)
+            changed = bool(np.abs(found - weights).max() > SAME_WEIGHT)
+            weights, settled = found, settled + 1
+            step = adjust(problem, weights) if changed else step
+        if search.take(step) and not changed:
+            return search.result(weights, iteration)
     raise DivergenceError(
         f"the search for the entry state has not come to rest in {MOST_ITERATIONS} iterations",
         file=imu.attrs.get("source"),
         quantity="entry state",
-        remedy="look at the fixes (EntryState.fixes of a shorter window), the axes of the Imu table "
-        "(-9.8 on z at level rest), and whether both tables have the same clock",
+        remedy="look at the fixes (units, sd), the axes of the Imu table (-9.8 on z "
+        " at level rest), and whether both tables have the same clock",
     )
 
 
@@ -157,30 +166,36 @@ class _Search:
         priors: EntryPriors,
         arm: Array,
     ) -> None:
-        self.mechanization, self.imu, self.fixes = mechanization, imu, fixes
+        self.mechanization, self.imu = mechanization, imu
+        # From the anchor backward, as the errors grow.
+        self.fixes = Fixes(
+            *(x[::-1] for x in (fixes.instants, fixes.place, fixes.velocity, fixes.sd))
+        )
         self.priors, self.arm = priors, arm
         self.ellipsoid = find_ellipsoid(mechanization.ellipsoid)
         self.state, self.at_first = guess.state, guess.state.q_nb
         self.bias = np.zeros(6)
-        self.measured = np.isfinite(fixes.sd)
-        self.blocks, self.block_of = _blocks(self.measured)
         self.near = False
-        self._fresh = True
+        self.further = np.zeros(0)
+        self._moved = math.inf
 
     def problem(self) -> Problem:
         """Rows and priors at the parameters as they are."""
         course, now = self._run()
-        if self._fresh:
+        if self._moved > STALE:
             self._linearise(course, now)
-        residuals = self._residuals(now)
-        if self.slip is not None:
-            residuals = np.append(residuals, -_slips(now, self.priors)[self.slip].mean())
-        residuals -= self.jacobian[:, STATES:] @ self.further
+            self._moved = 0.0
+        residuals = np.hstack([self._residuals(now), -_slips(now, self.priors)[:, None]])
+        residuals -= self.linear.by_constants[:, :, STATES:] @ self.further
         away = rotation.rotation_vector_from_quaternion(
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
         )
         before = np.concatenate([np.zeros(6), away, -self.bias, -self.further])
+<<<<<<< HEAD
         return Problem(residuals, self.jacobian, self.noise, self.prior_sd, before, self.blocks)
+=======
+        return replace(self.linear, residuals=residuals, prior_residuals=before)
+>>>>>>> w-gnss
 
     def take(self, adjustment: Adjustment) -> bool:
         """Add a step; return whether it was too small to go on."""
@@ -202,27 +217,24 @@ class _Search:
         )
         self.bias = self.bias + step[9:15]
         self.further = self.further + step[STATES:]
-        self.last = adjustment
         sd = np.sqrt(np.diag(adjustment.covariance))
-        # Away from the solution the sensitivities are made anew.
-        self._fresh = turn > 1e-3
+        self._moved += turn
         self.near = turn < 0.05
         return bool((np.abs(step) <= np.maximum(CONVERGED * sd, _TINY)).all())
 
-    def result(self, weights: Array, misfits: Array, iterations: int) -> Estimate:
+    def result(self, weights: Array, iterations: int) -> Estimate:
         """Return what was found; biases at the mean rate and force."""
-        self._fresh = True
+        self._moved = math.inf
         problem = self.problem()
-        last, plain = adjust(problem, weights), adjust(problem, np.ones(len(weights)))
-        to = np.eye(STATES, len(self.prior_sd))
+        last = adjust(problem, weights)
+        _, misfits = weigh(problem, last, weights)
+        plain = last if (weights == 1.0).all() else adjust(problem, np.ones(weights.shape))
         q = len(self.errors.sd)
+        to = np.eye(STATES, len(problem.prior_sd))
         to[GYRO_BIAS, STATES : STATES + q] = self.errors.gyro.mean(axis=0)
         to[ACCEL_BIAS, STATES : STATES + q] = self.errors.accel.mean(axis=0)
         bias = self.bias + to[9:15, STATES:] @ self.further
         means = values_of(self.imu, [*GYRO, *ACCEL]).mean(axis=0) - bias
-        shown = np.ones((len(self.measured), 2)), np.full((len(self.measured), 2), np.nan)
-        for b, (fix, group) in enumerate(self.block_of):
-            shown[0][fix, group], shown[1][fix, group] = weights[b], misfits[b]
         return Estimate(
             state=self.state,
             gyro_bias=bias[:3],
@@ -230,12 +242,12 @@ class _Search:
             covariance=to @ last.covariance @ to.T,
             mean_rate=means[:3],
             mean_force=means[3:],
-            weights=shown[0],
-            misfits=shown[1],
+            weights=weights[::-1],
+            misfits=misfits[::-1],
             chi_square=last.chi_square,
-            degrees_of_freedom=len(problem.residuals) - int(np.isinf(self.prior_sd).sum()),
+            degrees_of_freedom=int(problem.there.sum()) - 6,
             iterations=iterations,
-            slip_fixes=None if self.slip is None else int(self.slip.sum()),
+            slip_fixes=int(problem.there[:, 6].sum()),
             cost=plain.chi_square,
         )
 
@@ -258,74 +270,88 @@ class _Search:
         place, velocity = antenna_motion(
             now.place, now.velocity, now.q_nb, now.rate, self.arm, ellipsoid=self.ellipsoid
         )
-        off = np.hstack(
+        return np.hstack(
             [
                 place_difference(self.fixes.place, place, ellipsoid=self.ellipsoid),
                 self.fixes.velocity - velocity,
             ]
         )
-        return np.asarray(off[self.measured])
 
     def _linearise(self, course: Course, now: _AtFixes) -> None:
         """Sensitivities, noise and priors at the parameters as they are."""
         p, fixes = self.priors, self.fixes
         self.errors = sensor_errors(p.gyro, p.accel, course)
         q, m = len(self.errors.sd), len(fixes.instants)
-        grown = at_fixes(course, self.errors, fixes.instants)
-        noise = noise_at_fixes(course, p.gyro, p.accel, fixes.instants)
         C_nb = rotation.dcm_from_quaternion(now.q_nb)
-        look = np.zeros((m, 6, 9))
-        look[:, :3, :3] = look[:, 3:, 3:6] = np.eye(3)
-        look[:, :3, 6:] = -skew(C_nb @ self.arm)
-        turning = np.cross(now.rate, self.arm)
-        look[:, 3:, 6:] = -skew(np.einsum("mij,mj->mi", C_nb, turning))
-        own = np.zeros((m, 6, STATES + q + 4))
-        own[:, :, : STATES + q] = look @ grown
-        own[:, 3:, 9:12] += C_nb @ skew(self.arm)
-        own[:, :3, STATES + q : -1] = C_nb
-        own[:, 3:, STATES + q : -1] = C_nb @ skew(now.rate)
-        own[:, :3, -1] = -now.velocity
-        own[:, 3:, -1] = -now.acceleration
-        rows, shaken = own[self.measured], (look @ noise)[self.measured]
-        white = np.zeros(len(rows))
+        look = np.zeros((m, 7, 9))
+        look[:, 0:3, 0:3] = look[:, 3:6, 3:6] = np.eye(3)
+        look[:, 0:3, 6:] = -skew(C_nb @ self.arm)
+        look[:, 3:6, 6:] = -skew(np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm)))
+        look[:, 6] = _slip_look(now, C_nb, p)
+        # Of the antenna, of the clock, and the side slip that stays.
+        own = np.zeros((m, 7, STATES + q + 5))
+        own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
+        own[:, 3:6, GYRO_BIAS] += C_nb @ skew(self.arm)
+        own[:, 0:3, STATES + q : -2] = C_nb
+        own[:, 3:6, STATES + q : -2] = C_nb @ skew(now.rate)
+        own[:, 0:3, -2], own[:, 3:6, -2] = -now.velocity, -now.acceleration
+        own[:, 6, -1] = 1.0
+
+        there = np.column_stack([np.isfinite(fixes.sd), self._slides(now)])
+        slip_sd = math.radians(p.side_slip_sd_deg or 0.0)
+        sd = np.column_stack([np.where(there[:, :6], fixes.sd, 0.0), np.full(m, slip_sd)])
+        spec = (p.position_correlation,) * 3 + (p.velocity_correlation,) * 3
+        share = np.array([c.share for c in spec])
+        noise = sd**2
+        noise[:, :6] *= 1.0 - share
         # The gyro sample beside a fix moves the antenna, too.
         swing = (max(p.gyro.axis("noise_density")) * float(np.linalg.norm(self.arm))) ** 2
-        sample = swing / float(np.median(np.diff(course.time)))
-        white += np.broadcast_to([0.0] * 3 + [sample] * 3, (m, 6))[self.measured]
-        self.slip = self._slip(now)
-        if self.slip is not None:
-            seen = _slip_look(now, C_nb, p)[self.slip]
-            row = np.zeros(rows.shape[1])
-            row[: STATES + q] = np.einsum("mi,mik->mk", seen, grown[self.slip]).mean(axis=0)
-            rows = np.vstack([rows, row])
-            shaken = np.vstack(
-                [shaken, np.einsum("mi,mik->mk", seen, noise[self.slip]).mean(axis=0)]
-            )
-            white = np.append(white, math.radians(p.side_slip_sd_deg or 0.0) ** 2)
-        self.jacobian = rows
-        self.noise = shaken @ shaken.T + np.diag(white)
-        count = int(self.measured.sum())
-        self.noise[:count, :count] += fix_noise(fixes, p)
-        self.prior_sd = np.concatenate(
+        noise[:, 3:6] += swing / float(np.median(np.diff(course.time)))
+        by_states = np.concatenate([look, np.zeros((m, 7, 6))], axis=2)
+        for axis in range(6):
+            by_states[:, axis, 9 + axis] = sd[:, axis] * math.sqrt(share[axis])
+
+        grown, shaken = noise_between_fixes(course, p.gyro, p.accel, fixes.instants)
+        carry, driven = np.zeros((2, m, 15, 15))
+        carry[:, :9, :9], driven[:, :9, :9] = grown, shaken
+        lasted = -np.diff(fixes.instants, prepend=course.time[-1])
+        for axis in range(6):
+            a = np.exp(-lasted / spec[axis].time)
+            carry[:, 9 + axis, 9 + axis], driven[:, 9 + axis, 9 + axis] = a, 1.0 - a * a
+        bounded = np.where(np.isfinite(fixes.sd), fixes.sd, 0.0).max(axis=0)
+        loose = UNKNOWN * np.where(bounded > 0.0, bounded, np.tile(bounded[:3].max(), 6))
+        prior_sd = np.concatenate(
             [
-                np.full(6, np.inf),
+                loose,
                 np.radians([p.tilt_sd_deg, p.tilt_sd_deg, p.heading_sd_deg or ANY_HEADING]),
                 p.gyro.axis("bias"),
                 p.accel.axis("bias"),
                 self.errors.sd,
                 [p.antenna_sd] * 3,
-                [p.time_offset_sd],
+                [p.time_offset_sd, slip_sd],
             ]
         )
-        if not hasattr(self, "further"):
-            self.further = np.zeros(q + 4)
+        self.further = self.further if self.further.size else np.zeros(q + 5)
+        self.linear = Problem(
+            np.zeros((m, 7)),
+            own,
+            by_states,
+            noise,
+            sd**2,
+            there,
+            np.array([0, 0, 0, 1, 1, 1, -1]),
+            carry,
+            driven,
+            np.diag([0.0] * 9 + [1.0] * 6),
+            prior_sd,
+            np.zeros_like(prior_sd),
+        )
 
-    def _slip(self, now: _AtFixes) -> NDArray[np.bool_] | None:
-        if self.priors.side_slip_sd_deg is None:
-            return None
+    def _slides(self, now: _AtFixes) -> NDArray[np.bool_]:
+        """Where the vehicle travels along its axis."""
         speed = np.linalg.norm(now.velocity, axis=1)
         steady = (speed > LEAST_SLIP_SPEED) & (np.abs(speed * now.rate[:, 2]) < MOST_LATERAL)
-        return steady if steady.any() else None
+        return np.asarray(steady & (self.priors.side_slip_sd_deg is not None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -341,7 +367,14 @@ class _AtFixes:
 
 def _at_fixes(run: NavigationRun, course: Course, instants: Array) -> _AtFixes:
     """Between two samples: place by Hermite's cubic, velocity and attitude by their rates."""
+<<<<<<< HEAD
     there = trajectory_at(run.trajectory, instants, find_ellipsoid(run.mechanization.ellipsoid))
+=======
+    # Instants must increase there.
+    there = trajectory_at(
+        run.trajectory, instants[::-1], find_ellipsoid(run.mechanization.ellipsoid)
+    )[::-1]
+>>>>>>> w-gnss
     pushed = np.gradient(run.history[:, 3:6], run.time, axis=0)
     return _AtFixes(
         there[GEODETIC].to_numpy(dtype=np.float64),
@@ -374,34 +407,3 @@ def _slip_look(now: _AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
     out[:, 3:6] = back[:, 0]
     out[:, 6:9] = (back @ skew(now.velocity))[:, 0]
     return out
-
-
-def fix_noise(fixes: Fixes, priors: EntryPriors) -> Array:
-    """Covariance of what was measured, row by row of ``sd``, infinite ones left out."""
-    m = len(fixes.instants)
-    apart = np.abs(np.subtract.outer(fixes.instants, fixes.instants))
-    full = np.zeros((m, 6, m, 6))
-    sd = np.where(np.isfinite(fixes.sd), fixes.sd, 0.0)
-    for axis in range(6):
-        spec: FixCorrelation = (
-            priors.position_correlation if axis < 3 else priors.velocity_correlation
-        )
-        shape = spec.share * np.exp(-apart / spec.time) + (1.0 - spec.share) * np.eye(m)
-        full[:, axis, :, axis] = np.outer(sd[:, axis], sd[:, axis]) * shape
-    kept = np.isfinite(fixes.sd).ravel()
-    return np.asarray(full.reshape(6 * m, 6 * m)[np.ix_(kept, kept)])
-
-
-def _blocks(measured: NDArray[np.bool_]) -> tuple[list[Rows], list[tuple[int, int]]]:
-    """Rows of place and of velocity of each fix, and which they are."""
-    number = np.full(measured.shape, -1, dtype=np.intp)
-    number[measured] = np.arange(int(measured.sum()))
-    blocks, which = [], []
-    for fix in range(len(measured)):
-        for group in (0, 1):
-            rows = number[fix, 3 * group : 3 * group + 3]
-            rows = rows[rows >= 0]
-            if rows.size:
-                blocks.append(rows)
-                which.append((fix, group))
-    return blocks, which

@@ -59,10 +59,11 @@ class EntryPriors:
     heading_deg, heading_sd_deg : float, deg, optional
         From elsewhere, as from marks on the road; both or neither.
     side_slip_sd_deg : float, deg, optional
-        The vehicle travels along its forward axis, within this: of the mean side-slip angle at
-        `no_slip_point` over the fixes at which it is faster than 3 m/s and its acceleration to
-        the side, speed times yaw rate, below 2 m/s²: tyres slip where they hold. Without it the
-        heading comes from accelerations alone.
+        The vehicle travels along its forward axis, within this: of the side-slip angle at
+        `no_slip_point`, once for the whole window and once more from fix to fix, where the
+        vehicle is faster than 3 m/s and its acceleration to the side, speed times yaw rate, is
+        below 2 m/s²: tyres slip where they hold. Without it the heading comes from
+        accelerations alone.
     no_slip_point : triad, m
         In vehicle axes; of a car the middle of the rear axle.
     antenna_sd : float, m

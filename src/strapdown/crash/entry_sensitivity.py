@@ -111,45 +111,61 @@ def at_fixes(course: Course, errors: SensorErrors, instants: Array) -> Array:
     return between(course.time, np.concatenate([p, v, phi], axis=1), instants)
 
 
-def noise_at_fixes(
+def noise_between_fixes(
     course: Course, gyro: TriadUncertainty, accel: TriadUncertainty, instants: Array
-) -> Array:
-    """What the noise of the sensors between fix and anchor does to the state at the fixes.
+) -> tuple[Array, Array]:
+    """What the noise of the sensors does to position, velocity and attitude, backward.
+
+    Parameters
+    ----------
+    course : Course
+    gyro, accel : TriadUncertainty
+    instants : ndarray, (m,), s
+        Falling, from the end of the course on.
 
     Returns
     -------
-    ndarray, (m, 9, k)
-        By k independent numbers of unit variance: six for each piece of the record.
+    carry : ndarray, (m, 9, 9)
+        From the error at the instant before, in this order, to that at each; of the first from
+        the anchor.
+    driven : ndarray, (m, 9, 9)
+        Covariance of what the noise adds on the way; as impulses in the middle of pieces.
     """
-    time = course.time
-    edges = np.unique(np.append(instants, time[-1]))
-    pieces = [
-        np.linspace(a, b, max(1, int(np.ceil((b - a) / PIECE))) + 1)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
-    ]
-    if not pieces:
-        return np.zeros((len(instants), 9, 0))
-    edges = np.unique(np.concatenate(pieces))
-    lasted, middle = np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
-    near = np.clip(np.searchsorted(time, middle), 0, len(time) - 1)
     pushed = np.einsum("nij,nj->ni", course.C_nb, course.force)
-    gained = back_integral(time, pushed)
-    moved = back_integral(time, gained)
+    gained = back_integral(course.time, pushed)
+    moved = back_integral(course.time, gained)
+
+    def effect(s: Array, t: Array) -> tuple[Array, Array]:
+        """Of an attitude error at s on velocity and position at t before it."""
+        v_s, v_t = between(course.time, gained, s), between(course.time, gained, t)
+        s_s, s_t = between(course.time, moved, s), between(course.time, moved, t)
+        return skew(v_s - v_t), -skew(v_s * (s - t)[:, None] - (s_s - s_t))
+
+    before = np.concatenate([course.time[-1:], instants[:-1]])
+    carry = np.zeros((len(instants), 9, 9))
+    carry[:] = np.eye(9)
+    carry[:, 3:6, 6:9], carry[:, 0:3, 6:9] = effect(before, instants)
+    carry[:, 0:3, 3:6] = -(before - instants)[:, None, None] * np.eye(3)
+
+    count = np.maximum(1, np.ceil((before - instants) / PIECE).astype(np.int64))
+    which = np.repeat(np.arange(len(instants)), count)
+    place = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    lasted = ((before - instants) / count)[which]
+    middle = instants[which] + (place + 0.5) * lasted
+    near = np.clip(np.searchsorted(course.time, middle), 0, len(course.time) - 1)
     root = np.sqrt(lasted)[:, None, None]
     turn = course.C_nb[near] * np.array(gyro.axis("noise_density")) * root
     push = course.C_nb[near] * np.array(accel.axis("noise_density")) * root
-    after = (middle[None, :] > instants[:, None])[..., None, None]
-    since = (middle[None, :] - instants[:, None])[..., None]
-    v_s, v_t = between(time, gained, middle)[None], between(time, gained, instants)[:, None]
-    s_s, s_t = between(time, moved, middle)[None], between(time, moved, instants)[:, None]
-    out = np.zeros((len(instants), len(middle), 9, 6))
-    out[..., 0:3, 0:3] = -skew(v_s * since - (s_s - s_t)) @ turn
-    out[..., 0:3, 3:6] = -since[..., None] * push
-    out[..., 3:6, 0:3] = skew(v_s - v_t) @ turn
-    out[..., 3:6, 3:6] = push
-    out[..., 6:9, 0:3] = turn
-    out *= after
-    return out.transpose(0, 2, 1, 3).reshape(len(instants), 9, -1)
+    by_v, by_p = effect(middle, instants[which])
+    shift = np.zeros((len(which), 9, 6))
+    shift[:, 0:3, 0:3] = by_p @ turn
+    shift[:, 0:3, 3:6] = -(middle - instants[which])[:, None, None] * push
+    shift[:, 3:6, 0:3] = by_v @ turn
+    shift[:, 3:6, 3:6] = push
+    shift[:, 6:9, 0:3] = turn
+    driven = np.zeros((len(instants), 9, 9))
+    np.add.at(driven, which, shift @ shift.transpose(0, 2, 1))
+    return carry, driven
 
 
 def back_integral(time: Array, values: Array) -> Array:

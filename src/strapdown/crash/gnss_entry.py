@@ -159,10 +159,12 @@ def entry_state_from_gnss(
 
     guesses, found = first_guesses(turned, fixes, priors)
     arm = np.asarray(antenna, dtype=np.float64)
-    best = min(
-        (estimate(mechanization, piece, fixes, g, priors, arm) for g in guesses),
-        key=lambda e: e.cost,
-    )
+    best = estimate(mechanization, piece, fixes, guesses[0], priors, arm)
+    for other in guesses[1:]:
+        # A drive backward, or with the axes turned, fits from the other heading alone.
+        if _unlikely(best.cost, best.degrees_of_freedom):
+            next_best = estimate(mechanization, piece, fixes, other, priors, arm)
+            best = min(best, next_best, key=lambda e: e.cost)
     for name, weights, misfits in (
         ("position", best.weights[:, 0], best.misfits[:, 0]),
         ("velocity", best.weights[:, 1], best.misfits[:, 1]),
@@ -266,8 +268,8 @@ def _check_enough(fixes: Fixes, why: list[str], source: str | None) -> None:
         f"them with a place; not used: {told}",
         file=source,
         quantity="fixes",
-        remedy=f"at least {LEAST_FIXES} with a place over {LEAST_SPAN:g} s are needed: use a longer "
-        "window, or take the entry speed from elsewhere",
+        remedy=f"at least {LEAST_FIXES} with a place over {LEAST_SPAN:g} s are needed: use a "
+        "longer window, or take the entry speed from elsewhere",
     )
 
 
@@ -275,10 +277,12 @@ def _say_outliers(record: pd.DataFrame) -> None:
     """Say of each fix that lost weight how far it is off."""
     for name in ("position", "velocity"):
         lower = record["used"] & (record[f"{name}_weight"] < 1.0)
-        for t in record.index[lower]:
-            said = str(record.at[t, "why"])
-            what = f"{name} {record.at[t, f'{name}_misfit']:.3g} sd from what the others say"
-            record.at[t, "why"] = f"{said}; {what}" if said else what
+        misfits = record.loc[lower, f"{name}_misfit"].to_numpy(dtype=np.float64)
+        before = record.loc[lower, "why"].tolist()
+        record.loc[lower, "why"] = [
+            f"{said}{'; ' if said else ''}{name} {t:.3g} sd from what the others say"
+            for said, t in zip(before, misfits.tolist(), strict=True)
+        ]
 
 
 def _findings(
@@ -319,7 +323,7 @@ def _findings(
                 remedy="nothing, if this is expected: the standard deviations have grown with it",
             )
         )
-    if priors.side_slip_sd_deg is not None and best.slip_fixes is None:
+    if priors.side_slip_sd_deg is not None and not best.slip_fixes:
         found.append(
             Finding(
                 "the side slip was not used: at no fix is the vehicle faster than 3 m/s and nearly "
@@ -341,9 +345,7 @@ def _findings(
                 "from elsewhere; or use a longer window",
             )
         )
-    from scipy.stats import chi2
-
-    if chi2.sf(best.chi_square, best.degrees_of_freedom) < UNLIKELY:
+    if _unlikely(best.chi_square, best.degrees_of_freedom):
         found.append(
             Finding(
                 f"the fixes fit worse than their standard deviations say: chi-square "
@@ -356,3 +358,9 @@ def _findings(
             )
         )
     return found
+
+
+def _unlikely(chi_square: float, degrees_of_freedom: int) -> bool:
+    from scipy.stats import chi2
+
+    return bool(chi2.sf(chi_square, degrees_of_freedom) < UNLIKELY)

@@ -222,7 +222,7 @@ def _moved(motion: EarthMotion, place: Array, off: Array) -> Array:
 def _beyond(motion: EarthMotion, receiver: GnssReceiver, instants: Array) -> NDArray[np.bool_]:
     """Fixes within reach of an instant beyond the limits."""
     per = round(LOOP_MEMORY / _SEARCH)
-    time = np.arange(math.floor(motion.duration / _SEARCH) + 1) * _SEARCH
+    time = np.arange(math.floor(motion.duration / _SEARCH) + 1, dtype=np.float64) * _SEARCH
     struck = np.zeros(len(instants), dtype=np.bool_)
     if len(time) <= 2 * per:
         return struck

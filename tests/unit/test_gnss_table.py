@@ -1,0 +1,109 @@
+"""A Gnss table refuses what no receiver means, and says what was meant instead."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown import tables
+from strapdown.exceptions import DataError
+from strapdown.simulation import Origin, car
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.simulation.manoeuvres import Straight, Turn
+
+DRIVE = car(
+    Origin(48.0, 11.0, 500.0),
+    [("out", Straight(10.0)), ("bend", Turn(40.0, 80.0)), ("on", Straight(5.0))],
+    heading_deg=30.0,
+    speed=15.0,
+)
+FIXES = simulate_gnss(
+    DRIVE, GnssReceiver(rate=2.0, position_noise=0.5, velocity_noise=0.1), seed=1, source="a.csv"
+)
+
+
+def made(changed=FIXES):
+    """The table once more, from its columns."""
+    return tables.gnss_table(
+        changed.index.to_numpy(),
+        changed[tables.GEODETIC].to_numpy(),
+        changed[tables.VELOCITY].to_numpy(),
+        changed[tables.POSITION_SD].to_numpy(),
+        changed[tables.VELOCITY_SD].to_numpy(),
+        changed["quality"].to_numpy(),
+        source="a.csv",
+    )
+
+
+def test_a_table_keeps_what_it_was_given():
+    np.testing.assert_array_equal(made(), FIXES)
+    assert list(FIXES.columns) == tables.GNSS
+    assert FIXES.index.name == "time"
+    one = tables.gnss_table(
+        [0.0, 1.0], [[48, 11, 0]] * 2, np.zeros((2, 3)), (1, 1, 2), (np.inf,) * 3
+    )
+    assert one["down_sd"].tolist() == [2.0, 2.0]
+    assert one["quality"].tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("column", "row", "value", "message"),
+    [
+        ("alt", 2, np.nan, r"a.csv, row 3, alt: not a finite number"),
+        ("VE", 1, np.inf, r"a.csv, row 2, VE: not a finite number"),
+        ("lat", 4, 95.0, r"row 5, lat: a latitude of 95 deg is beyond the pole(.|\n)*swapped"),
+        ("north_sd", 0, -1.0, r"row 1, north_sd: -1 is no standard deviation"),
+        ("VD_sd", 3, np.nan, r"row 4, VD_sd: nan is no standard deviation"),
+        ("quality", 1, 12.0, r"row 2, quality: a quality of 12 is unknown(.|\n)*GGA"),
+    ],
+)
+def test_a_bad_value_is_named(column, row, value, message):
+    changed = FIXES.copy()
+    changed.iloc[row, changed.columns.get_loc(column)] = value
+    with pytest.raises(DataError, match=message):
+        made(changed)
+
+
+def test_time_and_columns_are_checked():
+    back = FIXES.copy()
+    back.index = back.index.to_numpy()[::-1]
+    with pytest.raises(DataError, match="row 2, time: time does not advance"):
+        made(back)
+    with pytest.raises(DataError, match="missing columns: VD_sd"):
+        tables.check_gnss(FIXES.drop(columns="VD_sd"))
+
+
+@pytest.mark.parametrize(
+    ("change", "remedy"),
+    [
+        ({"VN": 3.6, "VE": 3.6}, "km/h: divide them by 3.6"),
+        ({"VN": 1.943844, "VE": 1.943844}, "knots"),
+    ],
+)
+def test_velocities_in_another_unit_are_told(change, remedy):
+    with pytest.raises(DataError, match=remedy):
+        made(FIXES.assign(**{c: FIXES[c] * k for c, k in change.items()}))
+
+
+def test_exchanged_columns_are_told():
+    with pytest.raises(DataError, match="exchange VN and VE"):
+        made(FIXES.assign(VN=FIXES["VE"], VE=FIXES["VN"]))
+    # Both are below 90 here, so that only the motion tells it.
+    with pytest.raises(DataError, match="latitude and longitude are swapped"):
+        made(FIXES.assign(lat=FIXES["lon"], lon=FIXES["lat"]))
+
+
+def test_false_fixes_a_stand_and_unmeasured_velocities_are_no_wrong_units():
+    wild = FIXES.copy()
+    wild.iloc[-8:, :6] += np.random.default_rng(1).standard_normal((8, 6)) * [
+        1e-3,
+        1e-3,
+        99,
+        50,
+        50,
+        9,
+    ]
+    made(wild)
+    still = FIXES.assign(lat=48.0, lon=11.0, VN=0.1, VE=0.1)
+    made(still)
+    made(FIXES.assign(VN=0.0, VE=0.0, VN_sd=np.inf, VE_sd=np.inf, VD_sd=np.inf))
