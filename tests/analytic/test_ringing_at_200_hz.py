@@ -1,12 +1,24 @@
 """What structural ringing does to samples at 200 Hz, from formulas and from runs.
 
-Ringing moves nothing for good, so that whatever velocity its samples add up to is false. Sampled at
-instants, ``x = Im sum c_j exp(s_j t)`` gives the velocity ``h Im sum c_j s_j² q_j/(1 - exp(s_j h))``
-with q_j the exponential at the first sample: a geometric series, whose size is that of the alias.
+Ringing moves nothing for good, so that whatever velocity its samples add up to is false. Sampled
+at instants, ``x = Im sum c_j exp(s_j t)`` gives the velocity
+``h Im sum c_j s_j² q_j/(1 - exp(s_j h))`` with q_j the exponential at the first sample: a geometric
+series, whose size is that of the alias.
 Theory's numbers (1.03 m for 10 g at 195 Hz, 0.21 m for 10 g at 120 Hz, 0.05 m for 5 g at 300 Hz,
 each decaying in 30 ms, over 750 ms) depend on where the ringing begins between two samples. The
 quadratic mean over all such phases, for ringing that begins 50 ms after the start, is 1.05, 0.21
 and 0.08 m.
+
+For ringing that begins with the pulse of the crash, at 100 ms of 750 ms, quadratic mean and largest
+of ten phases (what the filter's delay alone does to the crash, 58, 23 and 14 mm, is taken off):
+
+====================  ===========  ============  ============  ============  ============
+m                     instants     means         20 Hz filter  50 Hz filter  80 Hz filter
+====================  ===========  ============  ============  ============  ============
+10 g at 195 Hz        0.98, 1.45   0.001, 0.002  0.10, 0.14    0.24, 0.33    0.36, 0.51
+10 g at 120 Hz        0.20, 0.36   0.000, 0.000  0.02, 0.03    0.04, 0.07    0.07, 0.11
+5 g at 300 Hz         0.08, 0.18   0.000, 0.000  0.00, 0.01    0.01, 0.01    0.01, 0.02
+====================  ===========  ============  ============  ============  ============
 """
 
 from __future__ import annotations
@@ -83,7 +95,8 @@ def test_a_formula_predicts_the_false_way(frequency, amplitude, phase):
     # which differs from the trapezoids' by h²/12 of each change of force, 0.2 mm. The last of the
     # true displacement is e^-21 of 65 um.
     assert error[0] == pytest.approx(sampled_way(ringing), rel=5e-4, abs=3e-4)
-    assert abs(error[1]) < 1e-6
+    # The Earth turns a false velocity: 2 w sin(lat) t/2 of the way.
+    assert abs(error[1]) < 4e-5 * abs(error[0]) + 1e-8
 
 
 def rms(ways):
@@ -143,9 +156,10 @@ def test_true_means_and_a_filter_keep_most_of_it_out(frequency, amplitude):
         for name, error in errors.items():
             worst[name] = max(worst[name], float(np.linalg.norm(error)))
     # Means over the sample lose no velocity. What is left is the way within a step that a line
-    # through the means misses, h²/12 of a false change of force of the amplitude, and sculling.
-    assert worst["mean"] < 5e-3
+    # through the means misses, h²/12 of a change of force of the amplitude, for each step of the
+    # decay, and as much again for the steps that this line takes from.
+    assert worst["mean"] < 2.0 * amplitude * STEP**2 / 12.0 * (DECAY / STEP)
     # A pole at 50 Hz passes 1/sqrt(1 + (f/50)²) of the oscillation.
     passes = 1.0 / math.hypot(1.0, frequency / 50.0)
     assert 0.3 * passes < worst["filter"] / worst["instantaneous"] < 3.0 * passes
-    assert worst["mean"] < 0.2 * worst["filter"]
+    assert worst["mean"] < 0.02 * worst["filter"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,43 @@ def mean_over(quantity: Quantity, starts: Array, ends: Array) -> Array:
         values = quantity(at.ravel()).reshape(*at.shape, 3)
         parts.append(0.5 * np.einsum("nmk,m->nk", values, weights))
     return np.concatenate(parts)
+
+
+def mean_between(quantity: Quantity, instants: Array, cuts: Sequence[float]) -> Array:
+    """Mean from each instant to the next, as `mean_over`, from cut to cut; (n - 1, 3).
+
+    Parameters
+    ----------
+    quantity : callable
+    instants : ndarray, (n,), s
+        Increasing.
+    cuts : sequence of float, s
+        Where the quantity is not smooth, or so near that it is smooth between.
+
+    Returns
+    -------
+    ndarray, (n - 1, 3)
+    """
+    edges, at = _cut(instants, cuts)
+    means = mean_over(quantity, edges[:-1], edges[1:])
+    if edges.size == instants.size:
+        return means
+    sums = np.add.reduceat(means * np.diff(edges)[:, None], at[:-1])
+    return np.asarray(sums / np.diff(instants)[:, None])
+
+
+def low_passed_at(
+    quantity: Quantity,
+    instants: Array,
+    bandwidth: float,
+    cuts: Sequence[float],
+    straight: float = 0.0,
+) -> Array:
+    """Output of a low-pass, as `low_passed`, with stretches that end at cuts; (n, 3)."""
+    if math.isinf(bandwidth):
+        return quantity(instants)
+    edges, at = _cut(instants, cuts)
+    return np.asarray(low_passed(quantity, edges, bandwidth, straight)[at])
 
 
 def low_passed(
@@ -128,6 +165,14 @@ def _curved(
     near[:-1] |= bent[1:]
     near[1:] |= bent[:-1]
     return np.flatnonzero(near)
+
+
+def _cut(instants: Array, cuts: Sequence[float]) -> tuple[Array, NDArray[np.intp]]:
+    """Instants and the cuts between them, and where the instants are among these."""
+    inner = np.asarray(cuts, dtype=np.float64)
+    inner = inner[(inner > instants[0]) & (inner < instants[-1])]
+    edges = np.unique(np.concatenate([instants, inner])) if inner.size else instants
+    return edges, np.asarray(np.searchsorted(edges, instants), dtype=np.intp)
 
 
 def _chunks(count: int, each: int) -> list[slice]:

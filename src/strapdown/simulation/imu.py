@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -11,7 +13,11 @@ from strapdown.sensors.error_chain import apply, jitter
 from strapdown.sensors.error_draws import Seed, child
 from strapdown.sensors.low_pass import mean_of_filtered
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.simulation.between_samples import Quantity, low_passed, mean_over
+from strapdown.simulation.between_samples import (
+    Quantity,
+    low_passed_at,
+    mean_between,
+)
 from strapdown.simulation.motion import Motion
 from strapdown.tables import SAMPLINGS, attitude_table, imu_table
 
@@ -45,7 +51,8 @@ def simulate_imu(
         Samples fall on ``k / rate``, from zero to the last that is within the motion.
     sampling : {'instantaneous', 'mean'}
         The value at each stamp, or the mean over the interval that ends there: of rates exact,
-        from the motion's angle; of specific force by Gauss-Legendre quadrature with 8 nodes.
+        from the motion's angle; of specific force by Gauss-Legendre quadrature with 8 nodes, cut
+        where the motion asks for it (`cuts`), as one that rings does.
         Before time zero there is no motion: the first row of means holds the value at zero.
     seed : int
         Of everything that is random; the same seed gives the same samples on every machine.
@@ -232,10 +239,10 @@ def _rate(
 ) -> Array:
     at = _instants(motion, errors, time, seed)
     if sampling == "instantaneous":
-        return low_passed(motion.rate, at, errors.bandwidth, straight)
+        return low_passed_at(motion.rate, at, errors.bandwidth, (), straight)
     angle = motion.angle(at)
     mean = np.vstack([motion.rate(at[:1]), np.diff(angle, axis=0) / step])
-    return _filtered_mean(motion.rate, at, mean, step, errors.bandwidth, straight)
+    return _filtered_mean(motion.rate, at, mean, step, errors.bandwidth, (), straight)
 
 
 def _force(
@@ -248,19 +255,26 @@ def _force(
     straight: float,
 ) -> Array:
     at, force = _instants(motion, errors, time, seed), motion.specific_force
+    cuts: Sequence[float] = getattr(motion, "cuts", ())
     if sampling == "instantaneous":
-        return low_passed(force, at, errors.bandwidth, straight)
-    mean = np.vstack([force(at[:1]), mean_over(force, at[:-1], at[1:])])
+        return low_passed_at(force, at, errors.bandwidth, cuts, straight)
+    mean = np.vstack([force(at[:1]), mean_between(force, at, cuts)])
     if errors.jitter > 0.0:
         # The sensor divides what it has gathered by the interval that it knows of.
         mean[1:] *= np.diff(at)[:, None] / step
-    return _filtered_mean(force, at, mean, step, errors.bandwidth, straight)
+    return _filtered_mean(force, at, mean, step, errors.bandwidth, cuts, straight)
 
 
 def _filtered_mean(
-    quantity: Quantity, at: Array, mean: Array, step: float, bandwidth: float, straight: float
+    quantity: Quantity,
+    at: Array,
+    mean: Array,
+    step: float,
+    bandwidth: float,
+    cuts: Sequence[float],
+    straight: float,
 ) -> Array:
     if np.isinf(bandwidth):
         return mean
-    ends = low_passed(quantity, at, bandwidth, straight)
+    ends = low_passed_at(quantity, at, bandwidth, cuts, straight)
     return mean_of_filtered(ends, mean, np.full(at.size, step), bandwidth)

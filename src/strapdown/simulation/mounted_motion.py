@@ -61,6 +61,16 @@ class MountedMotion:
         """Length in s."""
         return self.motion.duration
 
+    @property
+    def cuts(self) -> Array:
+        """Instants between which what is felt is smooth to quadratures of a few nodes, s.
+
+        The edges of the pulses, and of each ringing the beginning and every quarter of a period.
+        """
+        edges = [np.asarray(self.motion.breaks, dtype=np.float64)]
+        edges += [r.quarters() for r in self.ringing]
+        return np.unique(np.concatenate(edges))
+
     def rate(self, time: ArrayLike) -> Array:
         """Rate relative to inertial space in sensor axes, (n, 3), rad/s."""
         return rotation.rotate(self._to_sensor, self.motion.rate(time))

@@ -22,6 +22,7 @@ class RememberedMotion:
     def __init__(self, motion: Motion) -> None:
         self.motion = motion
         self.duration = motion.duration
+        self.cuts = tuple(getattr(motion, "cuts", ()))
         self.found: dict[tuple[str, bytes], Array] = {}
 
     def _ask(self, name: str, time: ArrayLike) -> Array:

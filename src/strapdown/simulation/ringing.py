@@ -15,6 +15,8 @@ Triple = tuple[float, float, float]
 
 # (1 - e)^2 of the onset, as the sum of its powers.
 _BINOMIAL = (1.0, -2.0, 1.0)
+# exp(-25) is 1.4e-11.
+_LEFT = 25.0
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,11 @@ class Ringing:
     def acceleration(self, time: ArrayLike) -> Array:
         """Second derivative of the displacement, in vehicle axes, (n, 3), m/s²."""
         return self._derivative(time, 2)
+
+    def quarters(self) -> Array:
+        """Instants from the start in steps of a quarter of a period, until 1e-11 is left; s."""
+        last = math.ceil(_LEFT * self.decay * 4.0 * self.frequency)
+        return np.asarray(self.start + np.arange(last + 1) / (4.0 * self.frequency))
 
     def _derivative(self, time: ArrayLike, order: int) -> Array:
         """Sum of three damped oscillations, each an exponential of a complex rate."""
