@@ -1,0 +1,349 @@
+"""Several units on one vehicle: whether they agree within what they state, and why not."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.crash.lever_arm_check import LeverArmCheck, check_lever_arm, lever_arm_findings
+from strapdown.crash.match_axes import AxisMatch, axis_findings, match_axes
+from strapdown.crash.mounting_rotation import (
+    MountingRotation,
+    mounting_rotation,
+    rotation_findings,
+)
+from strapdown.crash.unit_at_point import UnitAtPoint
+from strapdown.crash.unit_differences import (
+    VelocityIncrements,
+    common_edges,
+    velocity_increments,
+)
+from strapdown.exceptions import ConfigError, Finding
+
+Array = NDArray[np.float64]
+
+__all__ = ["UnitAgainstAll", "UnitComparison", "UnitPair", "compare_units"]
+
+AXES = ("forward", "right", "down")
+# Relative to the largest variance: below it a covariance is rounding.
+FLOOR = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class UnitPair:
+    """Two units at their common point.
+
+    Attributes
+    ----------
+    first, second : str
+    edges : ndarray, (m + 1,), s
+    difference : ndarray, (m + 1, 3), m/s
+        Integral of the first one's specific force minus that of the second's, vehicle axes,
+        from the first edge.
+    sd : ndarray, (m + 1, 3), m/s
+        As both state it.
+    force_difference, force_sd : ndarray, (m, 3), m/s²
+        Means over each piece.
+    chi_square, freedom : float, int
+        Of all pieces and axes together, with their covariance.
+    probability : float
+        Of a chi-square as large or larger, where the statements are right.
+    agree : bool
+    axes : AxisMatch
+    turned : MountingRotation
+    lever_arm : LeverArmCheck
+    findings : tuple of Finding
+    """
+
+    first: str
+    second: str
+    edges: Array
+    difference: Array
+    sd: Array
+    force_difference: Array
+    force_sd: Array
+    chi_square: float
+    freedom: int
+    probability: float
+    agree: bool
+    axes: AxisMatch
+    turned: MountingRotation
+    lever_arm: LeverArmCheck
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class UnitAgainstAll:
+    """One unit against the combination of all.
+
+    Attributes
+    ----------
+    name : str
+    difference, sd : ndarray, (m + 1, 3), m/s
+        Its delta-V minus the combination's, and as stated: what it shares with the combination
+        is taken into account.
+    chi_square, freedom, probability
+        As `UnitPair`.
+    """
+
+    name: str
+    difference: Array
+    sd: Array
+    chi_square: float
+    freedom: int
+    probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class UnitComparison:
+    """All units of a vehicle at one point.
+
+    Attributes
+    ----------
+    edges : ndarray, (m + 1,), s
+    pairs : tuple of UnitPair
+    combined : ndarray, (m + 1, 3), m/s
+        Delta-V of the best weighted combination, gravity still in it, body axes.
+    combined_sd : ndarray, (m + 1, 3), m/s
+    against : tuple of UnitAgainstAll
+    chi_square, freedom, probability
+        Of all units against the combination.
+    agree : bool
+    findings : tuple of Finding
+    """
+
+    edges: Array
+    pairs: tuple[UnitPair, ...]
+    combined: Array
+    combined_sd: Array
+    against: tuple[UnitAgainstAll, ...]
+    chi_square: float
+    freedom: int
+    probability: float
+    agree: bool
+    findings: tuple[Finding, ...]
+
+
+def compare_units(
+    units: Sequence[UnitAtPoint],
+    *,
+    window: tuple[float, float] | None = None,
+    pieces: int = 20,
+    level: float = 1e-3,
+) -> UnitComparison:
+    """Compare units pairwise and against their combination.
+
+    Parameters
+    ----------
+    units : sequence of UnitAtPoint
+        Two or more, of one rigid vehicle, at one point.
+    window : (start, end), s, optional
+        What is compared; -0.1 to 0.75 s, as far as all have samples, if not given.
+    pieces : int
+        The forces are compared as means over so many equal pieces, or as many as have two
+        samples each. The test of the pieces is one of the delta-V curve at their edges, too:
+        either follows from the other.
+    level : float
+        Probability below which a difference is a disagreement.
+
+    Returns
+    -------
+    UnitComparison
+
+    Notes
+    -----
+    With the difference d of the increments of velocity and its covariance C from all that both
+    units state, ``dᵀ C⁻¹ d`` is chi-square. Ringing that the structure has at one place and not at
+    the other, and whatever else was not stated, shows as a disagreement; its words say where it
+    is largest. Swapped axes, a turned mounting and wrong positions are looked for in each pair.
+
+    Raises
+    ------
+    DataError
+        There are fewer than two units, or they do not cover the window.
+    ConfigError
+        The window is too short, or an option is out of range.
+    """
+    if not (pieces >= 3 and 0.0 < level < 1.0):
+        raise ConfigError(
+            f"{pieces} pieces at a level of {level:g}",
+            quantity="pieces, level",
+            remedy="give at least 3 pieces, and a probability between 0 and 1, as 0.001",
+        )
+    edges = common_edges(units, window, pieces)
+    increments = [velocity_increments(u, edges) for u in units]
+    pairs = tuple(
+        _pair(units[i], units[j], increments[i], increments[j], level)
+        for i, j in itertools.combinations(range(len(units)), 2)
+    )
+    combined, covariance, against = _against_all(units, increments)
+    chi = sum(_square(v.values.ravel() - combined, v.whole) for v in increments)
+    freedom = combined.size * (len(units) - 1)
+    probability = _tail(chi, freedom)
+    findings = [f for p in pairs for f in p.findings]
+    findings += _odd_one(units, pairs)
+    total = np.kron(np.tril(np.ones((edges.size - 1, edges.size - 1))), np.eye(3))
+    sd = np.sqrt(np.maximum(np.diag(total @ covariance @ total.T), 0.0))
+    return UnitComparison(
+        edges,
+        pairs,
+        _curve(combined),
+        np.vstack([np.zeros(3), sd.reshape(-1, 3)]),
+        against,
+        chi,
+        freedom,
+        probability,
+        probability >= level and all(p.agree for p in pairs),
+        tuple(findings),
+    )
+
+
+def _pair(
+    first: UnitAtPoint,
+    second: UnitAtPoint,
+    a: VelocityIncrements,
+    b: VelocityIncrements,
+    level: float,
+) -> UnitPair:
+    edges = a.edges
+    difference, covariance = (a.values - b.values).ravel(), a.whole + b.whole
+    chi, freedom = _square(difference, covariance), difference.size
+    probability = _tail(chi, freedom)
+    curve, sd = _curve(difference), _curve_sd(covariance)
+    lengths = np.diff(edges)[:, None]
+    force_sd = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths
+    axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
+    findings: list[Finding] = []
+    agree = probability >= level
+    if not agree:
+        findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
+    found = axis_findings(axes, first.name, second.name)
+    if not found:
+        # A small rotation or a wrong place means nothing where an axis is another.
+        angles = float(np.hypot(first.angles_sd, second.angles_sd))
+        found = rotation_findings(turned, angles, first.name, second.name)
+        found += lever_arm_findings(
+            lever,
+            float(np.hypot(a.position_sd, b.position_sd)),
+            first.position - second.position,
+            first.name,
+            second.name,
+        )
+    return UnitPair(
+        first.name,
+        second.name,
+        edges,
+        curve,
+        sd,
+        difference.reshape(-1, 3) / lengths,
+        force_sd,
+        chi,
+        freedom,
+        probability,
+        agree,
+        axes,
+        turned,
+        lever,
+        tuple(findings + found),
+    )
+
+
+def _against_all(
+    units: Sequence[UnitAtPoint], increments: Sequence[VelocityIncrements]
+) -> tuple[Array, Array, tuple[UnitAgainstAll, ...]]:
+    """Weighted mean of the increments, its covariance, and each unit against it."""
+    information = [np.linalg.inv(_floored(v.whole)) for v in increments]
+    covariance = np.linalg.inv(np.sum(information, axis=0))
+    weighed = [i @ v.values.ravel() for i, v in zip(information, increments, strict=True)]
+    combined = covariance @ np.sum(weighed, axis=0)
+    against = []
+    for u, v in zip(units, increments, strict=True):
+        difference = v.values.ravel() - combined
+        # The unit is part of the combination: their covariance is the combination's.
+        own = _floored(v.whole) - covariance
+        chi = _square(difference, own)
+        against.append(
+            UnitAgainstAll(
+                u.name,
+                _curve(difference),
+                _curve_sd(own),
+                chi,
+                difference.size,
+                _tail(chi, difference.size),
+            )
+        )
+    return combined, covariance, tuple(against)
+
+
+def _floored(covariance: Array) -> Array:
+    floor = max(FLOOR * float(np.diag(covariance).max()), 1e-30)
+    return np.asarray(covariance + floor * np.eye(len(covariance)))
+
+
+def _square(difference: Array, covariance: Array) -> float:
+    return float(difference @ np.linalg.solve(_floored(covariance), difference))
+
+
+def _tail(chi_square: float, freedom: int) -> float:
+    from scipy.stats import chi2
+
+    return float(chi2.sf(chi_square, freedom))
+
+
+def _curve(increments: Array) -> Array:
+    return np.vstack([np.zeros(3), np.cumsum(increments.reshape(-1, 3), axis=0)])
+
+
+def _curve_sd(covariance: Array) -> Array:
+    m = len(covariance) // 3
+    total = np.kron(np.tril(np.ones((m, m))), np.eye(3))
+    variance = np.maximum(np.diag(total @ covariance @ total.T), 0.0)
+    return np.vstack([np.zeros(3), np.sqrt(variance).reshape(-1, 3)])
+
+
+def _disagreement(
+    first: UnitAtPoint,
+    second: UnitAtPoint,
+    edges: Array,
+    curve: Array,
+    sd: Array,
+    chi: float,
+    freedom: int,
+    probability: float,
+) -> Finding:
+    ratio = np.abs(curve[1:]) / np.maximum(sd[1:], 1e-30)
+    row, axis = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+    share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
+    return Finding(
+        f"it and {second.name} disagree at their common point: chi-square {chi:.4g} of {freedom} "
+        f"degrees of freedom, probability {share}; their delta-V differs most, for its bound, "
+        f"along {AXES[axis]} at {edges[row + 1]:.4g} s, by {curve[row + 1, axis]:+.3g} m/s with a "
+        f"stated standard deviation of {sd[row + 1, axis]:.2g} m/s",
+        file=first.name,
+        quantity="delta-V",
+        remedy="look at what follows on axes, mounting and positions; without such, one of them "
+        "rings or bends with its place, or states too small uncertainties",
+    )
+
+
+def _odd_one(units: Sequence[UnitAtPoint], pairs: Sequence[UnitPair]) -> list[Finding]:
+    """Of three or more, the one without which the others agree."""
+    if len(units) < 3 or all(p.agree for p in pairs):
+        return []
+    odd = [
+        u.name for u in units if all(p.agree for p in pairs if u.name not in (p.first, p.second))
+    ]
+    if len(odd) != 1:
+        return []
+    return [
+        Finding(
+            "the others agree with one another and not with it",
+            file=odd[0],
+            quantity="delta-V",
+            remedy="leave it out, or combine by median",
+        )
+    ]

@@ -1,0 +1,127 @@
+"""How one unit is turned against another on the same vehicle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.crash.unit_differences import VelocityIncrements
+from strapdown.exceptions import Finding
+
+Array = NDArray[np.float64]
+
+__all__ = ["MountingRotation", "mounting_rotation", "rotation_findings"]
+
+SIGMAS = 4.0
+# A direction about which less is known than this is not known.
+MOST_SD = 0.2  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class MountingRotation:
+    """The rotation that turns what the second unit reads into what the first one reads.
+
+    Attributes
+    ----------
+    matrix : ndarray, (3, 3)
+    vector_deg : ndarray, (3,), deg
+        The same as a rotation vector.
+    covariance : ndarray, (3, 3), rad²
+        Of a small rotation about the axes of the first unit; directions about which the motion
+        says nothing have a variance of pi².
+    misfit : float
+        Root of the residuals' chi-square over its degrees of freedom; where it exceeds one the
+        covariance was multiplied by its square.
+    """
+
+    matrix: Array
+    vector_deg: Array
+    covariance: Array
+    misfit: float
+
+    @property
+    def sd_deg(self) -> Array:
+        """About each axis of the first unit, (3,), deg."""
+        return np.asarray(np.degrees(np.sqrt(np.diag(self.covariance))), dtype=np.float64)
+
+
+def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> MountingRotation:
+    """Estimate the rotation between two units from forces and rates.
+
+    Parameters
+    ----------
+    first, second : VelocityIncrements
+        Between the same edges.
+
+    Returns
+    -------
+    MountingRotation
+
+    Notes
+    -----
+    The rotation of least squares (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
+    1988, J. Astronaut. Sci. 36, 245), forces and rates weighed by their stated variances. Its
+    covariance is the inverse of ``sum w (|b|² I - b bᵀ)`` over the vectors b (Shuster and Oh
+    1981, doi:10.2514/3.19717).
+    """
+    force = float(np.trace(first.whole + second.whole)) / first.values.size
+    turn = first.turn_sd**2 + second.turn_sd**2
+    a = np.vstack([first.values / max(force, 1e-30) ** 0.5, first.turned / max(turn, 1e-30) ** 0.5])
+    b = np.vstack(
+        [second.values / max(force, 1e-30) ** 0.5, second.turned / max(turn, 1e-30) ** 0.5]
+    )
+    u, _, vt = np.linalg.svd(a.T @ b)
+    C = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    turned = b @ C.T
+    misfit = float(np.sqrt(((a - turned) ** 2).sum() / (a.size - 3)))
+    normal = (turned**2).sum() * np.eye(3) - turned.T @ turned
+    values, vectors = np.linalg.eigh(normal)
+    variances = np.minimum(max(1.0, misfit) ** 2 / np.maximum(values, 1e-12), np.pi**2)
+    return MountingRotation(
+        C,
+        np.degrees(rotation.rotation_vector_from_dcm(C)),
+        np.asarray((vectors * variances) @ vectors.T),
+        misfit,
+    )
+
+
+def rotation_findings(
+    found: MountingRotation, stated_sd: float, first: str, second: str
+) -> list[Finding]:
+    """A rotation between the units that their mounting does not explain.
+
+    Parameters
+    ----------
+    found : MountingRotation
+    stated_sd : float, rad
+        Of each angle between the two, as stated.
+    first, second : str
+
+    Returns
+    -------
+    list of Finding
+        Empty where it is within four standard deviations, or not known.
+    """
+    vector = np.radians(found.vector_deg)
+    values, vectors = np.linalg.eigh(found.covariance)
+    along = vectors.T @ vector
+    told = np.sqrt(values) < MOST_SD
+    ratio = np.abs(along) / np.sqrt(values + stated_sd**2)
+    if not (told & (ratio > SIGMAS)).any():
+        return []
+    x, y, z = found.vector_deg
+    sd = found.sd_deg
+    return [
+        Finding(
+            f"it is turned against {first} by {x:+.2f}, {y:+.2f}, {z:+.2f} deg about forward, "
+            f"right, down (± {sd[0]:.2f}, {sd[1]:.2f}, {sd[2]:.2f}), more than the stated "
+            f"{np.degrees(stated_sd):.2g} deg between them",
+            file=second,
+            quantity="mounting angles",
+            remedy="look how the two are fixed, and correct the angles of the one that is turned; "
+            "structure that bends between them looks the same",
+        )
+    ]

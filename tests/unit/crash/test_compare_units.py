@@ -1,0 +1,273 @@
+"""Units on one vehicle: agreement with honest statements, and what is wrong where it is wrong."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from strapdown import rotation
+from strapdown.crash.combine_units import combine_units
+from strapdown.crash.compare_units import compare_units
+from strapdown.crash.match_axes import signed_permutations
+from strapdown.crash.unit_at_point import Contributor, UnitAtPoint
+from strapdown.crash.unit_differences import sum_weights
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.lever_arm import move_imu
+from strapdown.tables import ACCEL, GYRO, imu_table
+
+G = 9.80665
+SD, GYRO_SD, BIAS_SD, SCALE_SD = 0.5, 0.004, 0.2, 0.02
+P = np.array([0.1, 0.0, -0.1])
+
+
+def motion(time):
+    """Force at the vehicle's origin, rates and their derivative: a crash that turns all axes."""
+    x = np.clip(time / 0.12, 0, 1)
+    pulse = 2 * np.sin(np.pi * x) ** 2 / 0.12
+    area = x - np.sin(2 * np.pi * x) / (2 * np.pi)
+    direction, turn = np.array([-7.0, 2.0, -1.0]), np.array([0.8, -0.6, 1.5])
+    force = np.outer(pulse, direction) + [0.0, 0.0, -G]
+    return force, np.outer(area, turn), np.outer(pulse, turn)
+
+
+def at_place(place, *, rate=200.0, start=-0.5, wobble=3.0):
+    """Ideal readings at a place; a wobble keeps the turning alive after the crash."""
+    time = np.arange(round(start * rate), round(0.8 * rate) + 1) / rate
+    force, omega, alpha = motion(time)
+    w, p = 2 * np.pi * 4.0, np.array([0.0, 1.0, 2.0])
+    omega = omega + wobble * 0.2 * np.sin(w * time[:, None] + p)
+    alpha = alpha + wobble * 0.2 * w * np.cos(w * time[:, None] + p)
+    r = np.asarray(place, dtype=float)
+    force = force + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+    return time, force, omega
+
+
+def unit(
+    name,
+    place,
+    seed,
+    *,
+    stated=None,
+    rate=200.0,
+    errors=1.0,
+    accel_axes=None,
+    gyro_axes=None,
+    position_sd=0.0,
+    start=-0.5,
+    wobble=3.0,
+):
+    """A unit with bias, scale and noise drawn from what it states, moved to P."""
+    rng = np.random.default_rng(seed)
+    time, force, omega = at_place(place, rate=rate, start=start, wobble=wobble)
+    bias, scale = BIAS_SD * rng.normal(size=3), SCALE_SD * rng.normal(size=3)
+    read = force * (1 + errors * scale) + errors * bias
+    read = read + errors * SD * rng.normal(size=force.shape)
+    turned = omega + errors * GYRO_SD * rng.normal(size=omega.shape)
+    read = read if accel_axes is None else read @ np.asarray(accel_axes)
+    turned = turned if gyro_axes is None else turned @ np.asarray(gyro_axes)
+    position = np.asarray(place if stated is None else stated, dtype=float)
+    moved = move_imu(imu_table(time, turned, read), P - position, gyro_noise=GYRO_SD)
+    n = time.size
+    return UnitAtPoint(
+        name=name,
+        imu=moved.imu,
+        noise=np.tile(SD**2 * np.eye(3), (n, 1, 1)),
+        gyro_noise=np.tile(GYRO_SD**2 * np.eye(3), (n, 1, 1)),
+        contributors=(
+            Contributor("bias", np.tile(np.eye(3), (n, 1, 1)), BIAS_SD**2 * np.eye(3)),
+            Contributor("scale", read[:, :, None] * np.eye(3), SCALE_SD**2 * np.eye(3)),
+        ),
+        position=position,
+        position_sd=position_sd,
+        moved=moved,
+    )
+
+
+A, B, C = (-0.6, 0.5, -0.2), (0.4, -0.5, 0.1), (0.9, 0.3, -0.3)
+
+
+def test_integrals_are_exact_for_straight_lines_and_for_means():
+    time = np.cumsum(np.random.default_rng(0).uniform(0.5, 1.5, 50))
+    y = np.random.default_rng(1).normal(size=50)
+    edges = np.array([time[0], time[3], 0.3 * time[3] + 0.7 * time[4], 20.3, time[-1]])
+    fine = np.sort(np.r_[np.linspace(time[0], time[-1], 20001), time, edges])
+    line = np.interp(fine, time, y)
+    area = np.r_[0, np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(fine))]
+    expected = np.diff(np.interp(edges, fine, area))
+    # The trapezoid is exact on straight lines: 2e4 roundings of sums of order ten.
+    assert sum_weights(time, edges, "instantaneous") @ y == pytest.approx(expected, abs=1e-10)
+    steps = np.r_[0.0, np.cumsum(y[1:] * np.diff(time))]
+    means = np.diff(np.interp(edges, time, steps))
+    assert sum_weights(time, edges, "mean") @ y == pytest.approx(means, abs=1e-12)
+
+
+def test_honest_units_agree_and_their_chi_square_is_one():
+    chi, freedom, against, total = [], 0, [], []
+    for k in range(60):
+        units = [unit(n, p, 10 * k + i) for i, (n, p) in enumerate((("A", A), ("B", B), ("C", C)))]
+        out = compare_units(units)
+        assert all(p.axes.kind == "agree" for p in out.pairs)
+        chi.append([p.chi_square for p in out.pairs])
+        freedom = out.pairs[0].freedom
+        total.append(out.chi_square / out.freedom)
+        against.append(out.against[0].probability)
+    # The mean of n chi-squares scatters by sqrt(2 freedom / n); the parabola is short of the true
+    # angular acceleration by 0.6 (w h)² = 1 % of 15 rad/s² m, 0.15 m/s² against a noise of
+    # 0.5/sqrt(8) in a piece: up to (0.15/0.25)²/2 of a unit of chi-square more in the crash.
+    mean = np.mean(chi) / freedom
+    assert 1.0 - 5 * math.sqrt(2 / freedom / 60) < mean < 1.0 + 5 * math.sqrt(2 / freedom / 60)
+    assert np.mean(total) == pytest.approx(1.0, abs=5 * math.sqrt(2 / (2 * freedom) / 60))
+    assert np.mean(np.array(against) < 0.5) == pytest.approx(0.5, abs=5 * 0.5 / math.sqrt(60))
+
+
+def test_false_alarms_are_as_rare_as_stated():
+    findings = [
+        f
+        for k in range(40)
+        for f in compare_units([unit("A", A, k), unit("B", B, 1000 + k)]).findings
+    ]
+    assert not findings
+
+
+def test_units_of_different_rates_are_compared_without_resampling():
+    units = [unit("A", A, 1), unit("LAB", B, 2, rate=2000.0)]
+    out = compare_units(units)
+    assert out.agree
+    assert out.edges.size == 21
+
+
+def test_more_bias_than_stated_is_a_disagreement_with_words():
+    biased = unit("B", B, 4)
+    table = biased.imu.copy()
+    table.attrs = biased.imu.attrs
+    table["accel_y"] += 3.0
+    out = compare_units([unit("A", A, 3), replace(biased, imu=table), unit("C", C, 5)])
+    assert not out.agree
+    assert [p.agree for p in out.pairs] == [False, True, False]
+    words = " ".join(str(f) for f in out.findings)
+    assert "A, delta-V: it and B disagree" in words
+    assert "along right" in words
+    assert "B, delta-V: the others agree with one another and not with it" in words
+
+
+@pytest.mark.parametrize("index", range(48))
+def test_every_signed_permutation_of_the_accelerometers_is_recognised(index):
+    wrong = signed_permutations()[index]
+    # The second unit reads its own axes: v_read = wrongᵀ v, so wrong turns it back.
+    out = compare_units([unit("A", A, 1), unit("B", B, 2, accel_axes=wrong)])
+    match = out.pairs[0].axes
+    assert np.array_equal(match.accelerometers, wrong)
+    assert np.array_equal(match.gyro, np.eye(3))
+    if not np.array_equal(wrong, np.eye(3)):
+        assert match.kind == "accelerometers"
+        assert match.accelerometers_sure > 0.99
+        assert any(
+            "its accelerometers has other axes" in str(f) or "its accelerometers" in str(f)
+            for f in out.findings
+        )
+
+
+def test_a_unit_turned_as_a_whole_and_a_gyro_turned_alone():
+    turned = rotation.dcm_from_euler([0.0, 0.0, 90.0]).round()
+    both = compare_units([unit("A", A, 1), unit("B", B, 2, accel_axes=turned, gyro_axes=turned)])
+    assert both.pairs[0].axes.kind == "unit"
+    gyro = np.diag([1.0, 1.0, -1.0])
+    alone = compare_units([unit("A", A, 1), unit("B", B, 2, gyro_axes=gyro)])
+    assert np.array_equal(alone.pairs[0].axes.gyro, gyro)
+    assert any("its gyro has other axes" in str(f) for f in alone.findings)
+
+
+def test_a_small_rotation_of_the_mounting_is_estimated_with_its_sd():
+    C = rotation.dcm_from_euler([2.0, -3.0, 4.0])
+    z = []
+    for k in range(40):
+        second = unit("B", A, 500 + k, accel_axes=C, gyro_axes=C)
+        out = compare_units([unit("A", A, k), second])
+        found = out.pairs[0].turned
+        error = rotation.rotation_vector_from_dcm(found.matrix @ C.T)
+        z.append(error @ np.linalg.solve(found.covariance, error))
+        assert any("it is turned against A" in str(f) for f in out.findings)
+    # Three degrees of freedom; scale and bias are in the residuals and not independent from
+    # piece to piece: within a factor of three either way.
+    assert 1.0 < np.mean(z) < 9.0
+
+
+def test_a_wrong_position_is_recognised_with_its_sd():
+    wrong, z, said = np.array([-0.6, -0.5, -0.2]), [], 0
+    for k in range(40):
+        out = compare_units([unit("A", A, k, stated=wrong), unit("B", B, 700 + k)])
+        check = out.pairs[0].lever_arm
+        truth = np.asarray(A) - wrong
+        z.append(check.directions.T @ (check.correction - truth) / check.sd)
+        said += any("position" in str(f) for f in out.findings)
+        assert check.told.any()
+    assert said == 40
+    # Normal deviates, 120 of them: their variance is one to 5 sqrt(2/120); noise of the angular
+    # acceleration is of 5 % of the signal's power and pulls the metre by some of that.
+    assert np.mean(np.square(z)) < 1.0 + 5 * math.sqrt(2 / 120) + 1.0
+
+
+def test_without_turning_positions_are_not_judged():
+    out = compare_units(
+        [
+            unit("A", A, 1, stated=(5.0, 5.0, 5.0), wobble=0.0, start=-0.5),
+            unit("B", B, 2, wobble=0.0, start=-0.5),
+        ],
+        window=(-0.45, -0.05),
+    )
+    assert not out.pairs[0].lever_arm.told.any()
+    assert not out.findings
+
+
+def test_a_combination_is_better_than_its_parts_and_says_how_much():
+    z, parts, whole = [], [], []
+    for k in range(60):
+        units = [unit(n, p, 20 * k + i) for i, (n, p) in enumerate((("A", A), ("B", B), ("C", C)))]
+        both = combine_units(units)
+        time, truth, _ = at_place(P)
+        edges = np.array([0.0, 0.3])
+        w = sum_weights(time, edges, "instantaneous")
+        true = (w @ truth)[0]
+        from strapdown.crash.unit_differences import velocity_increments
+
+        got = velocity_increments(both, edges)
+        error = got.values[0] - true
+        z.append(error @ np.linalg.solve(got.whole, error))
+        whole.append(np.sum(error**2))
+        parts.append(np.sum((velocity_increments(units[0], edges).values[0] - true) ** 2))
+    # Chi-square of three degrees of freedom; noise of the gyro is taken as white in a
+    # combination, where it cancels: below three by that.
+    assert 0.5 * 3 < np.mean(z) < 3 + 5 * math.sqrt(6 / 60)
+    assert np.mean(whole) < 0.6 * np.mean(parts)
+
+
+def test_a_median_is_not_moved_by_one_unit_gone_astray():
+    units = [unit("A", A, 1, errors=0.0), unit("B", B, 2, errors=0.0), unit("C", C, 3, errors=0.0)]
+    table = units[1].imu.copy()
+    table.attrs = units[1].imu.attrs
+    table[ACCEL] = 50.0
+    units[1] = replace(units[1], imu=table)
+    both = combine_units(units, "median")
+    good = np.stack([units[0].force, units[2].force])
+    assert (both.force <= good.max(axis=0)).all()
+    assert (both.force >= good.min(axis=0)).all()
+    assert both.imu[GYRO].to_numpy() == pytest.approx(units[0].rate)
+
+
+def test_what_is_refused():
+    one = unit("A", A, 1)
+    with pytest.raises(DataError, match="needs two"):
+        compare_units([one])
+    with pytest.raises(DataError, match="does not cover"):
+        compare_units([one, unit("B", B, 2)], window=(0.0, 5.0))
+    with pytest.raises(ConfigError, match="pieces"):
+        compare_units([one, one], pieces=1)
+    with pytest.raises(ConfigError, match="three pieces"):
+        compare_units([one, one], window=(0.0, 0.02))
+    with pytest.raises(ConfigError, match="three or more"):
+        combine_units([one, one], "median")
+    with pytest.raises(ConfigError, match="no way"):
+        combine_units([one, one], "mode")
