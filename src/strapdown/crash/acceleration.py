@@ -183,6 +183,23 @@ def body_acceleration(imu: pd.DataFrame, at_rest: Sequence[float]) -> Accelerati
     return Acceleration(index_of(imu), force - rest, "body", sampling, source)
 
 
+def force_at_rest(roll_deg: float, pitch_deg: float, gravity: float) -> Array:
+    """Specific force at rest of an unbiased sensor, from the levelling.
+
+    Parameters
+    ----------
+    roll_deg, pitch_deg : float, deg
+    gravity : float, m/s²
+
+    Returns
+    -------
+    ndarray, (3,), m/s²
+        For `body_acceleration`, where a record has no rest to take the mean of.
+    """
+    q = rotation.conjugate(rotation.quaternion_from_euler([roll_deg, pitch_deg, 0.0]))
+    return rotation.rotate(q, np.array([0.0, 0.0, -gravity]))
+
+
 def resolved_acceleration(imu: pd.DataFrame, q_nb: ArrayLike, gravity: float) -> Acceleration:
     """Resolve the specific force in north-east-down and take gravity off.
 

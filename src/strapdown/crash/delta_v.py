@@ -12,31 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.event_detector import CrashEvent
 from strapdown.crash.velocity_course import VelocityCourse
-from strapdown.crash.window_weights import check_within, resolved_weights, window_weights
+from strapdown.crash.window_weights import check_within, window_weights
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.tables.checks import index_of, source_of, values_of
-from strapdown.tables.columns import VELOCITY
-from strapdown.tables.trajectory import check_trajectory
 
 Array = NDArray[np.float64]
 
 __all__ = [
     "DeltaV",
-    "MaximumDeltaV",
     "TrailingDeltaV",
     "cumulative_delta_v",
     "delta_v",
     "event_delta_v",
-    "maximum_delta_v",
-    "resolved_weights",
     "trailing_delta_v",
-    "trajectory_delta_v",
-    "window_weights",
 ]
 
-#: 49 CFR 563.5(b), 563.7: delta-V is recorded for 250 ms or 30 ms beyond the end of the event,
-#: whichever is shorter; its maximum is looked for over 300 ms or the same.
-RECORDED, SEARCHED, BEYOND_END = 0.250, 0.300, 0.030
 #: The window of Tadic and Vukajlovic (2016), section 4.
 WINDOW = 0.030
 
@@ -121,31 +110,6 @@ class TrailingDeltaV:
     vector: Array = field(repr=False)
     peak: DeltaV
     frame: str
-
-
-@dataclass(frozen=True)
-class MaximumDeltaV:
-    """Largest cumulative changes of velocity of an event (49 CFR 563.5(b)).
-
-    Attributes
-    ----------
-    longitudinal, lateral : float, m/s
-        Signed.
-    resultant : float, m/s
-        Largest of the vector sum of the two at one instant.
-    longitudinal_time, lateral_time, resultant_time : float, s
-        From time zero.
-    searched : float, s
-        How far from time zero was looked.
-    """
-
-    longitudinal: float
-    lateral: float
-    resultant: float
-    longitudinal_time: float
-    lateral_time: float
-    resultant_time: float
-    searched: float
 
 
 def delta_v(
@@ -329,84 +293,3 @@ def trailing_delta_v(
     best = course.largest_change(low, high, window)
     peak = delta_v(acceleration, max(best - window, acceleration.begin), best, across_gaps=True)
     return TrailingDeltaV(window, at, vector, peak, acceleration.frame)
-
-
-def maximum_delta_v(acceleration: Acceleration, event: CrashEvent) -> MaximumDeltaV:
-    """Largest cumulative change of velocity since time zero, and the time to it.
-
-    Parameters
-    ----------
-    acceleration : Acceleration
-        In the frame ``body`` or ``impact``.
-    event : CrashEvent
-
-    Returns
-    -------
-    MaximumDeltaV
-        Looked for over 300 ms, to 30 ms after the end of the event, or to the end of the
-        record, whichever is least (49 CFR 563.5(b), 563.8 Table III).
-
-    Raises
-    ------
-    DataError
-        Time zero is not within the record.
-    """
-    zero = event.time_zero
-    check_within(acceleration.time, zero, zero, acceleration.source)
-    stop = min(zero + SEARCHED, event.end + BEYOND_END, acceleration.end)
-    course = VelocityCourse(acceleration)
-    at = np.array([course.largest_since(zero, stop, axes) for axes in ((0,), (1,), (0, 1))])
-    change = course.velocity(at) - course.velocity(np.array([zero]))
-    return MaximumDeltaV(
-        float(change[0, 0]),
-        float(change[1, 1]),
-        math.hypot(float(change[2, 0]), float(change[2, 1])),
-        float(at[0]) - zero,
-        float(at[1]) - zero,
-        float(at[2]) - zero,
-        stop - zero,
-    )
-
-
-def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> DeltaV:
-    """Change of velocity between two instants of a navigated trajectory.
-
-    Parameters
-    ----------
-    trajectory : DataFrame
-        Trajectory table, at the reference point; gravity is out of its velocities already.
-    start, end : float, s
-        Within it; between stamps the velocity is taken for a line.
-
-    Returns
-    -------
-    DeltaV
-        In the frame ``ned``; the weights are those of the velocities.
-
-    Raises
-    ------
-    DataError
-        The window is empty or reaches beyond the trajectory.
-    """
-    check_trajectory(trajectory)
-    time, source = index_of(trajectory), source_of(trajectory)
-    check_within(time, start, end, source)
-    if not end > start:
-        raise DataError(
-            f"the window from {start:.6g} to {end:.6g} s is empty",
-            file=source,
-            quantity="time",
-            remedy="let it end after it begins",
-        )
-    velocity = values_of(trajectory, VELOCITY)
-    weights = np.zeros(len(time))
-    rates = []
-    for instant, sign in ((start, -1.0), (end, 1.0)):
-        k = int(np.clip(np.searchsorted(time, instant, side="right"), 1, len(time) - 1))
-        step = time[k] - time[k - 1]
-        u = (instant - time[k - 1]) / step
-        weights[k - 1] += sign * (1.0 - u)
-        weights[k] += sign * u
-        rates.append((velocity[k] - velocity[k - 1]) / step)
-    vector = weights @ velocity
-    return DeltaV(float(start), float(end), vector, "ned", weights, rates[0], rates[1])

@@ -148,7 +148,7 @@ def detect_events(
     size, axis, when = detector.largest_change
     findings = [f for e in events for f in _findings(e, acceleration, rule)]
     if not events:
-        findings.append(_no_event(size, axis, when, detector.woken, rule, source))
+        findings.append(_no_event(detector, acceleration))
     return CrashEvents(
         events, rule, detector.woken, size, axis, when, source, findings=tuple(findings)
     )
@@ -197,17 +197,23 @@ def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) ->
     return found
 
 
-def _no_event(
-    size: float, axis: str, when: float, woken: int, rule: EventRule, source: str | None
-) -> Finding:
+def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
+    rule, (size, axis, when) = detector.rule, detector.largest_change
+    length = acceleration.end - acceleration.begin
     remedy = "check that the record holds the crash, and its axes and units"
     if size * STANDARD_GRAVITY >= rule.trigger:
         remedy = "if the record is in g, multiply it by 9.80665; otherwise " + remedy
-    return Finding(
-        f"no crash in it: the largest change of velocity in {rule.trigger_window * 1e3:g} ms is "
-        f"{size / KMH:.2f} km/h ({axis}, up to {when:.4f} s), and an event needs "
-        f"{rule.trigger / KMH:g} km/h; the wake threshold was exceeded {woken} times",
-        file=source,
-        quantity="delta-V",
-        remedy=remedy,
+    what = (
+        f"the largest change of velocity in {rule.trigger_window * 1e3:g} ms is "
+        f"{size / KMH:.2f} km/h ({axis}, up to {when:.4f} s)"
+        if size > 0.0
+        else "the velocity does not change"
     )
+    what = f"no crash in it: {what}, and an event needs {rule.trigger / KMH:g} km/h"
+    if length < rule.trigger_window:
+        what += f"; the record is only {length * 1e3:.4g} ms long"
+        remedy = "use a longer record; otherwise " + remedy
+    elif detector.woken:
+        what += f"; it changed by more than {rule.wake / KMH:g} km/h in "
+        what += f"{rule.wake_window * 1e3:g} ms {detector.woken} times, and not for long"
+    return Finding(what, file=acceleration.source, quantity="delta-V", remedy=remedy)

@@ -112,7 +112,8 @@ def pdof_interval(
     vector = vector_of(change, ("body", "impact", "ned"))
     matrix = covariance_of(covariance)
     z = NormalDist().inv_cdf(0.5 + 0.5 * level)
-    horizontal = _fieller(-vector[:2], matrix[:2, :2], z)
+    # 0 - x and not -x, as for the estimate: from behind is +180 deg.
+    horizontal = _fieller(0.0 - vector[:2], matrix[:2, :2], z)
     if horizontal is None:
         across = AngleInterval(-180.0, 180.0, undetermined=True)
     else:

@@ -16,13 +16,12 @@ from strapdown.crash.delta_v import (
     cumulative_delta_v,
     delta_v,
     event_delta_v,
-    maximum_delta_v,
-    resolved_weights,
     trailing_delta_v,
-    trajectory_delta_v,
-    window_weights,
 )
 from strapdown.crash.events import detect_events
+from strapdown.crash.recorder_delta_v import maximum_delta_v, recorder_delta_v
+from strapdown.crash.trajectory_delta_v import trajectory_delta_v
+from strapdown.crash.window_weights import resolved_weights, window_weights
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.tables import imu_table
 from strapdown.tables.trajectory import trajectory_table
@@ -167,9 +166,14 @@ def test_the_course_of_the_change_and_what_a_recorder_gives():
     exact = OBLIQUE.velocity(0.0004 + course.index.to_numpy()) - OBLIQUE.velocity(0.0004)
     assert np.all(np.abs(course[["dv_x", "dv_y", "dv_z"]] - exact) <= trapezoid_bound(1e3) + 1e-13)
     assert course.index[0] == 0.0 and course.iloc[0].abs().max() == 0.0
-    recorder = cumulative_delta_v(made, 0.0004, 0.2504, every=0.010)
-    assert np.allclose(recorder.index, np.arange(26) * 0.01, atol=1e-12)
-    assert recorder["horizontal"].iloc[-1] == pytest.approx(np.hypot(7.2, 2.5), abs=2e-3)
+    tenths = cumulative_delta_v(made, 0.0004, 0.2504, every=0.010)
+    assert np.allclose(tenths.index, np.arange(26) * 0.01, atol=1e-12)
+    event = detect_events(made).first
+    kept = recorder_delta_v(made, event)
+    # To the last whole 10 ms before 30 ms after the end, which is before 250 ms.
+    assert len(kept) == int((event.duration + 0.030) / 0.010) + 1 < 26
+    # What came before time zero is less than the threshold.
+    assert kept["dv_x"].iloc[-1] == pytest.approx(-7.2, abs=0.8 / 3.6)
 
 
 def test_the_maximum_and_the_time_to_it():

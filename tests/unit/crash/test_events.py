@@ -254,3 +254,10 @@ def test_a_record_in_g_gets_a_hint():
     time = stamps(1000.0)
     search = detect_events(Acceleration(time, FRONT.accel(time) / 9.80665))
     assert not search.events and "in g" in str(search.findings[0].remedy)
+
+
+def test_a_record_that_is_too_short_says_so():
+    time = np.arange(0.0, 0.05, 1e-3)
+    search = detect_events(Acceleration(time, np.zeros((len(time), 3)), source="unit 5"))
+    (finding,) = search.findings
+    assert "only 49 ms long" in finding.what and "the velocity does not change" in finding.what
