@@ -8,21 +8,19 @@ import pytest
 from strapdown.exceptions import ConfigError
 from strapdown.frames import place_difference
 from strapdown.simulation import Origin, StationaryMotion, car
+from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.gnss import FALSE_POSITION, GnssReceiver, simulate_gnss
 from strapdown.simulation.manoeuvres import Straight, Turn
-from strapdown.simulation.pulse_motion import PulseMotion
 from strapdown.tables import GEODETIC, VELOCITY
 
 TURNING = car(
     Origin(45.0, 20.0, 80.0), [("in", Straight(1.0)), ("bend", Turn(120.0, 30.0))], speed=12.0
 )
-CRASH = PulseMotion(
+CRASH = CrashMotion(
     10.0,
     Origin(45.0, 20.0, 80.0),
-    velocity=(14.0, 0.0, 0.0),
-    velocity_change=(-14.0, 0.0, 0.0),
-    start=5.0,
-    length=0.1,
+    (14.0, 0.0, 0.0),
+    (HaversinePulse(5.0, 0.1, (-14.0, 0.0, 0.0)),),
 )
 LONG = StationaryMotion(4000.0, Origin(45.0, 20.0, 80.0))
 
