@@ -133,6 +133,8 @@ def onto_stamps(
         held = np.abs(g.values) >= AT_END * limits[axes]
         at, method = _resample(channels, g, held, offset, stamps, rate, sampling, attenuation)
         values[:, axes], factor[:, axes] = at.values, at.noise_factor[:, None]
+        if method == "interpolated":
+            values[:, axes] = _held(g, held, at.values, stamps + offset, limits[axes])
         noise[:, axes] = at.noise_factor[:, None] * density[axes] / np.sqrt(g.step)
         clipped[:, axes] = at.touched
         whole &= at.whole
@@ -150,6 +152,16 @@ def onto_stamps(
         next(m for m in order if m in methods),
     )
     return result, findings
+
+
+def _held(g: AxisGroup, held: Flags, values: Array, at: Array, limits: Array) -> Array:
+    """Values between samples, at the end of the range where the nearest sample was held there.
+
+    A polynomial through a held stretch swings about it: the end would no longer be seen for one.
+    """
+    nearest = np.clip(np.rint((at - g.time[0]) / g.step).astype(np.int64), 0, len(g.time) - 1)
+    inside = np.clip(values, -limits, limits)
+    return np.where(held[nearest], np.copysign(limits, g.values[nearest]), inside)
 
 
 def _is_faster(g: AxisGroup, rate: float) -> bool:
@@ -210,23 +222,18 @@ def _resample(
 
 
 def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float) -> list[Finding]:
-    if method != "interpolated":
-        return []
     own = 1.0 / g.step
-    slower = own * SAME_RATE < rate
-    why = "slower than" if slower else "at other instants than"
+    # Of a like rate and other instants only, nothing is lost that a person should know of.
+    if method != "interpolated" or own * SAME_RATE > rate:
+        return []
     return [
         Finding(
-            f"{', '.join(names)} at {own:.5g} Hz, {why} the common stamps at {rate:g} Hz, "
+            f"{', '.join(names)} at {own:.5g} Hz, slower than the common stamps at {rate:g} Hz, "
             "interpolated by polynomials through six samples",
             file=source,
             quantity="time",
-            remedy=f"nothing above some {own / 8.0:.3g} Hz is kept to a part in a thousand; "
-            + (
-                "use a lower rate if that matters"
-                if slower
-                else "give `rate` or the trigger so that stamps coincide if that matters"
-            ),
+            remedy=f"nothing above some {own / 8.0:.3g} Hz is kept to a part in a thousand; use a "
+            "lower rate if that matters",
         )
     ]
 

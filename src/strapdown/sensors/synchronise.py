@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, onto_stamps
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.unit_clocks import (
@@ -140,7 +141,9 @@ def synchronise(
     Returns
     -------
     SynchronisedUnits
-        Cut to what all units cover. Faster channels are decimated (or averaged), without delay;
+        Cut to what all units cover. The delay of the low-pass before each sampler, its time
+        constant for signals slow against it, is taken off every channel's stamps. Faster channels
+        are decimated (or averaged), without delay;
         others are interpolated where they were not sampled at the common stamps, and a finding
         says so.
 
@@ -172,8 +175,9 @@ def synchronise(
     for u, clock in sorted(zip(given, clocks, strict=True), key=lambda p: p[0].gyro is None):
         triads = []
         for channels, triad, columns in _parts(u):
+            late = clock.offset + _delay(triad)
             at, said = onto_stamps(
-                channels, triad, columns, clock.offset, time, rate, sampling, attenuation
+                channels, triad, columns, late, time, rate, sampling, attenuation
             )
             triads.append(at)
             findings += said
@@ -217,6 +221,12 @@ def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str
     return parts
 
 
+def _delay(triad: RecordedTriad) -> float:
+    """By how much the low-pass before the sampler is late for slow signals, s."""
+    bandwidth = triad.uncertainty.bandwidth
+    return 0.0 if math.isinf(bandwidth) else time_constant(bandwidth)
+
+
 def _triads(u: UnitChannels) -> tuple[TriadChannels, ...]:
     return (*u.accelerometers, *(() if u.gyro is None else (u.gyro,)))
 
@@ -254,9 +264,9 @@ def _common_stamps(
     given: list[UnitChannels], clocks: list[UnitClock], rate: float, sampling: str
 ) -> Array:
     spans = [
-        (channels.source, *allowed_stamps(channels, clock.offset, rate, sampling))
+        (channels.source, *allowed_stamps(channels, clock.offset + _delay(triad), rate, sampling))
         for u, clock in zip(given, clocks, strict=True)
-        for channels in _triads(u)
+        for channels, triad, _ in _parts(u)
     ]
     latest = max(spans, key=lambda s: s[1])
     earliest = min(spans, key=lambda s: s[2])
