@@ -1,1 +1,4 @@
-"""Digital filters: CFC classes, resampling, derivatives, delays between signals."""
+"""Digital filters: CFC classes, resampling, derivatives, delays between signals.
+
+Arrays in, arrays out; each tells what it does to noise and to time.
+"""

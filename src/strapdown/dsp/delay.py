@@ -224,6 +224,7 @@ def _refine(one: EvenSignal, two: EvenSignal, delay: float, coarse: float) -> De
     shorter = min(len(one.values), len(two.values))
     widths = [w for w in WIDTHS if 2.0 * TRUNCATE * w + LEAST_SAMPLES <= 0.5 * shorter]
     best: Delay | None = None
+    noise: Array | None = None
     for width in widths or WIDTHS[:1]:
         edge = int(TRUNCATE * width) if widths else 0
         smooth = [
@@ -236,7 +237,7 @@ def _refine(one: EvenSignal, two: EvenSignal, delay: float, coarse: float) -> De
             )
             for s in (one, two)
         ]
-        found = _least_squares(smooth[0], smooth[1], delay, coarse, width)
+        found, noise = _least_squares(smooth[0], smooth[1], delay, coarse, width, noise)
         if best is None or found.sd < best.sd:
             best = found
     assert best is not None
@@ -244,10 +245,21 @@ def _refine(one: EvenSignal, two: EvenSignal, delay: float, coarse: float) -> De
 
 
 def _least_squares(
-    one: EvenSignal, two: EvenSignal, delay: float, coarse: float, width: float
-) -> Delay:
-    """Delay, a gain and constants, from the nearest sample on."""
+    one: EvenSignal,
+    two: EvenSignal,
+    delay: float,
+    coarse: float,
+    width: float,
+    noise: Array | None,
+) -> tuple[Delay, Array | None]:
+    """Delay, a gain and constants, from the nearest sample on; and the noise of the samples.
+
+    The variance is the larger of two: by the residuals' own correlation, which scatters and of
+    which the least over the widths is low by chance; and as of white noise before the smoothing,
+    with the variance that the narrowest width showed.
+    """
     from scipy.interpolate import CubicSpline
+    from scipy.ndimage import gaussian_filter1d
 
     shape = CubicSpline(one.time, one.values)
     slope = CubicSpline(two.time, two.values)(two.time, 1)
@@ -256,7 +268,7 @@ def _least_squares(
     for _ in range(STEPS):
         inside = (two.time - at >= one.time[0]) & (two.time - at <= one.time[-1])
         if inside.sum() < LEAST_SAMPLES:
-            return nothing
+            return nothing, noise
         t = two.time[inside] - at
         x, y, dx, dy = shape(t), two.values[inside], shape(t, 1), slope[inside]
         x, y = x - x.mean(axis=0), y - y.mean(axis=0)
@@ -265,15 +277,22 @@ def _least_squares(
         # Noise of the two records is not common: the product of slopes does not count it.
         energy = gain * float((dx * dy).sum())
         if not energy > 0.0:
-            return nothing
+            return nothing, noise
         move = -gain * float((dx * (y - gain * x)).sum()) / energy
         at = float(np.clip(at + move, delay - limit, delay + limit))
         if abs(move) < 1e-9 * one.step:
             break
     residual = y - gain * x
     common = float((x * y).sum() / math.sqrt((x * x).sum() * (y * y).sum()))
-    sd = math.sqrt(_variance(gain * dx, residual, width)) / energy
-    return Delay(at, sd, max(common, coarse), 0.0, math.nan, False, gain, len(t) * two.step)
+    if noise is None:
+        # A Gaussian leaves 1/(2 sqrt(π) width) of the variance of white noise.
+        left = 2.0 * math.sqrt(math.pi) * width / max(len(t) - 3, 1)
+        noise = left * (residual**2).sum(axis=0)
+    felt = gaussian_filter1d(gain * dx, width, axis=0, truncate=TRUNCATE, mode="constant")
+    white = float(((felt**2).sum(axis=0) * noise).sum())
+    sd = math.sqrt(max(_variance(gain * dx, residual, width), white)) / energy
+    found = Delay(at, sd, max(common, coarse), 0.0, math.nan, False, gain, len(t) * two.step)
+    return found, noise
 
 
 def _variance(slope: Array, residual: Array, width: float) -> float:

@@ -122,6 +122,7 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     stamps = np.asarray(table.index.to_numpy(), dtype=np.float64)
     check_time(stamps, source)
     values = table[columns].to_numpy(dtype=np.float64)
+    check_rows(np.where(np.isnan(values), 0.0, values), columns, source)
     groups, findings = _groups(source, stamps, values, columns)
     judge = _judge_force if columns == ACCEL else _judge_rate
     return TriadChannels(
@@ -166,13 +167,13 @@ def _group(
     names = [columns[a] for a in axes]
     block = values[:, list(axes)]
     rows = np.flatnonzero(~np.isnan(block[:, 0]))
+    time, block = stamps[rows], np.ascontiguousarray(block[rows])
     if rows.size >= 2:
-        # Rows that a slower or later axis does not have come at a steady beat; others are holes.
-        skips = np.diff(rows)
-        odd = skips != np.median(skips)
-        if odd.any():
-            row = int(rows[int(np.argmax(odd))]) + 1
-            check_rows(block[row : row + 1], names, source)
+        # Rows of the other axes are between the samples; a hole is where a sample is left out.
+        steps = np.diff(time)
+        hole = (np.diff(rows) > 1) & (steps > 1.5 * np.median(steps))
+        if hole.any():
+            row = int(rows[int(np.argmax(hole))]) + 1
             raise DataError(
                 f"nan at {stamps[row]:.9g} s, between samples of the axis",
                 file=source,
@@ -180,9 +181,6 @@ def _group(
                 quantity=names[0],
                 remedy="fill it with what is known, or cut the record before it",
             )
-        time, block = stamps[rows], np.ascontiguousarray(block[rows])
-    else:
-        time, block = stamps[rows], block[rows]
     if len(time) < LEAST_SAMPLES:
         raise DataError(
             f"it has {len(time)} samples, and {LEAST_SAMPLES} are needed",
@@ -190,7 +188,6 @@ def _group(
             quantity=names[0],
             remedy="give a record of the crash, or leave this part out",
         )
-    check_rows(block, names, source)
     gaps = find_gaps(time)
     if gaps:
         worst = max(gaps, key=lambda g: g.length)

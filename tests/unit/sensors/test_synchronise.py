@@ -94,6 +94,11 @@ def with_table(unit, change, *, gyro=False):
     return replace(unit, gyro=part) if gyro else replace(unit, accelerometers=(part,))
 
 
+def with_inf(table):
+    table.iloc[200, 1] = np.inf
+    return table
+
+
 def test_everything_lands_on_one_clock_and_common_stamps():
     both = synchronise([lab(), imu()])
     assert [u.unit.name for u in both.units] == ["LAB1", "IMU1"]
@@ -108,9 +113,9 @@ def test_everything_lands_on_one_clock_and_common_stamps():
     np.testing.assert_allclose(
         two.unit.accelerometers[0].table, force(both.time) @ IMU_MOUNT.C_vs, atol=1e-9
     )
-    # A haversine begins and ends with a jump J = 2 (π/T)² A of its second derivative, whose spectrum
-    # is J/(2π f)³. What lies above the passband's 50 Hz is at most 2 ∫ of it = J/((2π)³ 50²) a
-    # corner, some 0.4 m/s² for each; and 1e-4 of the rest.
+    # A haversine begins and ends with a jump J = 2 (π/T)² A of its second derivative, with the
+    # spectrum J/(2π f)³. What lies above the passband's 50 Hz is at most 2 ∫ of it, J/((2π)³ 50²)
+    # a corner, some 0.4 m/s² for each; and 1e-4 of the rest.
     got = one.unit.accelerometers[0].table.to_numpy()
     truth = force(both.time) @ LAB_MOUNT.C_vs
     jumps = sum(2.0 * 2.0 * (np.pi / t) ** 2 * np.linalg.norm(a) for a, _, t in PULSES)
@@ -321,6 +326,10 @@ def test_clipping_is_seen_through_the_low_pass():
         (
             lambda: [with_table(imu(), lambda t: t.drop(t.index[77]).reindex(t.index))],
             ["IMU1, accel, row 78", "nan at"],
+        ),
+        (
+            lambda: [with_table(imu(), with_inf)],
+            ["IMU1, accel, row 201, accel_y", "not a finite number (inf)"],
         ),
         (
             lambda: [with_table(imu(), lambda t: t.drop(t.index[100:110]), gyro=True)],
