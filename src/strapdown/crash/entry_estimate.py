@@ -135,14 +135,16 @@ def estimate(
     for iteration in range(1, MOST_ITERATIONS + 1):
         problem = search.problem()
         step = adjust(problem, weights)
-        # Outliers are told where the rest is nearly linear; weights that go on changing are
-        # those of fixes at the brink, and are kept as they are after a while.
+        # Far from the solution weights only keep gross errors out; those at the brink of another
+        # are kept as they are after a while.
         changed = not search.near
-        if search.near and settled < MOST_WEIGHINGS:
+        if not search.near or settled < MOST_WEIGHINGS:
             found, _ = weigh(problem, step, weights)
-            changed = bool(np.abs(found - weights).max() > SAME_WEIGHT)
-            weights, settled = found, settled + 1
-            step = adjust(problem, weights) if changed else step
+            changed |= bool(np.abs(found - weights).max() > SAME_WEIGHT)
+            settled += search.near
+            if (found != weights).any():
+                weights = found
+                step = adjust(problem, weights)
         if search.take(step) and not changed:
             return search.result(weights, iteration)
     raise DivergenceError(
@@ -150,7 +152,7 @@ def estimate(
         file=imu.attrs.get("source"),
         quantity="entry state",
         remedy="look at the fixes (units, sd), the axes of the Imu table (-9.8 on z "
-        " at level rest), and whether both tables have the same clock",
+        "at level rest), and whether both tables have the same clock",
     )
 
 

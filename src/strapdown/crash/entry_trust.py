@@ -85,17 +85,20 @@ def judge_fixes(
             recent = strained[
                 (run.time[strained] >= t - RECOVERY) & (run.time[strained] <= t + slack)
             ]
-            if not recent.size:
-                why.append("")
-                continue
-            k = int(recent[-1])
-            what = (
-                f"acceleration of {acceleration[k]:.3g} m/s²"
-                if hard[k]
-                else f"jerk of {jerk[k]:.3g} m/s³"
-            )
-            why.append(f"{what} at {run.time[k]:.6g} s")
+            why.append(_excess(run.time, acceleration, jerk, recent))
     return why
+
+
+def _excess(time: Array, acceleration: Array, jerk: Array, at: NDArray[np.intp]) -> str:
+    """What exceeded a limit at these stamps, and when it last did."""
+    if not at.size:
+        return ""
+    said = []
+    if acceleration[at].max() > LARGEST_ACCELERATION:
+        said.append(f"acceleration of {acceleration[at].max():.3g} m/s²")
+    if jerk[at].max() > LARGEST_JERK:
+        said.append(f"jerk of {jerk[at].max():.3g} m/s³")
+    return f"{' and '.join(said)}, last at {time[at[-1]]:.6g} s"
 
 
 def record_of_fixes(stamps: Array, why: list[str]) -> pd.DataFrame:
