@@ -193,6 +193,15 @@ def forget(state):
 
 
 @njit(cache=True)
+def take_later(state):
+    """Count the peak since the resultant became small with the event."""
+    if state[LATER] > state[PEAK]:
+        state[PEAK] = state[LATER]
+        state[PEAK_TIME] = state[LATER_TIME]
+    state[LATER] = 0.0
+
+
+@njit(cache=True)
 def felt(rows, k, options):
     """Squared magnitude of a row."""
     size = rows[k, AX] * rows[k, AX]
@@ -353,10 +362,7 @@ def advance(state, options, rows, count):
         elif what == 0 and over:
             # Quiet did not last.
             state[PENDING] = math.nan
-            if state[LATER] > state[PEAK]:
-                state[PEAK] = state[LATER]
-                state[PEAK_TIME] = state[LATER_TIME]
-            state[LATER] = 0.0
+            take_later(state)
         elif what == 0:
             state[PENDING] = now
             mark(state, END, rows, k, int(tails[1]), now, windows[1], mean, x, y)
@@ -390,6 +396,12 @@ def advance(state, options, rows, count):
                 state[MARKS + END * MARK + 1] = math.nan
                 close(state, now, rows, k, mean)
                 return CLOSED
+            if pending:
+                # An event does not end before it is one.
+                state[PENDING] = now
+                take_later(state)
+                mark(state, END, rows, k, int(tails[1]), now, windows[1], mean, x, y)
+                state[MARKS + END * MARK + 1] = math.nan
         elif what == 7:
             state[ACTIVE] = 0.0
             if not math.isnan(state[TRIGGERED]):

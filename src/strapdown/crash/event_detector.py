@@ -28,7 +28,8 @@ class CrashEvent:
     Attributes
     ----------
     time_zero : float, s
-        First point of the interval in which the wake threshold was reached (49 CFR 563.5(b)).
+        First point of the interval in which the wake threshold was reached (49 CFR 563.5(b)), or
+        the instant at which it was; as `EventRule.zero_at` says.
     time_zero_sd : float, s
         Of `time_zero` from noise and bias of the acceleration: that of the window's change,
         over its slope where it crosses the threshold. First order: right while it is small
@@ -199,7 +200,7 @@ class EventDetector:
         axis = AXES[int(state[kernel.MOST_AXIS])]
         return float(state[kernel.MOST]), axis, float(state[kernel.MOST_TIME])
 
-    def update(self, time: float, accel: ArrayLike) -> tuple[CrashEvent, ...]:
+    def update(self, time: float, accel: Array | Sequence[float]) -> tuple[CrashEvent, ...]:
         """Take one sample.
 
         Parameters
@@ -218,7 +219,16 @@ class EventDetector:
         DataError
             Time does not advance, or a number is not finite. The sample is then not taken.
         """
-        return self.extend(np.array([time]), np.asarray(accel, dtype=np.float64)[None, :])
+        held = self._held
+        if 0 < held < len(self._rows) and np.shape(accel) == (3,):
+            x, y, z = accel
+            # What is not finite, or goes back, is refused with its words by `extend`.
+            if time > self._rows[held - 1, kernel.T] and math.isfinite(x + y + z + time):
+                row = self._rows[held]
+                row[kernel.T], row[kernel.AX], row[kernel.AY] = time, x, y
+                self._held = held + 1
+                return self._advance()
+        return self.extend([time], [accel])  # type: ignore[arg-type]
 
     def extend(self, time: ArrayLike, accel: ArrayLike) -> tuple[CrashEvent, ...]:
         """Take a piece of a record.
@@ -238,8 +248,11 @@ class EventDetector:
         DataError
             As `update`; then nothing of the piece is taken.
         """
-        stamps = np.asarray(time, dtype=np.float64)
-        values = np.asarray(accel, dtype=np.float64)
+        try:
+            stamps = np.asarray(time, dtype=np.float64)
+            values = np.asarray(accel, dtype=np.float64)
+        except (TypeError, ValueError):
+            stamps, values = np.empty(0), np.empty(0)
         self._check(stamps, values)
         if not len(stamps):
             return ()
@@ -252,6 +265,9 @@ class EventDetector:
             self._rows[0, kernel.VX :] = 0.0
             kernel.begin(self._state, float(stamps[0]))
         self._held += len(stamps)
+        return self._advance()
+
+    def _advance(self) -> tuple[CrashEvent, ...]:
         before = len(self._events)
         while kernel.advance(self._state, self._options, self._rows, self._held) == kernel.CLOSED:
             end = float(self._state[kernel.MARKS + kernel.END * kernel.MARK])
@@ -319,11 +335,12 @@ class EventDetector:
         own = [i for i in (0, 1, 3) if not math.isnan(first[i])]
         which = min(own, key=lambda i: first[i]) if own else 2
         trigger = float(state[kernel.TRIGGERED])
-        zero = first[which] if not math.isnan(first[which]) else trigger - rule.trigger_window
+        begin = first[which] if not math.isnan(first[which]) else trigger - rule.trigger_window
         # A rounding below the first stamp is the first stamp.
-        before = zero < began - 1e-12 * max(1.0, abs(began))
+        before = begin < began - 1e-12 * max(1.0, abs(began))
+        late = rule.zero_at == "threshold" and not math.isnan(first[which])
         return CrashEvent(
-            time_zero=max(zero, began),
+            time_zero=float(marks[which, 0]) if late else max(begin, began),
             time_zero_sd=self._time_sd(marks[which]),
             basis=BASES[which],
             woken=float(marks[which, 0]),
@@ -340,9 +357,11 @@ class EventDetector:
     def _time_sd(self, mark: Array) -> float:
         """Uncertainty of the change at the crossing, over its slope."""
         _, slope, power, length, *shares = mark.tolist()
+        if math.isnan(slope):
+            return math.nan
         variance = 0.0
         for share, noise, bias in zip(shares, self._noise, self._bias, strict=True):
             variance += share**2 * (power * noise**2 + (length * bias) ** 2)
         if variance == 0.0:
             return 0.0
-        return math.sqrt(variance) / slope if slope > 0.0 else math.inf
+        return math.sqrt(variance) / slope if slope != 0.0 else math.inf

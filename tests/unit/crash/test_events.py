@@ -121,6 +121,16 @@ def test_a_wake_up_system_takes_its_own_level():
     assert event.time_zero == pytest.approx(x * FRONT.length, abs=bound)
 
 
+def test_time_zero_is_where_the_threshold_is_reached_on_demand():
+    begin, late = (
+        found([FRONT], rule=EventRule(zero_at=z)).events[0] for z in ("interval", "threshold")
+    )
+    assert late.time_zero == late.woken == begin.woken
+    # 20 ms apart, but for the rounding of one subtraction.
+    assert late.time_zero - begin.time_zero == pytest.approx(0.020, abs=1e-16)
+    assert late.time_zero_sd == begin.time_zero_sd and late.end == begin.end
+
+
 def test_two_impacts_are_two_events_of_one_crash_and_a_dip_is_held_together_on_demand():
     pulses = [Pulse((-5.0, 0.0, 0.0), 0.0, 0.08), Pulse((-5.0, 0.0, 0.0), 0.13, 0.08)]
     search = found(pulses, 2000.0)
@@ -183,7 +193,9 @@ def test_a_trigger_reached_after_the_spike_is_told_by_the_spike():
     values += spike.accel(time)
     (event,) = detect_events(Acceleration(time, values)).events
     assert event.woken < 0.02 < event.trigger
-    assert event.end == event.trigger
+    assert event.end == event.trigger and np.isnan(event.end_sd)
+    (held,) = detect_events(Acceleration(time, values), EventRule(quiet=0.2)).events
+    assert held.end == held.trigger == event.trigger and np.isnan(held.end_sd)
 
 
 @pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
@@ -246,6 +258,8 @@ def test_bad_input_is_refused_with_its_row():
     with pytest.raises(ConfigError, match="along"):
         detect_events(ned)
     assert detect_events(ned.along(0.0)).events == detect_events(replace(ned, frame="body")).events
+    with pytest.raises(ConfigError, match="did you mean 'threshold'"):
+        EventRule(zero_at="treshold")
     with pytest.raises(ConfigError, match="trigger_window"):
         EventRule(trigger_window=0.01)
 
