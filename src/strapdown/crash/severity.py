@@ -14,10 +14,11 @@ from strapdown.exceptions import ConfigError, nearest
 __all__ = ["SEVERITY_MODELS", "find_severity_model"]
 
 WANG_NOTE = (
-    "Logistic regression on NASS-CDS 2010-2015, all occupants together. The coefficients are those "
-    "that four public programs quote alike from the tables; the report itself was not at hand. It "
-    "states no range here: the one given is that in which the curves of one table keep their order "
-    "(a graver injury is less likely), and no more. Front and rear curves are not for side impacts."
+    "Logistic regression on NASS-CDS 2010-2015, all occupants together, belted or not. The report "
+    "itself was not at hand: the coefficients are those that four public programs quote alike, two "
+    "of which name the tables (A-3, A-6, A-9; the first two also 4-1 and 4-3). The range given is "
+    "that in which the curves of one table keep their order (a graver injury is less likely), and "
+    "not the report's own. There is no curve for side impacts alone."
 )
 # Where two curves of a table cross first, in mph, rounded down: 56.3, 60.4 and 47.8.
 WANG_RANGE = {"all": 56.0, "front": 60.0, "rear": 47.0}

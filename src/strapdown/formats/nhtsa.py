@@ -13,7 +13,7 @@ from pathlib import Path
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats.nhtsa_channel import KMH, Channel
-from strapdown.formats.nhtsa_header import bad_number, only, row_error, sections, to_number
+from strapdown.formats.nhtsa_header import only, row_error, sections, to_number, to_whole
 
 __all__ = ["Channel", "CrashTest", "Vehicle", "read_nhtsa"]
 
@@ -27,7 +27,9 @@ class Vehicle:
 
     Attributes
     ----------
-    number, year : int
+    number : int
+    year : int or None
+        None where not stated.
     make, model, body : str
         Codes of the database.
     vin : str
@@ -42,7 +44,7 @@ class Vehicle:
     number: int
     make: str
     model: str
-    year: int
+    year: int | None
     body: str
     vin: str
     mass: float
@@ -135,7 +137,7 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     test, line = only(rows, "TEST", file)
     if len(test) < TEST_FIELDS:
         raise row_error(file, line, "TEST", len(test), TEST_FIELDS)
-    promised = int(to_number(test[18], file, line, "count of curves"))
+    promised = to_whole(test[18], file, line, "count of curves")
     listed = rows["INSTRUMENTATION"]
     if promised != len(listed):
         raise DataError(
@@ -175,10 +177,7 @@ def _channel(fields: list[str], file: Path, line: int, present: dict[str, Path])
         return to_number(fields[at], file, line, what)
 
     def whole(at: int, what: str) -> int:
-        value = number(at, what)
-        if not (math.isfinite(value) and value == int(value)):
-            raise bad_number(fields[at], file, line, what)
-        return int(value)
+        return to_whole(fields[at], file, line, what)
 
     curve = whole(1, "channel")
     first, last, interval = (
@@ -226,11 +225,12 @@ def _vehicle(fields: list[str], file: Path, line: int) -> Vehicle:
     def number(at: int, what: str, factor: float = 1.0) -> float:
         return to_number(fields[at], file, line, what) * factor
 
+    year = number(3, "year")
     return Vehicle(
-        number=int(number(0, "vehicle")),
+        number=to_whole(fields[0], file, line, "vehicle"),
         make=fields[1],
         model=fields[2],
-        year=int(number(3, "year")),
+        year=None if math.isnan(year) else int(year),
         body=fields[5],
         vin=fields[6],
         mass=number(10, "test mass"),

@@ -94,6 +94,14 @@ def to_number(text: str, file: Path, line: int, what: str) -> float:
     return value
 
 
+def to_whole(text: str, file: Path, line: int, what: str) -> int:
+    """Return a field as a whole number; refuse what is none, or not stated."""
+    value = to_number(text, file, line, what)
+    if not math.isfinite(value) or value != int(value):
+        raise bad_number(text, file, line, what)
+    return int(value)
+
+
 def bad_number(text: str, file: Path, line: int, what: str) -> DataError:
     """What is said of a field that should be a number."""
     return DataError(

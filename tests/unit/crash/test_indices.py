@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
 from strapdown.crash.indices.asi import asi
@@ -225,6 +226,79 @@ class TestThiv:
         holed[9] = np.nan
         with pytest.raises(DataError, match="sample 10"):
             thiv(time, plane(holed))
+
+
+class TestTogether:
+    """What must hold of every record, on random smooth ones."""
+
+    @pytest.fixture(params=range(4))
+    def record(self, request):
+        rng = np.random.default_rng(request.param)
+        time = np.arange(-200, 3001) * STEP
+        waves = rng.standard_normal((3, 12)) @ np.sin(
+            2 * np.pi * np.outer(np.arange(1, 13), time / 0.35)
+        )
+        accel = 40.0 * waves.T
+        accel[:, 0] -= 120.0
+        yaw = 2.0 * np.sin(2 * np.pi * (time / 0.3 + rng.uniform()))
+        return time, accel, yaw
+
+    def test_mirrored_left_to_right(self, record):
+        time, accel, yaw = record
+        flipped = accel * [1.0, -1.0, 1.0]
+        one, two = thiv(time, accel, yaw), thiv(time, flipped, -yaw)
+        assert two.velocity == pytest.approx(one.velocity, rel=EXACT)
+        sides = {"front": "front", "left": "right", "right": "left"}
+        assert two.surface == sides[one.surface]
+        assert asi(time, flipped).value == pytest.approx(asi(time, accel).value, rel=EXACT)
+        a, b = flail_space(time, accel), flail_space(time, flipped)
+        assert (b.oiv_x, b.oiv_y) == pytest.approx((a.oiv_x, -a.oiv_y), rel=EXACT)
+        assert b.ora_y_g == pytest.approx(-a.ora_y_g, rel=EXACT)
+
+    def test_on_another_clock(self, record):
+        time, accel, yaw = record
+        late = time + 1000.0
+        # Stamps of 1000 s are known to 1e-13 s, steps of 1e-4 so to 1e-9.
+        one, two = thiv(time, accel, yaw), thiv(late, accel, yaw, start=1000.0)
+        assert two.velocity == pytest.approx(one.velocity, rel=1e-7)
+        assert two.phd_g == pytest.approx(one.phd_g, rel=1e-7)
+        first, second = olc(time, accel[:, 0]), olc(late, accel[:, 0], start=1000.0)
+        assert second.value_g == pytest.approx(first.value_g, rel=1e-7)
+
+    def test_head_against_an_integration_of_the_vehicle_alone(self, record):
+        # The vehicle on the ground by a Runge-Kutta integrator; the head stays where it was.
+        time, accel, yaw = record
+        head = (0.4, -0.35)
+
+        def rate(t, s):
+            ax, ay = (np.interp(t, time, accel[:, k]) for k in (0, 1))
+            c, n = math.cos(s[0]), math.sin(s[0])
+            return [np.interp(t, time, yaw), s[3], s[4], c * ax - n * ay, n * ax + c * ay]
+
+        def flown(t, s):
+            c, n = math.cos(s[0]), math.sin(s[0])
+            dx, dy = head[0] - s[1], head[1] - s[2]
+            return c * dx + n * dy - head[0], c * dy - n * dx - head[1]
+
+        events = [
+            lambda t, s: flown(t, s)[0] - 0.6,
+            lambda t, s: flown(t, s)[1] - 0.3,
+            lambda t, s: flown(t, s)[1] + 0.3,
+        ]
+        for event in events:
+            event.terminal = True
+        run = solve_ivp(
+            rate, (0.0, 0.3), [0.0] * 5, events=events, rtol=1e-9, atol=1e-11, max_step=STEP
+        )
+        found = thiv(time, accel, yaw, head=head)
+        # The trapezoid's second order: (h w)²/12 of accelerations of up to 12/0.35 Hz, 4e-5.
+        assert found.time_of_flight == pytest.approx(run.t[-1], rel=4e-5)
+        s = run.y[:, -1]
+        c, n, w = math.cos(s[0]), math.sin(s[0]), float(np.interp(run.t[-1], time, yaw))
+        x, y = np.add(flown(run.t[-1], s), head)
+        vx = -(c * s[3] + n * s[4]) + w * y
+        vy = -(c * s[4] - n * s[3]) - w * x
+        assert found.velocity == pytest.approx(math.hypot(vx, vy), rel=4e-5)
 
 
 class TestOlc:

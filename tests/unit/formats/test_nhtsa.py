@@ -177,6 +177,8 @@ def test_a_count_that_does_not_match_is_refused(make):
         (lambda t: t.replace("|2800|", "|28OO|"), "'28OO' is no number"),
         (lambda t: t.replace("|-2|3|", "|3|-2|"), "are no record"),
         (lambda t: t.replace("|-2|3|", "|nan|3|"), "'nan' is no number"),
+        (lambda t: t.replace("|-2|3|", "|-2.5|3|"), "'-2.5' is no number"),
+        (lambda t: t.replace("|1|a comment", "||a comment"), "'' is no number"),
     ],
 )
 def test_bad_headers_are_refused(make, change, words):
@@ -185,6 +187,16 @@ def test_bad_headers_are_refused(make, change, words):
     with pytest.raises(DataError, match=words) as error:
         read_nhtsa(path)
     assert error.value.finding.remedy
+
+
+def test_what_a_header_does_not_state_is_none_or_nan(make):
+    path = make([curve(1, rating="", velocity="NA")])
+    path.write_text(path.read_text().replace("|2018|", "||").replace("|1719|", "|UN|"))
+    test = read_nhtsa(path)
+    assert test.vehicles[0].year is None
+    assert math.isnan(test.vehicles[0].mass)
+    assert math.isnan(test.channel(1).rating)
+    assert math.isnan(test.channel(1).initial_velocity)
 
 
 def test_a_missing_header_and_a_number_twice_are_refused(make, tmp_path):
