@@ -193,11 +193,7 @@ class _Search:
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
         )
         before = np.concatenate([np.zeros(6), away, -self.bias, -self.further])
-<<<<<<< HEAD
-        return Problem(residuals, self.jacobian, self.noise, self.prior_sd, before, self.blocks)
-=======
         return replace(self.linear, residuals=residuals, prior_residuals=before)
->>>>>>> w-gnss
 
     def take(self, adjustment: Adjustment) -> bool:
         """Add a step; return whether it was too small to go on."""
@@ -369,14 +365,10 @@ class _AtFixes:
 
 def _at_fixes(run: NavigationRun, course: Course, instants: Array) -> _AtFixes:
     """Between two samples: place by Hermite's cubic, velocity and attitude by their rates."""
-<<<<<<< HEAD
-    there = trajectory_at(run.trajectory, instants, find_ellipsoid(run.mechanization.ellipsoid))
-=======
     # Instants must increase there.
     there = trajectory_at(
         run.trajectory, instants[::-1], find_ellipsoid(run.mechanization.ellipsoid)
     )[::-1]
->>>>>>> w-gnss
     pushed = np.gradient(run.history[:, 3:6], run.time, axis=0)
     return _AtFixes(
         there[GEODETIC].to_numpy(dtype=np.float64),

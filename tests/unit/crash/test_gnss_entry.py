@@ -32,9 +32,9 @@ from strapdown.crash.gnss_entry import entry_state_from_gnss
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation import TriadErrors, car
+from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.manoeuvres import Straight
-from strapdown.simulation.pulse_motion import PulseMotion
 from strapdown.tables import GEODETIC, VELOCITY
 
 RUNS = 200
@@ -130,14 +130,11 @@ def test_a_few_drives_are_as_wrong_as_they_say(lively):
 
 def crash(angles=0.0):
     """A car that brakes not and meets a wall at 11 s."""
-    return PulseMotion(
+    return CrashMotion(
         14.0,
         ORIGIN,
         (12.0, 8.0, 0.0),
-        (-12.0, -8.0, 0.0),
-        (0.0, 0.0, angles),
-        IMPACT,
-        0.1,
+        (HaversinePulse(IMPACT, 0.1, (-12.0, -8.0, 0.0), (0.0, 0.0, angles)),),
         heading_deg=33.69,
     )
 

@@ -228,12 +228,11 @@ def test_noise_factor_is_what_noise_becomes():
             np.testing.assert_allclose(b.noise_factor, np.sqrt(49.5) / 50.0, rtol=1e-9)
 
 
-def test_stamps_that_do_not_coincide_are_interpolated_and_told():
+def test_stamps_that_do_not_coincide_are_interpolated():
     both = synchronise([imu(), imu("IMU2", shift=1.0, begin=-0.998, rate=200.0)])
     moved = both.unit("IMU2")
     assert moved.accelerometers[0].method == "interpolated"
-    said = [f for f in both.findings if f.file == "IMU2, accel"]
-    assert "at other instants" in said[0].what
+    assert not [f for f in both.findings if f.file == "IMU2, accel"]
     jump = max(2.0 * (np.pi / t) ** 2 * np.linalg.norm(a) for a, _, t in PULSES)
     np.testing.assert_allclose(
         moved.unit.accelerometers[0].table,
