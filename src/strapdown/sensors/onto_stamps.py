@@ -225,7 +225,7 @@ def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float)
             + (
                 "use a lower rate if that matters"
                 if slower
-                else "give `rate` or the trigger so that stamps coincide if that matters"
+                else "synchronise at a multiple of its rate if that matters"
             ),
         )
     ]
