@@ -161,8 +161,8 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
         Without delay. Both ends are continued by their own samples, point-mirrored about the end
         sample as ISO 6487 has it, over 10 ms or more (SAE J211-1's least) and 100 samples or more,
         and in any case until a pass has forgotten its start to 1e-8, as far as there are samples;
-        each pass begins at rest with its first padded value. A constant passes to rounding, and a straight
-        line without a trace of the ends.
+        each pass begins at rest with its first padded value. A constant passes to rounding, and a
+        straight line without a trace of the ends.
 
     Raises
     ------

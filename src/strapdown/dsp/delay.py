@@ -297,12 +297,18 @@ def _least_squares(
 
 def _variance(slope: Array, residual: Array, width: float) -> float:
     """Variance of ``Σ slope residual`` for residuals that are correlated over up to a tenth."""
+    from scipy.signal import correlate
+
     n = len(residual)
     reach = min(n, max(n // 10, int(12.0 * width)))
+    lag = np.arange(reach)
+    # Whole over half the reach, then falling to nothing; both signs of a lag.
+    taper = np.minimum(1.0, 2.0 - 2.0 * lag / reach) * np.where(lag, 2.0, 1.0) / (n - lag)
     total = 0.0
     for s, e in zip(slope.T, residual.T, strict=True):
-        for lag in range(reach):
-            share = min(1.0, 2.0 - 2.0 * lag / reach) * float(e[: n - lag] @ e[lag:]) / (n - lag)
-            total += (1.0 if lag == 0 else 2.0) * share * float(s[: n - lag] @ s[lag:])
+        of_slope, of_residual = (
+            correlate(x, x, mode="full", method="fft")[n - 1 : n - 1 + reach] for x in (s, e)
+        )
+        total += float((taper * of_slope * of_residual).sum())
     # What the gain, the constants and the delay took out of the residuals.
     return max(total, 0.0) * n / max(n - 3, 1)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.triad_channels import TriadChannels
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ __all__ = ["UnitClock", "clocks_by_correlation", "clocks_by_trigger"]
 
 # Triggers and correlation that differ by more standard deviations contradict each other.
 CONTRADICTION = 4.0
+FORCE, RATES = "specific force", "rates"
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,8 @@ def clocks_by_correlation(
     Returns
     -------
     clocks : list of UnitClock
-        The reference unit's has the standard deviation 0: what its trigger is off by, all share.
+        The delays less what each part's stated bandwidth accounts for. The reference unit's has
+        the standard deviation 0: what its trigger is off by, all share.
     findings : list of Finding
 
     Raises
@@ -90,7 +93,11 @@ def clocks_by_correlation(
             clocks.append(UnitClock(zero, 0.0, "reference"))
             continue
         delay, what = _delay(reference, u)
-        clock = UnitClock(zero + delay.delay, delay.sd, f"correlation of the {what}")
+        clock = UnitClock(
+            zero + delay.delay - (_lag(u, what) - _lag(reference, what)),
+            delay.sd,
+            f"correlation of the {what}",
+        )
         clocks.append(clock)
         if u.unit.trigger is None:
             continue
@@ -128,14 +135,22 @@ def _trigger(unit: CrashUnit) -> float:
     return unit.trigger
 
 
+def _lag(u: UnitChannels, what: str) -> float:
+    """What the part's own low-pass delays slow signals by: the time constant of its single pole."""
+    triad = u.unit.gyro if what == RATES else u.unit.accelerometers[-1]
+    assert triad is not None
+    bandwidth = triad.uncertainty.bandwidth
+    return time_constant(bandwidth) if 0.0 < bandwidth < math.inf else 0.0
+
+
 def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
     """Best of what both have: lengths do not know of mountings, and bodies turn everywhere alike.
 
     The widest range is used, as what is held at the end of a range has no shape.
     """
-    pairs = [("specific force", reference.accelerometers, u.accelerometers)]
+    pairs = [(FORCE, reference.accelerometers, u.accelerometers)]
     if reference.gyro is not None and u.gyro is not None:
-        pairs.append(("rates", (reference.gyro,), (u.gyro,)))
+        pairs.append((RATES, (reference.gyro,), (u.gyro,)))
     found, errors = [], []
     for what, first, second in pairs:
         if not (first and second):

@@ -187,6 +187,23 @@ def test_correlation_finds_clocks_that_nothing_states():
     assert abs(found.offset - off) < 4.0 * found.time_sd
 
 
+def test_correlation_takes_off_the_lag_of_a_part_s_own_low_pass():
+    """A single pole of 100 Hz is 1.59 ms late."""
+    from strapdown.sensors.low_pass import low_pass
+
+    unit = lab(shift=0.7, trigger=None)
+    part = unit.accelerometers[0]
+    time = part.table.index.to_numpy()
+    values = low_pass(time, part.table.to_numpy(), 100.0)
+    late = pd.DataFrame(values, index=part.table.index, columns=ACCEL)
+    late.attrs = dict(part.table.attrs)
+    told = replace(part, table=late, uncertainty=TriadUncertainty(bandwidth=100.0))
+    both = synchronise([imu(), replace(unit, accelerometers=(told,))], method="correlation")
+    # The pole's delay is τ/(1 + (ω τ)²): at the pulses' 10 Hz a hundredth less, and at their
+    # harmonics up to a tenth of it.
+    assert both.unit("LAB1").offset == pytest.approx(0.7, abs=0.1 * 1.6e-3)
+
+
 def test_correlation_uses_rates_where_they_say_more():
     second = imu("IMU2", shift=1.0, trigger=None)
     flat = replace(
