@@ -74,13 +74,6 @@ class Fixes:
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
-    """A state at the anchor to begin with."""
-
-    state: NavState
-
-
-@dataclass(frozen=True, eq=False)
 class Estimate:
     """What came of a guess; attributes as of `EntryState`, weights and misfits (m, 2)."""
 
@@ -103,7 +96,7 @@ def estimate(
     mechanization: NorthEastDown,
     imu: pd.DataFrame,
     fixes: Fixes,
-    guess: Guess,
+    guess: NavState,
     priors: EntryPriors,
     arm: Array,
 ) -> Estimate:
@@ -116,7 +109,8 @@ def estimate(
         Up to the anchor.
     fixes : Fixes
         Within the record.
-    guess : Guess
+    guess : NavState
+        At the anchor.
     priors : EntryPriors
     arm : ndarray, (3,), m
         Of the antenna.
@@ -164,7 +158,7 @@ class _Search:
         mechanization: NorthEastDown,
         imu: pd.DataFrame,
         fixes: Fixes,
-        guess: Guess,
+        guess: NavState,
         priors: EntryPriors,
         arm: Array,
     ) -> None:
@@ -175,7 +169,7 @@ class _Search:
         )
         self.priors, self.arm = priors, arm
         self.ellipsoid = find_ellipsoid(mechanization.ellipsoid)
-        self.state, self.at_first = guess.state, guess.state.q_nb
+        self.state, self.at_first = guess, guess.q_nb
         self.bias = np.zeros(6)
         self.near = False
         self.further = np.zeros(0)
@@ -262,7 +256,9 @@ class _Search:
             sensed[:, :3],
             sensed[:, 3:],
         )
-        return course, _at_fixes(run, course, self.fixes.instants)
+        # A mean is, on average, what was half a step before its stamp.
+        late = 0.5 * float(np.median(np.diff(run.time))) * (imu.attrs["sampling"] == "mean")
+        return course, _at_fixes(run, course, self.fixes.instants, late)
 
     def _residuals(self, now: _AtFixes) -> Array:
         place, velocity = antenna_motion(
@@ -363,7 +359,7 @@ class _AtFixes:
     rate: Array
 
 
-def _at_fixes(run: NavigationRun, course: Course, instants: Array) -> _AtFixes:
+def _at_fixes(run: NavigationRun, course: Course, instants: Array, late: float) -> _AtFixes:
     """Between two samples: place by Hermite's cubic, velocity and attitude by their rates."""
     # Instants must increase there.
     there = trajectory_at(
@@ -375,7 +371,7 @@ def _at_fixes(run: NavigationRun, course: Course, instants: Array) -> _AtFixes:
         there[VELOCITY].to_numpy(dtype=np.float64),
         between(run.time, pushed, instants),
         rotation.quaternion_from_euler(there[EULER].to_numpy(dtype=np.float64)),
-        between(course.time, course.rate, instants),
+        between(course.time, course.rate, instants + late),
     )
 
 

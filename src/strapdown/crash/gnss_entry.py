@@ -14,7 +14,7 @@ from strapdown.crash.entry_estimate import Estimate, Fixes, estimate
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_start import first_guesses
 from strapdown.crash.entry_state import EntryState
-from strapdown.crash.entry_trust import judge_fixes, record_of_fixes
+from strapdown.crash.entry_trust import AVERAGED, RECOVERY, judge_fixes, record_of_fixes
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
@@ -93,10 +93,10 @@ def entry_state_from_gnss(
     *Method.* Iterated generalised least squares (Gauss-Newton) for the 15 states at the anchor,
     from which the full mechanization runs backward over the window, and for scale,
     misalignment, g-sensitivity, antenna and time offset as far as the priors leave them open.
-    The covariance of the fixes has the noise of the sensors since each of them, and the part
-    of the receiver's error that stays (`FixCorrelation`), so that ten fixes a second are not
-    taken for ten times the knowledge. Fixes that lie too far from all others lose weight
-    (`entry_adjust.adjust`).
+    The covariance of the rows has the noise of the inertial sensors between each fix and the
+    anchor, and the part of the receiver's error that stays (`FixCorrelation`), so that ten fixes
+    a second are not taken for ten times the knowledge; `entry_adjust.adjust` solves it fix by
+    fix. Fixes that lie too far from what all others say lose weight (`entry_adjust.weigh`).
 
     *Which fixes.* None from the impact on; none where the acceleration without gravity exceeds
     50 m/s² or the jerk 20 m/s³ (both means over 50 ms, `entry_trust.strain`), nor for 1 s after;
@@ -104,15 +104,15 @@ def entry_state_from_gnss(
 
     *What can be seen.* Velocity and place always. Roll and pitch, and the horizontal bias
     that looks like them, only together while the vehicle neither turns nor accelerates: 0.1 m/s²
-    of bias is 0.6 deg; the prior decides. Heading through accelerations alone: braking by 3 m/s
-    with fixes of 0.1 m/s shows it to about 3 deg, a steady straight drive not at all, unless the
-    vehicle may be taken to travel along its axis (`EntryPriors.side_slip_sd_deg`). A finding
-    says when it is not seen; its standard deviation, and all that hang on it, then mean no
-    more than "unknown", because errors of more than about 30 deg are not linear.
+    of bias is 0.6 deg, and the prior of the bias decides. Heading through changes of velocity
+    alone: a steady straight drive does not show it, unless the vehicle may be taken to travel
+    along its axis (`EntryPriors.side_slip_sd_deg`). A finding says when it is not seen. A
+    standard deviation beyond some 15 deg then means "unknown": errors so large are not linear,
+    and the noise that the accelerometers have summed up is itself taken for a motion.
 
-    *Valid* for motions that the Imu table samples well, sensor errors that stay over the
-    window, and a standard deviation of the fixes that is true in its scale: a misfit that chance
-    does not explain is told.
+    *Valid* for motions that the Imu table samples well; for sensor errors that stay over the
+    window; without vibration that the sensors rectify; and for fixes whose standard deviations
+    are right: a misfit that chance does not explain is told.
     """
     mechanization = NorthEastDown(ellipsoid=ellipsoid)
     at = impact if anchor is None else anchor
@@ -133,11 +133,11 @@ def entry_state_from_gnss(
             remedy="use a longer window or an earlier anchor, or check that both tables have the "
             "same clock",
         )
-    first = int(np.searchsorted(sensed, instants[reached][0], side="right")) - 1
-    piece = imu.iloc[max(0, first - 1) : last + 1]
-    piece.attrs = dict(imu.attrs)
-
-    turned = _turn_only(mechanization, piece, gnss[reached].iloc[0])
+    first = float(instants[reached][0])
+    piece = _between(imu, first, last)
+    turned = _turn_only(
+        mechanization, _between(imu, first - RECOVERY - 2.0 * AVERAGED, last), gnss[reached]
+    )
     slack = 3.0 * priors.time_offset_sd
     why = judge_fixes(
         instants[later],
@@ -187,13 +187,23 @@ def entry_state_from_gnss(
     )
 
 
-def _turn_only(mechanization: NorthEastDown, imu: pd.DataFrame, first: pd.Series) -> NavigationRun:
+def _between(imu: pd.DataFrame, begin: float, last: int) -> pd.DataFrame:
+    """Rows from the last one before an instant to a row."""
+    first = max(0, int(np.searchsorted(index_of(imu), begin, side="right")) - 1)
+    # A step needs two samples.
+    piece = imu.iloc[min(first, last - 1) : last + 1]
+    piece.attrs = dict(imu.attrs)
+    return piece
+
+
+def _turn_only(
+    mechanization: NorthEastDown, imu: pd.DataFrame, gnss: pd.DataFrame
+) -> NavigationRun:
     """Navigate from a stand, level and to the north: only what changes means something."""
     increments = motion_increments(imu)
     begin = float(increments.index[0] - increments["dt"].iloc[0])
-    start = NavState.from_degrees(
-        float(first["lat"]), float(first["lon"]), float(first["alt"]), time=begin
-    )
+    at = gnss[GEODETIC].median()
+    start = NavState.from_degrees(at["lat"], at["lon"], at["alt"], time=begin)
     return run_mechanization(mechanization, start, increments)
 
 
@@ -289,8 +299,8 @@ def _findings(
     best: Estimate, record: pd.DataFrame, source: str | None, priors: EntryPriors, impact: float
 ) -> list[Finding]:
     found = []
-    refused = record[~record["used"] & (record["why"] != "from the impact on")]
-    refused = refused[refused["why"] != "after the anchor"]
+    late = record["why"].str.contains("after the anchor|impact")
+    refused = record[~record["used"] & ~late]
     if len(refused):
         found.append(
             Finding(
