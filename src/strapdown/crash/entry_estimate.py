@@ -11,25 +11,24 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.crash.entry_adjust import Adjustment, Problem, adjust, weigh
+from strapdown.crash.entry_at_fixes import AtFixes, by_state, side_slips, state_at_fixes
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_sensitivity import (
     Course,
     at_fixes,
-    between,
     noise_between_fixes,
     sensor_errors,
     skew,
 )
 from strapdown.crash.entry_state import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.evaluation.trajectory_at import trajectory_at
 from strapdown.exceptions import DivergenceError
 from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
-from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
+from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.sensors.antenna import antenna_motion
-from strapdown.tables import ACCEL, EULER, GEODETIC, GYRO, VELOCITY
+from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
 Array = NDArray[np.float64]
@@ -74,13 +73,6 @@ class Fixes:
 
 
 @dataclass(frozen=True, eq=False)
-class Guess:
-    """A state at the anchor to begin with."""
-
-    state: NavState
-
-
-@dataclass(frozen=True, eq=False)
 class Estimate:
     """What came of a guess; attributes as of `EntryState`, weights and misfits (m, 2)."""
 
@@ -103,7 +95,7 @@ def estimate(
     mechanization: NorthEastDown,
     imu: pd.DataFrame,
     fixes: Fixes,
-    guess: Guess,
+    guess: NavState,
     priors: EntryPriors,
     arm: Array,
 ) -> Estimate:
@@ -116,7 +108,8 @@ def estimate(
         Up to the anchor.
     fixes : Fixes
         Within the record.
-    guess : Guess
+    guess : NavState
+        At the anchor.
     priors : EntryPriors
     arm : ndarray, (3,), m
         Of the antenna.
@@ -164,7 +157,7 @@ class _Search:
         mechanization: NorthEastDown,
         imu: pd.DataFrame,
         fixes: Fixes,
-        guess: Guess,
+        guess: NavState,
         priors: EntryPriors,
         arm: Array,
     ) -> None:
@@ -175,7 +168,7 @@ class _Search:
         )
         self.priors, self.arm = priors, arm
         self.ellipsoid = find_ellipsoid(mechanization.ellipsoid)
-        self.state, self.at_first = guess.state, guess.state.q_nb
+        self.state, self.at_first = guess, guess.q_nb
         self.bias = np.zeros(6)
         self.near = False
         self.further = np.zeros(0)
@@ -187,7 +180,7 @@ class _Search:
         if self._moved > STALE:
             self._linearise(course, now)
             self._moved = 0.0
-        residuals = np.hstack([self._residuals(now), -_slips(now, self.priors)[:, None]])
+        residuals = np.hstack([self._residuals(now), -side_slips(now, self.priors)[:, None]])
         residuals -= self.linear.by_constants[:, :, STATES:] @ self.further
         away = rotation.rotation_vector_from_quaternion(
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
@@ -249,7 +242,7 @@ class _Search:
             cost=plain.chi_square,
         )
 
-    def _run(self) -> tuple[Course, _AtFixes]:
+    def _run(self) -> tuple[Course, AtFixes]:
         imu = biases_off(self.imu, self.bias[:3], self.bias[3:])
         run = run_mechanization(
             self.mechanization, self.state, motion_increments(imu), backward=True
@@ -262,9 +255,11 @@ class _Search:
             sensed[:, :3],
             sensed[:, 3:],
         )
-        return course, _at_fixes(run, course, self.fixes.instants)
+        # A mean is, on average, what was half a step before its stamp.
+        late = 0.5 * float(np.median(np.diff(run.time))) * (imu.attrs["sampling"] == "mean")
+        return course, state_at_fixes(run, course, self.fixes.instants, late)
 
-    def _residuals(self, now: _AtFixes) -> Array:
+    def _residuals(self, now: AtFixes) -> Array:
         place, velocity = antenna_motion(
             now.place, now.velocity, now.q_nb, now.rate, self.arm, ellipsoid=self.ellipsoid
         )
@@ -275,7 +270,7 @@ class _Search:
             ]
         )
 
-    def _linearise(self, course: Course, now: _AtFixes) -> None:
+    def _linearise(self, course: Course, now: AtFixes) -> None:
         """Sensitivities, noise and priors at the parameters as they are."""
         p, fixes = self.priors, self.fixes
         self.errors = sensor_errors(p.gyro, p.accel, course)
@@ -285,7 +280,7 @@ class _Search:
         look[:, 0:3, 0:3] = look[:, 3:6, 3:6] = np.eye(3)
         look[:, 0:3, 6:] = -skew(C_nb @ self.arm)
         look[:, 3:6, 6:] = -skew(np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm)))
-        look[:, 6] = _slip_look(now, C_nb, p)
+        look[:, 6] = by_state(now, C_nb, p)
         # Of the antenna, of the clock, and the side slip that stays.
         own = np.zeros((m, 7, STATES + q + 5))
         own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
@@ -345,59 +340,8 @@ class _Search:
             np.zeros_like(prior_sd),
         )
 
-    def _slides(self, now: _AtFixes) -> NDArray[np.bool_]:
+    def _slides(self, now: AtFixes) -> NDArray[np.bool_]:
         """Where the vehicle travels along its axis."""
         speed = np.linalg.norm(now.velocity, axis=1)
         steady = (speed > LEAST_SLIP_SPEED) & (np.abs(speed * now.rate[:, 2]) < MOST_LATERAL)
         return np.asarray(steady & (self.priors.side_slip_sd_deg is not None))
-
-
-@dataclass(frozen=True, eq=False)
-class _AtFixes:
-    """The vehicle's point at the instants of the fixes."""
-
-    place: Array
-    velocity: Array
-    acceleration: Array
-    q_nb: Array
-    rate: Array
-
-
-def _at_fixes(run: NavigationRun, course: Course, instants: Array) -> _AtFixes:
-    """Between two samples: place by Hermite's cubic, velocity and attitude by their rates."""
-    # Instants must increase there.
-    there = trajectory_at(
-        run.trajectory, instants[::-1], find_ellipsoid(run.mechanization.ellipsoid)
-    )[::-1]
-    pushed = np.gradient(run.history[:, 3:6], run.time, axis=0)
-    return _AtFixes(
-        there[GEODETIC].to_numpy(dtype=np.float64),
-        there[VELOCITY].to_numpy(dtype=np.float64),
-        between(run.time, pushed, instants),
-        rotation.quaternion_from_euler(there[EULER].to_numpy(dtype=np.float64)),
-        between(course.time, course.rate, instants),
-    )
-
-
-def _slips(now: _AtFixes, priors: EntryPriors) -> Array:
-    """Side-slip angle at the point that does not slip, (m,), rad."""
-    v = _point_velocity(now, priors)
-    return np.asarray(np.arctan2(v[:, 1], v[:, 0]))
-
-
-def _point_velocity(now: _AtFixes, priors: EntryPriors) -> Array:
-    own = rotation.rotate(rotation.conjugate(now.q_nb), now.velocity)
-    return np.asarray(own + np.cross(now.rate, np.asarray(priors.no_slip_point)))
-
-
-def _slip_look(now: _AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
-    """Derivative of the side-slip angle by position, velocity and attitude, (m, 9)."""
-    v = _point_velocity(now, priors)
-    by_v = np.zeros((len(v), 1, 3))
-    by_v[:, 0, 0], by_v[:, 0, 1] = -v[:, 1], v[:, 0]
-    by_v /= (v[:, 0] ** 2 + v[:, 1] ** 2)[:, None, None]
-    back = by_v @ C_nb.transpose(0, 2, 1)
-    out = np.zeros((len(v), 9))
-    out[:, 3:6] = back[:, 0]
-    out[:, 6:9] = (back @ skew(now.velocity))[:, 0]
-    return out

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.entry_estimate import Fixes, Guess
+from strapdown.crash.entry_estimate import Fixes
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_sensitivity import between
 from strapdown.ellipsoids import WGS84
@@ -31,7 +31,7 @@ _SAME = 30.0
 
 def first_guesses(
     turned: NavigationRun, fixes: Fixes, priors: EntryPriors
-) -> tuple[list[Guess], list[Finding]]:
+) -> tuple[list[NavState], list[Finding]]:
     """Guess place and velocity from the last fixes, and one heading or two.
 
     Parameters
@@ -44,7 +44,7 @@ def first_guesses(
 
     Returns
     -------
-    guesses : list of Guess
+    guesses : list of NavState
         Heading as the priors have it; or the direction of travel; and that for which the
         changes of velocity by the sensors agree best with those of the fixes, where it is another.
     findings : list of Finding
@@ -76,15 +76,13 @@ def first_guesses(
                 )
             )
     guesses = [
-        Guess(
-            NavState.from_degrees(
-                *place.tolist(),
-                v_n=late,
-                roll_deg=priors.roll_deg,
-                pitch_deg=priors.pitch_deg,
-                heading_deg=h % 360.0,
-                time=end,
-            )
+        NavState.from_degrees(
+            *place.tolist(),
+            v_n=late,
+            roll_deg=priors.roll_deg,
+            pitch_deg=priors.pitch_deg,
+            heading_deg=h % 360.0,
+            time=end,
         )
         for h in (headings or [0.0])
     ]

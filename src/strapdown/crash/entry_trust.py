@@ -75,8 +75,10 @@ def judge_fixes(
     strained = np.flatnonzero(hard | rough)
     why = []
     for t, q in zip(instants, quality, strict=True):
-        if t >= impact - slack:
+        if t >= impact:
             why.append("from the impact on")
+        elif t >= impact - slack:
+            why.append("perhaps after the impact: its stamp is not so well known")
         elif t > anchor:
             why.append("after the anchor")
         elif q == 0:

@@ -2,44 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.crash.entry_estimate import Estimate, Fixes, estimate
+from strapdown.crash.entry_checks import check_arguments, check_enough
+from strapdown.crash.entry_estimate import Fixes, estimate
+from strapdown.crash.entry_findings import findings, say_outliers, unlikely
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_start import first_guesses
 from strapdown.crash.entry_state import EntryState
-from strapdown.crash.entry_trust import judge_fixes, record_of_fixes
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.crash.entry_trust import AVERAGED, RECOVERY, judge_fixes, record_of_fixes
+from strapdown.exceptions import DataError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.tables import (
-    ACCEL,
     GEODETIC,
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
-    check_gnss,
-    check_imu,
 )
 from strapdown.tables.checks import index_of, values_of
 
 Array = NDArray[np.float64]
-
-# Least of what an entry state can be made of.
-LEAST_FIXES = 3
-LEAST_SPAN = 1.0  # s
-LONGEST_WINDOW = 60.0  # s
-# A heading that is known less well is told.
-WIDE_HEADING = 5.0  # deg
-# Misfits of all fixes that chance makes more seldom are told.
-UNLIKELY = 1e-4
 
 
 def entry_state_from_gnss(
@@ -93,10 +81,10 @@ def entry_state_from_gnss(
     *Method.* Iterated generalised least squares (Gauss-Newton) for the 15 states at the anchor,
     from which the full mechanization runs backward over the window, and for scale,
     misalignment, g-sensitivity, antenna and time offset as far as the priors leave them open.
-    The covariance of the fixes has the noise of the sensors since each of them, and the part
-    of the receiver's error that stays (`FixCorrelation`), so that ten fixes a second are not
-    taken for ten times the knowledge. Fixes that lie too far from all others lose weight
-    (`entry_adjust.adjust`).
+    The covariance of the rows has the noise of the inertial sensors between each fix and the
+    anchor, and the part of the receiver's error that stays (`FixCorrelation`), so that ten fixes
+    a second are not taken for ten times the knowledge; `entry_adjust.adjust` solves it fix by
+    fix. Fixes that lie too far from what all others say lose weight (`entry_adjust.weigh`).
 
     *Which fixes.* None from the impact on; none where the acceleration without gravity exceeds
     50 m/s² or the jerk 20 m/s³ (both means over 50 ms, `entry_trust.strain`), nor for 1 s after;
@@ -104,19 +92,19 @@ def entry_state_from_gnss(
 
     *What can be seen.* Velocity and place always. Roll and pitch, and the horizontal bias
     that looks like them, only together while the vehicle neither turns nor accelerates: 0.1 m/s²
-    of bias is 0.6 deg; the prior decides. Heading through accelerations alone: braking by 3 m/s
-    with fixes of 0.1 m/s shows it to about 3 deg, a steady straight drive not at all, unless the
-    vehicle may be taken to travel along its axis (`EntryPriors.side_slip_sd_deg`). A finding
-    says when it is not seen; its standard deviation, and all that hang on it, then mean no
-    more than "unknown", because errors of more than about 30 deg are not linear.
+    of bias is 0.6 deg, and the prior of the bias decides. Heading through changes of velocity
+    alone: a steady straight drive does not show it, unless the vehicle may be taken to travel
+    along its axis (`EntryPriors.side_slip_sd_deg`). A finding says when it is not seen. A
+    standard deviation beyond some 15 deg then means "unknown": errors so large are not linear,
+    and the noise that the accelerometers have summed up is itself taken for a motion.
 
-    *Valid* for motions that the Imu table samples well, sensor errors that stay over the
-    window, and a standard deviation of the fixes that is true in its scale: a misfit that chance
-    does not explain is told.
+    *Valid* for motions that the Imu table samples well; for sensor errors that stay over the
+    window; without vibration that the sensors rectify; and for fixes whose standard deviations
+    are right: a misfit that chance does not explain is told.
     """
     mechanization = NorthEastDown(ellipsoid=ellipsoid)
     at = impact if anchor is None else anchor
-    _check(imu, gnss, impact, window, at, antenna)
+    check_arguments(imu, gnss, impact, window, at, antenna)
     source = gnss.attrs.get("source")
     stamps, sensed = index_of(gnss), index_of(imu)
     instants = stamps - priors.time_offset
@@ -133,11 +121,11 @@ def entry_state_from_gnss(
             remedy="use a longer window or an earlier anchor, or check that both tables have the "
             "same clock",
         )
-    first = int(np.searchsorted(sensed, instants[reached][0], side="right")) - 1
-    piece = imu.iloc[max(0, first - 1) : last + 1]
-    piece.attrs = dict(imu.attrs)
-
-    turned = _turn_only(mechanization, piece, gnss[reached].iloc[0])
+    first = float(instants[reached][0])
+    piece = _between(imu, first, last)
+    turned = _turn_only(
+        mechanization, _between(imu, first - RECOVERY - 2.0 * AVERAGED, last), gnss[reached]
+    )
     slack = 3.0 * priors.time_offset_sd
     why = judge_fixes(
         instants[later],
@@ -155,14 +143,14 @@ def entry_state_from_gnss(
         values_of(gnss, VELOCITY)[used],
         np.hstack([values_of(gnss, POSITION_SD)[used], values_of(gnss, VELOCITY_SD)[used]]),
     )
-    _check_enough(fixes, why, source)
+    check_enough(fixes, why, source)
 
     guesses, found = first_guesses(turned, fixes, priors)
     arm = np.asarray(antenna, dtype=np.float64)
     best = estimate(mechanization, piece, fixes, guesses[0], priors, arm)
     for other in guesses[1:]:
         # A drive backward, or with the axes turned, fits from the other heading alone.
-        if _unlikely(best.cost, best.degrees_of_freedom):
+        if unlikely(best.cost, best.degrees_of_freedom):
             next_best = estimate(mechanization, piece, fixes, other, priors, arm)
             best = min(best, next_best, key=lambda e: e.cost)
     for name, weights, misfits in (
@@ -171,7 +159,7 @@ def entry_state_from_gnss(
     ):
         record.loc[record["used"], f"{name}_weight"] = weights
         record.loc[record["used"], f"{name}_misfit"] = misfits
-    _say_outliers(record)
+    say_outliers(record)
     return EntryState(
         state=best.state,
         gyro_bias=tuple(best.gyro_bias.tolist()),
@@ -183,184 +171,25 @@ def entry_state_from_gnss(
         chi_square=best.chi_square,
         degrees_of_freedom=best.degrees_of_freedom,
         iterations=best.iterations,
-        findings=(*found, *_findings(best, record, source, priors, at)),
+        findings=(*found, *findings(best, record, source, priors, at)),
     )
 
 
-def _turn_only(mechanization: NorthEastDown, imu: pd.DataFrame, first: pd.Series) -> NavigationRun:
+def _between(imu: pd.DataFrame, begin: float, last: int) -> pd.DataFrame:
+    """Rows from the last one before an instant to a row."""
+    first = max(0, int(np.searchsorted(index_of(imu), begin, side="right")) - 1)
+    # A step needs two samples.
+    piece = imu.iloc[min(first, last - 1) : last + 1]
+    piece.attrs = dict(imu.attrs)
+    return piece
+
+
+def _turn_only(
+    mechanization: NorthEastDown, imu: pd.DataFrame, gnss: pd.DataFrame
+) -> NavigationRun:
     """Navigate from a stand, level and to the north: only what changes means something."""
     increments = motion_increments(imu)
     begin = float(increments.index[0] - increments["dt"].iloc[0])
-    start = NavState.from_degrees(
-        float(first["lat"]), float(first["lon"]), float(first["alt"]), time=begin
-    )
+    at = gnss[GEODETIC].median()
+    start = NavState.from_degrees(at["lat"], at["lon"], at["alt"], time=begin)
     return run_mechanization(mechanization, start, increments)
-
-
-def _check(
-    imu: pd.DataFrame,
-    gnss: pd.DataFrame,
-    impact: float,
-    window: float,
-    anchor: float,
-    antenna: Sequence[float],
-) -> None:
-    check_imu(imu)
-    check_gnss(gnss)
-    if ACCEL[0] not in imu.columns:
-        raise DataError(
-            "there is no accelerometer: nothing carries the velocity from fix to fix",
-            file=imu.attrs.get("source"),
-            quantity="accel",
-            remedy="give an Imu table with the specific force in vehicle axes",
-        )
-    if not (math.isfinite(impact) and math.isfinite(anchor) and anchor <= impact):
-        raise ConfigError(
-            f"an anchor at {anchor:g} s, with the impact at {impact:g} s",
-            quantity="anchor",
-            remedy="give the instant of the impact in s, and an anchor not after it",
-        )
-    if not 1.0 <= window <= LONGEST_WINDOW:
-        raise ConfigError(
-            f"a window of {window:g} s",
-            quantity="window",
-            remedy=f"use 1 to {LONGEST_WINDOW:g} s: beyond, the sensitivities lose their meaning",
-        )
-    if len(antenna) != 3 or not all(math.isfinite(x) for x in antenna):
-        raise ConfigError(
-            f"{antenna!r} are not three finite numbers",
-            quantity="antenna",
-            remedy="give forward, right, down from the reference point, in m",
-        )
-    sensed = index_of(imu)
-    step = float(np.median(np.diff(sensed)))
-    if not sensed[0] < anchor <= sensed[-1] + step:
-        raise DataError(
-            f"it goes from {sensed[0]:.6g} s to {sensed[-1]:.6g} s, and the anchor is at "
-            f"{anchor:.6g} s",
-            file=imu.attrs.get("source"),
-            quantity="time",
-            remedy="give a record that reaches from before the fixes to the impact, on the same "
-            "clock as the impact",
-        )
-    sd = values_of(gnss, [*POSITION_SD, *VELOCITY_SD])
-    if (sd == 0.0).any():
-        row, column = (int(i) for i in np.argwhere(sd == 0.0)[0])
-        raise DataError(
-            "a standard deviation of zero: nothing is measured exactly",
-            file=gnss.attrs.get("source"),
-            row=row + 1,
-            quantity=[*POSITION_SD, *VELOCITY_SD][column],
-            remedy="give what the receiver is good for, and inf where it does not measure it",
-        )
-
-
-def _check_enough(fixes: Fixes, why: list[str], source: str | None) -> None:
-    span = float(np.ptp(fixes.instants)) if len(fixes.instants) else 0.0
-    placed = int(np.isfinite(fixes.sd[:, :3]).all(axis=1).sum())
-    if min(len(fixes.instants), placed) >= LEAST_FIXES and span >= LEAST_SPAN:
-        return
-    # The instant at the end of a reason is one of many.
-    reasons = Counter(w.split(" of ")[0] for w in why if w)
-    told = "; ".join(f"{count} {what}" for what, count in reasons.items()) or "none was refused"
-    raise DataError(
-        f"{len(fixes.instants)} fixes over {span:.3g} s are left before the impact, {placed} of "
-        f"them with a place; not used: {told}",
-        file=source,
-        quantity="fixes",
-        remedy=f"at least {LEAST_FIXES} with a place over {LEAST_SPAN:g} s are needed: use a "
-        "longer window, or take the entry speed from elsewhere",
-    )
-
-
-def _say_outliers(record: pd.DataFrame) -> None:
-    """Say of each fix that lost weight how far it is off."""
-    for name in ("position", "velocity"):
-        lower = record["used"] & (record[f"{name}_weight"] < 1.0)
-        misfits = record.loc[lower, f"{name}_misfit"].to_numpy(dtype=np.float64)
-        before = record.loc[lower, "why"].tolist()
-        record.loc[lower, "why"] = [
-            f"{said}{'; ' if said else ''}{name} {t:.3g} sd from what the others say"
-            for said, t in zip(before, misfits.tolist(), strict=True)
-        ]
-
-
-def _findings(
-    best: Estimate, record: pd.DataFrame, source: str | None, priors: EntryPriors, impact: float
-) -> list[Finding]:
-    found = []
-    refused = record[~record["used"] & (record["why"] != "from the impact on")]
-    refused = refused[refused["why"] != "after the anchor"]
-    if len(refused):
-        found.append(
-            Finding(
-                f"{len(refused)} fixes before the impact are not believed; the first, at "
-                f"{refused.index[0]:.6g} s: {refused['why'].iloc[0]}",
-                file=source,
-                quantity="fixes",
-                remedy="look at EntryState.fixes; a receiver is not believed under such motion",
-            )
-        )
-    lower = record[record["used"] & (record["why"] != "")]
-    if len(lower):
-        found.append(
-            Finding(
-                f"{len(lower)} fixes have less weight or none; the first, at "
-                f"{lower.index[0]:.6g} s: {lower['why'].iloc[0]}",
-                file=source,
-                quantity="fixes",
-                remedy="look at EntryState.fixes; reflections from buildings make such fixes",
-            )
-        )
-    used = record.index[record["used"]]
-    if impact - used[-1] > 2.0:
-        found.append(
-            Finding(
-                f"the last fix that is used is {impact - used[-1]:.3g} s before the anchor: the "
-                "inertial sensors alone carry the state from there",
-                file=source,
-                quantity="fixes",
-                remedy="nothing, if this is expected: the standard deviations have grown with it",
-            )
-        )
-    if priors.side_slip_sd_deg is not None and not best.slip_fixes:
-        found.append(
-            Finding(
-                "the side slip was not used: at no fix is the vehicle faster than 3 m/s and nearly "
-                "straight",
-                file=source,
-                quantity="heading",
-                remedy="use a longer window, or a heading from elsewhere",
-            )
-        )
-    heading_sd = math.degrees(math.sqrt(best.covariance[8, 8]))
-    if heading_sd > WIDE_HEADING:
-        found.append(
-            Finding(
-                f"the heading is known to {min(heading_sd, 180.0):.3g} deg only: in this drive the "
-                "vehicle hardly speeds up, brakes or turns",
-                file=source,
-                quantity="heading",
-                remedy="if it travels along its axis, say so (side_slip_sd_deg); give a heading "
-                "from elsewhere; or use a longer window",
-            )
-        )
-    if _unlikely(best.chi_square, best.degrees_of_freedom):
-        found.append(
-            Finding(
-                f"the fixes fit worse than their standard deviations say: chi-square "
-                f"{best.chi_square:.4g} of {best.degrees_of_freedom} degrees of freedom",
-                file=source,
-                quantity="fixes",
-                remedy="the covariance is too small by up to "
-                f"{best.chi_square / best.degrees_of_freedom:.3g}: look for a wrong antenna, time "
-                "offset or axes, vibration, or a receiver that claims too much",
-            )
-        )
-    return found
-
-
-def _unlikely(chi_square: float, degrees_of_freedom: int) -> bool:
-    from scipy.stats import chi2
-
-    return bool(chi2.sf(chi_square, degrees_of_freedom) < UNLIKELY)

@@ -31,7 +31,7 @@ from strapdown.crash.entry_priors import EntryPriors, FixCorrelation
 from strapdown.crash.gnss_entry import entry_state_from_gnss
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.simulation import TriadErrors, car
+from strapdown.simulation import ImuErrors, TriadErrors, car, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.manoeuvres import Straight
@@ -67,10 +67,12 @@ def entry(imu, fixes, priors=PRIORS, **changes):
     )
 
 
-def test_without_noise_it_is_the_truth(lively):
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+def test_without_noise_it_is_the_truth(lively, sampling):
     gyro, accel = TriadErrors(bias=(0.01, -0.01, 0.02)), TriadErrors(bias=(0.2, -0.1, 0.15))
     sure = GnssReceiver(antenna=ARM, stated_position_sd=1e-4, stated_velocity_sd=1e-4)
-    found = entry(lively.imu(gyro, accel), simulate_gnss(LIVELY, sure), LOOSE)
+    imu, _ = simulate_imu(LIVELY, ImuErrors(gyro, accel), rate=200.0, sampling=sampling)
+    found = entry(imu, simulate_gnss(LIVELY, sure), LOOSE)
     off = errors_of(found, lively, gyro, accel)
     # Rate and force are lines between samples of 5 ms, and so is the velocity at a fix: wrong by
     # up to h²/8 times the jerk of 20 m/s³, 6e-5 m/s. That is less than what the fixes claim.
