@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.delta_v import DeltaV
-from strapdown.crash.event_detector import CrashEvent
 from strapdown.crash.pdof import Pdof, pdof
 from strapdown.crash.pdof_interval import AngleInterval, pdof_interval
 from strapdown.crash.tipping import PASSENGER_CAR, RollMotion, TippingBody

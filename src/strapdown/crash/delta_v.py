@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.event_detector import CrashEvent
+from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.velocity_course import VelocityCourse
 from strapdown.crash.window_weights import check_within, window_weights
 from strapdown.exceptions import ConfigError, DataError

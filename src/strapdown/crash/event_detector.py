@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import crash_events as kernel
+from strapdown._kernels import window_change as rows
+from strapdown.crash.crash_event import CrashEvent, two_sds
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.tables.imu import SAMPLINGS
@@ -19,82 +20,6 @@ Array = NDArray[np.float64]
 #: By what time zero is told, in the order of the kernel's marks.
 BASES = ("longitudinal", "lateral", "resultant", "acceleration")
 AXES = ("longitudinal", "lateral")
-
-
-@dataclass(frozen=True)
-class CrashEvent:
-    """One event of a record.
-
-    Attributes
-    ----------
-    time_zero : float, s
-        First point of the interval in which the wake threshold was reached (49 CFR 563.5(b)), or
-        the instant at which it was; as `EventRule.zero_at` says.
-    time_zero_sd : float, s
-        Of `time_zero` from noise and bias of the acceleration: that of the window's change,
-        over its slope where it crosses the threshold. First order: right while it is small
-        against the time in which the slope changes. Zero where nothing was said of the noise.
-    basis : {'longitudinal', 'lateral', 'resultant', 'acceleration'}
-        By which criterion.
-    woken : float, s
-        When the wake threshold was reached: no earlier could a recorder know.
-    trigger : float, s
-        When the trigger threshold was reached: the instant of detection.
-    trigger_axis : {'longitudinal', 'lateral'}
-    end : float, s
-        When the resultant change within the wake window became small; the last stamp where
-        `lasts_beyond_record`.
-    end_sd : float, s
-        As `time_zero_sd`; NaN where the event lasts beyond the record, or where the end is that
-        of the trigger.
-    peak : float, m/s²
-        Largest horizontal magnitude of a sample from time zero to the end, unfiltered.
-    peak_time : float, s
-    starts_before_record : bool
-        The record begins within the interval of time zero, which is then the first stamp.
-    lasts_beyond_record : bool
-        The record ends before the event.
-    """
-
-    time_zero: float
-    time_zero_sd: float
-    basis: str
-    woken: float
-    trigger: float
-    trigger_axis: str
-    end: float
-    end_sd: float
-    peak: float
-    peak_time: float
-    starts_before_record: bool
-    lasts_beyond_record: bool
-
-    @property
-    def duration(self) -> float:
-        """From time zero to the end, s."""
-        return self.end - self.time_zero
-
-
-def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
-    """Forward and right standard deviation of one number or a triad.
-
-    Raises
-    ------
-    ConfigError
-        It is neither, or negative, or not finite.
-    """
-    try:
-        sds = np.asarray(given, dtype=np.float64)
-        sds = np.broadcast_to(sds, (3,)) if sds.ndim == 0 else sds
-    except (TypeError, ValueError):
-        sds = np.empty(0)
-    if sds.shape != (3,) or not (np.isfinite(sds).all() and (sds >= 0.0).all()):
-        raise ConfigError(
-            f"{given!r} is no standard deviation",
-            quantity=name,
-            remedy="give one number, or three (forward, right, down), in m/s²",
-        )
-    return float(sds[0]), float(sds[1])
 
 
 class EventDetector:
@@ -153,7 +78,7 @@ class EventDetector:
         self._options = options
         self._noise, self._bias = two_sds(noise, "noise"), two_sds(bias_sd, "bias_sd")
         self._state = np.zeros(kernel.SIZE)
-        self._rows = np.zeros((1024, kernel.WIDTH))
+        self._rows = np.zeros((1024, rows.WIDTH))
         self._held, self._gone = 0, 0
         self._events: list[CrashEvent] = []
 
@@ -223,9 +148,9 @@ class EventDetector:
         if 0 < held < len(self._rows) and np.shape(accel) == (3,):
             x, y, z = accel
             # What is not finite, or goes back, is refused with its words by `extend`.
-            if time > self._rows[held - 1, kernel.T] and math.isfinite(x + y + z + time):
+            if time > self._rows[held - 1, rows.T] and math.isfinite(x + y + z + time):
                 row = self._rows[held]
-                row[kernel.T], row[kernel.AX], row[kernel.AY] = time, x, y
+                row[rows.T], row[rows.AX], row[rows.AY] = time, x, y
                 self._held = held + 1
                 return self._advance()
         return self.extend([time], [accel])  # type: ignore[arg-type]
@@ -258,11 +183,11 @@ class EventDetector:
             return ()
         self._make_room(len(stamps))
         new = slice(self._held, self._held + len(stamps))
-        self._rows[new, kernel.T] = stamps
-        self._rows[new, kernel.AX] = values[:, 0]
-        self._rows[new, kernel.AY] = values[:, 1]
+        self._rows[new, rows.T] = stamps
+        self._rows[new, rows.AX] = values[:, 0]
+        self._rows[new, rows.AY] = values[:, 1]
         if self._held + self._gone == 0:
-            self._rows[0, kernel.VX :] = 0.0
+            self._rows[0, rows.VX :] = 0.0
             kernel.begin(self._state, float(stamps[0]))
         self._held += len(stamps)
         return self._advance()
@@ -293,7 +218,7 @@ class EventDetector:
                 quantity="acceleration",
                 remedy="leave the sample out",
             )
-        last = self._rows[self._held - 1, kernel.T] if self._held else -math.inf
+        last = self._rows[self._held - 1, rows.T] if self._held else -math.inf
         back = np.flatnonzero(np.diff(time, prepend=last) <= 0.0)
         if back.size:
             raise DataError(
@@ -314,7 +239,7 @@ class EventDetector:
             reach = rule.trigger_window + 2.0 * rule.wake_window
             pending = state[kernel.PENDING]
             oldest = state[kernel.NOW] if math.isnan(pending) else pending
-            first = int(np.searchsorted(self._rows[: self._held, kernel.T], oldest - reach)) - 2
+            first = int(np.searchsorted(self._rows[: self._held, rows.T], oldest - reach)) - 2
             first = max(min(first, int(state[kernel.TAILS : kernel.TAILS + 3].min()) - 1), 0)
             self._rows[: self._held - first] = self._rows[first : self._held].copy()
             state[kernel.TAILS : kernel.TAILS + 3] -= first
@@ -322,9 +247,9 @@ class EventDetector:
             self._held -= first
             self._gone += first
         if 2 * (self._held + more) > len(self._rows):
-            rows = np.zeros((2 * (self._held + more), kernel.WIDTH))
-            rows[: self._held] = self._rows[: self._held]
-            self._rows = rows
+            larger = np.zeros((2 * (self._held + more), rows.WIDTH))
+            larger[: self._held] = self._rows[: self._held]
+            self._rows = larger
 
     def _event(self, end: float, lasts: bool) -> CrashEvent:
         state = self._state

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.event_detector import CrashEvent, EventDetector
+from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.event_detector import EventDetector
 from strapdown.crash.event_rule import KMH, PART_563, EventRule
 from strapdown.exceptions import ConfigError, DataError, Finding
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 
 from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.delta_v import cumulative_delta_v
-from strapdown.crash.event_detector import CrashEvent
 from strapdown.crash.velocity_course import VelocityCourse
 from strapdown.crash.window_weights import check_within
 

@@ -11,9 +11,8 @@ from strapdown.crash.acceleration import Acceleration
 
 Array = NDArray[np.float64]
 
-# Golden section: each turn leaves 0.618 of the interval; 80 leave its rounding.
-_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
-_TURNS = 80
+#: Value, slope and half the curvature of each component at some instants, (m, k) each.
+Polynomials = tuple[Array, Array, Array]
 
 
 class VelocityCourse:
@@ -53,51 +52,83 @@ class VelocityCourse:
         rate: Array = self._first[k] + u * self._slope[k]
         return rate
 
+    def slope(self, instants: Array) -> Array:
+        """Slope of the acceleration at instants between stamps, (m, 3), m/s³."""
+        k, _ = self._place(instants)
+        slope: Array = self._slope[k]
+        return slope
+
     def largest_change(
         self, low: float, high: float, window: float, axes: Sequence[int] = (0, 1, 2)
     ) -> float:
         """End in [low, high] of the window in which the velocity changes most, s."""
-        time, columns = self._time, list(axes)
-        begin = time[0]
+        time, columns, begin = self._time, list(axes), self._time[0]
 
-        def size(at: Array) -> Array:
+        def course(at: Array) -> Polynomials:
             before = np.maximum(at - window, begin)
-            change = (self.velocity(at) - self.velocity(before))[:, columns]
-            squared: Array = (change**2).sum(axis=1)
-            return squared
+            return (
+                (self.velocity(at) - self.velocity(before))[:, columns],
+                (self.rate(at) - self.rate(before))[:, columns],
+                0.5 * (self.slope(at) - self.slope(before))[:, columns],
+            )
 
         # Between these the change is one polynomial.
-        return _largest(size, np.r_[time, time + window], low, high)
+        return _largest(course, np.r_[time, time + window], low, high)
 
     def largest_since(self, start: float, end: float, axes: Sequence[int]) -> float:
         """Instant in [start, end] at which the change since `start` is largest, s."""
         columns = list(axes)
-        origin = self.velocity(np.array([start]))[:, columns]
+        origin = self.velocity(np.array([start]))
 
-        def size(at: Array) -> Array:
-            squared: Array = ((self.velocity(at)[:, columns] - origin) ** 2).sum(axis=1)
-            return squared
+        def course(at: Array) -> Polynomials:
+            return (
+                (self.velocity(at) - origin)[:, columns],
+                self.rate(at)[:, columns],
+                0.5 * self.slope(at)[:, columns],
+            )
 
-        return _largest(size, self._time, start, end)
+        return _largest(course, self._time, start, end)
 
 
-def _largest(size: Callable[[Array], Array], breaks: Array, low: float, high: float) -> float:
-    """Where a function that is smooth between breaks is largest in an interval."""
+def _largest(
+    course: Callable[[Array], Polynomials], breaks: Array, low: float, high: float
+) -> float:
+    """Where the length of a vector of quadratics is largest in an interval.
+
+    Parameters
+    ----------
+    course : callable
+        Value, slope and half the curvature at instants between breaks.
+    breaks : ndarray
+    low, high : float
+    """
     nodes = np.unique(np.r_[low, breaks[(breaks > low) & (breaks < high)], high])
-    sizes = size(nodes)
+    sizes = np.sqrt((course(nodes)[0] ** 2).sum(axis=1))
     best = int(np.argmax(sizes))
     at, most = float(nodes[best]), float(sizes[best])
-    for a, b in ((best - 1, best), (best, best + 1)):
-        if a < 0 or b >= len(nodes):
-            continue
-        left, right = float(nodes[a]), float(nodes[b])
-        for _ in range(_TURNS):
-            x, y = right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)
-            fx, fy = size(np.array([x, y]))
-            left, right = (left, y) if fx >= fy else (x, right)
-        middle = 0.5 * (left + right)
-        found = float(size(np.array([middle]))[0])
-        # A plateau is met where it begins, whatever its rounding.
-        if found > most * (1.0 + 1e-12):
-            at, most = middle, found
+    if len(nodes) < 2:
+        return at
+    # About the middles, where no rounding of a break takes the neighbour's polynomial.
+    middle, half = 0.5 * (nodes[1:] + nodes[:-1]), 0.5 * np.diff(nodes)
+    c0, c1, c2 = course(middle)
+    # No point of a piece is further from one of its ends than half its length times the
+    # greatest slope, and that is at an end.
+    steep = np.sqrt(
+        np.maximum(
+            ((c1 - 2.0 * c2 * half[:, None]) ** 2).sum(axis=1),
+            ((c1 + 2.0 * c2 * half[:, None]) ** 2).sum(axis=1),
+        )
+    )
+    reach = np.maximum(sizes[1:], sizes[:-1]) + half * steep
+    for k in np.flatnonzero(reach > most).tolist():
+        a, b, c = c0[k], c1[k], c2[k]
+        # Derivative of half the squared length: a cubic.
+        cubic = [2.0 * c @ c, 3.0 * b @ c, b @ b + 2.0 * a @ c, a @ b]
+        roots = np.roots(cubic)
+        for u in roots[np.abs(roots.imag) <= 1e-6 * half[k]].real:
+            if abs(u) <= half[k]:
+                found = float(np.sqrt((((c * u + b) * u + a) ** 2).sum()))
+                # A plateau is met where it begins, whatever its rounding.
+                if found > most * (1.0 + 1e-12):
+                    at, most = float(middle[k] + u), found
     return at
