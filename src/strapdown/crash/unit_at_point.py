@@ -112,21 +112,19 @@ class UnitAtPoint:
             it, with its correlation from sample to sample: it all but cancels in a delta-V.
         """
         m = len(weights)
-        out = np.einsum("an,bn,nij->aibj", weights, weights, self.noise).reshape(3 * m, 3 * m)
+        spread = np.einsum("an,nik->aink", weights, _root_of(self.noise)).reshape(3 * m, -1)
+        out = spread @ spread.T
         if self.moved is None or not self.moved.lever_arm.any():
             return np.asarray(out)
         slope, arm = self.moved.slope, self.moved.lever_arm
         turn = rate_effect(slope.value_of(self.rate), arm)
-        by_slope, _ = slope.weighted(weights)
+        by_slope = slope.weighted(weights)[0]
         effect = np.einsum("an,ij->anij", by_slope, -cross_matrix(arm))
         for axis in range(3):
             for other in range(3):
                 rows = weights * turn[:, axis, other]
                 effect[:, :, axis, other] += slope.weighted(rows)[1]
-        # Root of the covariance of each sample of the gyro.
-        values, vectors = np.linalg.eigh(self.gyro_noise)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-        half = np.einsum("anij,njk->aink", effect, root).reshape(3 * m, -1)
+        half = np.einsum("anij,njk->aink", effect, _root_of(self.gyro_noise)).reshape(3 * m, -1)
         return np.asarray(out + half @ half.T)
 
 
@@ -184,6 +182,12 @@ def unit_at_point(
     )
 
 
+def _root_of(covariances: Array) -> Array:
+    """Matrices whose product with their transpose is the covariance of each sample."""
+    values, vectors = np.linalg.eigh(covariances)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])
+
+
 def _of_range(
     prepared: PreparedUnit, j: int, name: str, own: Array, speaks: Array, C: Array
 ) -> list[Contributor]:
@@ -199,7 +203,7 @@ def _of_range(
         # All ranges hang on the lowest one's bias, but for those that have none to hang on.
         hanging = np.zeros_like(speaks)
         for k in range(len(prepared.unit.accelerometers)):
-            if _root(prepared, k) == j:
+            if _hangs_on(prepared, k) == j:
                 hanging += prepared.range_spoken == k
         found.append(Contributor(f"bias of {name}", C[None] * hanging[:, None, :], covariance))
     else:
@@ -240,7 +244,7 @@ def _of_range(
     return found
 
 
-def _root(prepared: PreparedUnit, k: int) -> int:
+def _hangs_on(prepared: PreparedUnit, k: int) -> int:
     """The range on whose own bias a range hangs."""
     origin = prepared.bias_from[k]
     while k > 0 and origin is not None and origin >= 0:

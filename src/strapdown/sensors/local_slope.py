@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Array = NDArray[np.float64]
 
@@ -62,19 +67,25 @@ class LocalSlope:
         slope, value : ndarray, (m, n)
             Weights of the samples of the signal.
         """
-        return self._spread(self.slope, rows), self._spread(self.value, rows)
+        by_slope, by_value = self._matrices
+        return np.asarray(rows @ by_slope), np.asarray(rows @ by_value)
+
+    @cached_property
+    def _matrices(self) -> tuple[csr_array, csr_array]:
+        """The weights as matrices (n, n), nearly empty."""
+        from scipy.sparse import csr_array
+
+        n, width = self.slope.shape
+        columns = (self.first[:, None] + np.arange(width)).ravel()
+        starts = np.arange(0, n * width + 1, width)
+        slope = csr_array((self.slope.ravel(), columns, starts), shape=(n, n))
+        return slope, csr_array((self.value.ravel(), columns, starts), shape=(n, n))
 
     def _apply(self, weights: Array, y: Array) -> Array:
         out = np.zeros((len(weights), y.shape[1]))
         for j in range(weights.shape[1]):
             out += weights[:, j, None] * y[self.first + j]
         return out
-
-    def _spread(self, weights: Array, rows: Array) -> Array:
-        out = np.zeros((weights.shape[0], rows.shape[0]))
-        for j in range(weights.shape[1]):
-            np.add.at(out, self.first + j, (rows * weights[:, j]).T)
-        return np.ascontiguousarray(out.T)
 
 
 def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0) -> LocalSlope:

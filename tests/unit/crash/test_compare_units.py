@@ -13,7 +13,7 @@ from strapdown.crash.combine_units import combine_units
 from strapdown.crash.compare_units import compare_units
 from strapdown.crash.match_axes import signed_permutations
 from strapdown.crash.unit_at_point import Contributor, UnitAtPoint
-from strapdown.crash.unit_differences import sum_weights
+from strapdown.crash.unit_differences import sum_weights, velocity_increments
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.lever_arm import move_imu
 from strapdown.tables import ACCEL, GYRO, imu_table
@@ -29,7 +29,7 @@ def motion(time):
     pulse = 2 * np.sin(np.pi * x) ** 2 / 0.12
     area = x - np.sin(2 * np.pi * x) / (2 * np.pi)
     direction, turn = np.array([-7.0, 2.0, -1.0]), np.array([0.8, -0.6, 1.5])
-    force = np.outer(pulse, direction) + [0.0, 0.0, -G]
+    force = np.outer(pulse, direction) + np.array([0.0, 0.0, -G])
     return force, np.outer(area, turn), np.outer(pulse, turn)
 
 
@@ -106,7 +106,7 @@ def test_integrals_are_exact_for_straight_lines_and_for_means():
 
 def test_honest_units_agree_and_their_chi_square_is_one():
     chi, freedom, against, total = [], 0, [], []
-    for k in range(60):
+    for k in range(25):
         units = [unit(n, p, 10 * k + i) for i, (n, p) in enumerate((("A", A), ("B", B), ("C", C)))]
         out = compare_units(units)
         assert all(p.axes.kind == "agree" for p in out.pairs)
@@ -114,19 +114,17 @@ def test_honest_units_agree_and_their_chi_square_is_one():
         freedom = out.pairs[0].freedom
         total.append(out.chi_square / out.freedom)
         against.append(out.against[0].probability)
-    # The mean of n chi-squares scatters by sqrt(2 freedom / n); the parabola is short of the true
-    # angular acceleration by 0.6 (w h)² = 1 % of 15 rad/s² m, 0.15 m/s² against a noise of
-    # 0.5/sqrt(8) in a piece: up to (0.15/0.25)²/2 of a unit of chi-square more in the crash.
+    # The mean of n chi-squares over their degrees of freedom scatters by sqrt(2 / (freedom n)).
     mean = np.mean(chi) / freedom
-    assert 1.0 - 5 * math.sqrt(2 / freedom / 60) < mean < 1.0 + 5 * math.sqrt(2 / freedom / 60)
-    assert np.mean(total) == pytest.approx(1.0, abs=5 * math.sqrt(2 / (2 * freedom) / 60))
-    assert np.mean(np.array(against) < 0.5) == pytest.approx(0.5, abs=5 * 0.5 / math.sqrt(60))
+    assert 1.0 - 5 * math.sqrt(2 / freedom / 25) < mean < 1.0 + 5 * math.sqrt(2 / freedom / 25)
+    assert np.mean(total) == pytest.approx(1.0, abs=5 * math.sqrt(2 / (2 * freedom) / 25))
+    assert np.mean(np.array(against) < 0.5) == pytest.approx(0.5, abs=5 * 0.5 / math.sqrt(25))
 
 
 def test_false_alarms_are_as_rare_as_stated():
     findings = [
         f
-        for k in range(40)
+        for k in range(20)
         for f in compare_units([unit("A", A, k), unit("B", B, 1000 + k)]).findings
     ]
     assert not findings
@@ -183,31 +181,29 @@ def test_a_unit_turned_as_a_whole_and_a_gyro_turned_alone():
 def test_a_small_rotation_of_the_mounting_is_estimated_with_its_sd():
     C = rotation.dcm_from_euler([2.0, -3.0, 4.0])
     z = []
-    for k in range(40):
+    for k in range(20):
         second = unit("B", A, 500 + k, accel_axes=C, gyro_axes=C)
         out = compare_units([unit("A", A, k), second])
         found = out.pairs[0].turned
         error = rotation.rotation_vector_from_dcm(found.matrix @ C.T)
         z.append(error @ np.linalg.solve(found.covariance, error))
         assert any("it is turned against A" in str(f) for f in out.findings)
-    # Three degrees of freedom; scale and bias are in the residuals and not independent from
-    # piece to piece: within a factor of three either way.
-    assert 1.0 < np.mean(z) < 9.0
+    # Chi-square of three degrees of freedom: a mean over 20 scatters by sqrt(6/20).
+    assert np.mean(z) == pytest.approx(3.0, abs=5 * math.sqrt(6 / 20))
 
 
 def test_a_wrong_position_is_recognised_with_its_sd():
     wrong, z, said = np.array([-0.6, -0.5, -0.2]), [], 0
-    for k in range(40):
+    for k in range(20):
         out = compare_units([unit("A", A, k, stated=wrong), unit("B", B, 700 + k)])
         check = out.pairs[0].lever_arm
         truth = np.asarray(A) - wrong
         z.append(check.directions.T @ (check.correction - truth) / check.sd)
         said += any("position" in str(f) for f in out.findings)
         assert check.told.any()
-    assert said == 40
-    # Normal deviates, 120 of them: their variance is one to 5 sqrt(2/120); noise of the angular
-    # acceleration is of 5 % of the signal's power and pulls the metre by some of that.
-    assert np.mean(np.square(z)) < 1.0 + 5 * math.sqrt(2 / 120) + 1.0
+    assert said == 20
+    # 60 normal deviates: their variance is one to sqrt(2/60).
+    assert np.mean(np.square(z)) == pytest.approx(1.0, abs=5 * math.sqrt(2 / 60))
 
 
 def test_without_turning_positions_are_not_judged():
@@ -224,15 +220,13 @@ def test_without_turning_positions_are_not_judged():
 
 def test_a_combination_is_better_than_its_parts_and_says_how_much():
     z, parts, whole = [], [], []
-    for k in range(60):
+    for k in range(25):
         units = [unit(n, p, 20 * k + i) for i, (n, p) in enumerate((("A", A), ("B", B), ("C", C)))]
         both = combine_units(units)
         time, truth, _ = at_place(P)
         edges = np.array([0.0, 0.3])
         w = sum_weights(time, edges, "instantaneous")
         true = (w @ truth)[0]
-        from strapdown.crash.unit_differences import velocity_increments
-
         got = velocity_increments(both, edges)
         error = got.values[0] - true
         z.append(error @ np.linalg.solve(got.whole, error))
@@ -240,7 +234,7 @@ def test_a_combination_is_better_than_its_parts_and_says_how_much():
         parts.append(np.sum((velocity_increments(units[0], edges).values[0] - true) ** 2))
     # Chi-square of three degrees of freedom; noise of the gyro is taken as white in a
     # combination, where it cancels: below three by that.
-    assert 0.5 * 3 < np.mean(z) < 3 + 5 * math.sqrt(6 / 60)
+    assert 0.5 * 3 < np.mean(z) < 3 + 5 * math.sqrt(6 / 25)
     assert np.mean(whole) < 0.6 * np.mean(parts)
 
 
