@@ -19,6 +19,7 @@ from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
+GYRO_BIAS = "gyro bias"
 # What is faster than this part of a record is vibration to it.
 VIBRATION = 0.025  # s
 
@@ -55,6 +56,12 @@ class SampleEffects:
     tilt: Array
     force_noise: Array
     rate_noise: Array
+
+    @property
+    def roll_bias_sd(self) -> float:
+        """Standard deviation of the bias about the forward axis, rad/s."""
+        of_bias = [k for k, name in enumerate(self.contributors) if name == GYRO_BIAS]
+        return float(np.sqrt((self.rate[of_bias, 0, 0] ** 2).sum()))
 
 
 def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.0) -> SampleEffects:
@@ -280,7 +287,7 @@ class _UnitEffects:
             bias = self.prepared.gyro_bias_sd[axis]
             if bias > 0.0:
                 rate = np.tile(bias * direction, (len(self.time), 1))
-                self._add(f"gyro bias {AXES[axis]}", "gyro bias", None, rate, none, owner)
+                self._add(f"gyro bias {AXES[axis]}", GYRO_BIAS, None, rate, none, owner)
             for name, contributor, one in self._gyro_curves(axis):
                 self._add(name, contributor, None, np.outer(one, direction), none, owner)
             slope = sd.axis("g_sensitivity")[axis]

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
+from strapdown.crash.at_point import AtPoint
+from strapdown.crash.crash_type import CrashType, classify_crashes
 from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
 from strapdown.crash.entry import Entry
@@ -21,38 +22,12 @@ from strapdown.crash.path import WINDOW, CrashPath, reconstruct_path
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
 from strapdown.exceptions import Finding
-from strapdown.results import RestStretch
-from strapdown.sensors.prepared_unit import Levelling
-from strapdown.tables import ACCEL
+from strapdown.mechanization import NorthEastDown
 
 Array = NDArray[np.float64]
 
 #: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
 PEAK_WINDOW = 0.030
-
-
-@dataclass(frozen=True, eq=False)
-class AtPoint:
-    """What a unit says at the reference point.
-
-    Attributes
-    ----------
-    name : str
-    imu : DataFrame
-        Imu table in vehicle axes, time from the common trigger.
-    effects : SampleEffects
-    levelling : Levelling
-    rest : RestStretch, optional
-    rest_accel_sd : float, m/s²
-        What is not known of the vehicle's own acceleration over the rest.
-    """
-
-    name: str
-    imu: pd.DataFrame = field(repr=False)
-    effects: SampleEffects = field(repr=False)
-    levelling: Levelling
-    rest: RestStretch | None
-    rest_accel_sd: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +47,8 @@ class UnitReconstruction:
     body, ned : tuple of EventChanges
         Of every event, along the turning axes and resolved. An event that reaches beyond the
         path's window has no resolved change.
+    types : tuple of CrashType
+        Of every event, from its change along the turning axes and the roll.
     findings : tuple of Finding
     """
 
@@ -83,6 +60,7 @@ class UnitReconstruction:
     path: CrashPath = field(repr=False)
     body: tuple[EventChanges, ...]
     ned: tuple[EventChanges | None, ...]
+    types: tuple[CrashType, ...]
     findings: tuple[Finding, ...] = ()
 
 
@@ -93,7 +71,8 @@ def reconstruct_unit(
     window: Sequence[float] = WINDOW,
     peak_window: float = PEAK_WINDOW,
     rule: EventRule = PART_563,
-    gravity: float = 9.80665,
+    gravity: float = STANDARD_GRAVITY,
+    mechanization: NorthEastDown | None = None,
 ) -> UnitReconstruction:
     """Find the events of a unit, its changes of velocity and its path.
 
@@ -108,6 +87,7 @@ def reconstruct_unit(
     rule : EventRule
     gravity : float, m/s²
         At the place.
+    mechanization : NorthEastDown, optional
 
     Returns
     -------
@@ -119,7 +99,7 @@ def reconstruct_unit(
     DataError, DivergenceError
         As `reconstruct_path`.
     """
-    at_rest, rest_sd = resting_force(at_point, gravity)
+    at_rest, rest_sd = at_point.resting_force(gravity)
     acceleration = body_acceleration(at_point.imu, at_rest.tolist())
     effects = at_point.effects
     events = detect_events(
@@ -135,6 +115,7 @@ def reconstruct_unit(
         None if at_point.rest is None else at_point.rest.end,
         entry,
         window=window,
+        mechanization=mechanization,
     )
     first = int(np.searchsorted(at_point.imu.index, path.time[0] - 1e-9))
     part = at_point.imu.iloc[first : first + len(path.time)]
@@ -186,25 +167,18 @@ def reconstruct_unit(
         path,
         tuple(body),
         tuple(ned),
+        classify_crashes(
+            [changes.event.delta_v for changes in body],
+            [changes.event.bound.covariance for changes in body],
+            events=events.events,
+            time=acceleration.time,
+            roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64),
+            start_roll_deg=at_point.levelling.roll_deg,
+            roll_rate_sd=effects.roll_bias_sd,
+            start_roll_sd_deg=at_point.levelling.sd_deg,
+        ),
         tuple(findings),
     )
-
-
-def resting_force(at_point: AtPoint, gravity: float) -> tuple[Array, Array]:
-    """Mean specific force before the crash and how well it is known, (3,) each, m/s².
-
-    Where there is no rest, gravity in the attitude that was stated.
-    """
-    rest, level = at_point.rest, at_point.levelling
-    if rest is None:
-        C_bn = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0]).T
-        tilt = gravity * math.radians(level.sd_deg)
-        return C_bn @ np.array([0.0, 0.0, -gravity]), np.array([tilt, tilt, 0.0])
-    imu = at_point.imu
-    within = (imu.index >= rest.start - 1e-9) & (imu.index <= rest.end + 1e-9)
-    mean = imu.loc[within, ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
-    noise = np.zeros(3) if rest.accel_mean_sd is None else np.asarray(rest.accel_mean_sd)
-    return mean, np.hypot(noise, at_point.rest_accel_sd)
 
 
 def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:

@@ -1,0 +1,107 @@
+"""What a unit says at a point of the vehicle, with everything that is not known of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.crash.sample_effects import SampleEffects, unit_effects
+from strapdown.results import RestStretch
+from strapdown.sensors.lever_arm import MovedImu, move_unit
+from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
+from strapdown.tables import ACCEL
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AtPoint:
+    """What a unit, or the mean of several, says at a point.
+
+    Attributes
+    ----------
+    name : str
+    imu : DataFrame
+        Imu table in vehicle axes, time from the common trigger.
+    effects : SampleEffects
+    levelling : Levelling
+    rest : RestStretch, optional
+    rest_accel_sd : float, m/s²
+        What is not known of the vehicle's own acceleration over the rest.
+    prepared : PreparedUnit, optional
+        What it is of; None for a mean of several.
+    moved : MovedImu, optional
+        How it came to the point.
+    """
+
+    name: str
+    imu: pd.DataFrame = field(repr=False)
+    effects: SampleEffects = field(repr=False)
+    levelling: Levelling
+    rest: RestStretch | None
+    rest_accel_sd: float = 0.0
+    prepared: PreparedUnit | None = field(default=None, repr=False)
+    moved: MovedImu | None = field(default=None, repr=False)
+
+    def resting_force(self, gravity: float) -> tuple[Array, Array]:
+        """Mean specific force before the crash and how well it is known, (3,) each, m/s².
+
+        Where there is no rest, gravity in the attitude that was stated.
+
+        Parameters
+        ----------
+        gravity : float, m/s²
+        """
+        rest, level = self.rest, self.levelling
+        if rest is None:
+            C_bn = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0]).T
+            tilt = gravity * math.radians(level.sd_deg)
+            return C_bn @ np.array([0.0, 0.0, -gravity]), np.array([tilt, tilt, 0.0])
+        within = (self.imu.index >= rest.start - 1e-9) & (self.imu.index <= rest.end + 1e-9)
+        mean = self.imu.loc[within, ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
+        noise = np.zeros(3) if rest.accel_mean_sd is None else np.asarray(rest.accel_mean_sd)
+        return mean, np.hypot(noise, self.rest_accel_sd)
+
+
+def at_point(
+    prepared: PreparedUnit,
+    point: Sequence[float],
+    *,
+    time_sd: float | None = None,
+    window: float | None = None,
+) -> AtPoint:
+    """Move a prepared unit to a point and list what is not known of it.
+
+    Parameters
+    ----------
+    prepared : PreparedUnit
+    point : sequence of float, (3,), m
+        Vehicle axes, from the vehicle's origin.
+    time_sd : float, s, optional
+        How well the unit's clock is known against the common one; that of its trigger, if not
+        given.
+    window : float, s, optional
+        Of the derivative, as `move_imu`.
+
+    Returns
+    -------
+    AtPoint
+    """
+    moved = move_unit(prepared, np.asarray(point, dtype=np.float64), window=window)
+    sd = prepared.unit.trigger_sd if time_sd is None else time_sd
+    return AtPoint(
+        prepared.unit.name,
+        moved.imu,
+        unit_effects(prepared, moved, time_sd=sd),
+        prepared.levelling,
+        prepared.rest,
+        prepared.rest_accel_sd,
+        prepared,
+        moved,
+    )

@@ -1,0 +1,170 @@
+"""A crash, from the records of its units to changes of velocity, direction of force and path."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.at_point import AtPoint, at_point
+from strapdown.crash.combine_units import combine_units
+from strapdown.crash.compare_units import UnitComparison, compare_units
+from strapdown.crash.entry import Entry
+from strapdown.crash.event_rule import PART_563, EventRule
+from strapdown.crash.path import WINDOW
+from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.unit_reconstruction import (
+    PEAK_WINDOW,
+    UnitReconstruction,
+    reconstruct_unit,
+)
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.mechanization import NorthEastDown
+from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
+
+
+@dataclass(frozen=True, eq=False)
+class CrashReconstruction:
+    """What the units say of a crash, each for itself and together.
+
+    Attributes
+    ----------
+    point : tuple of float, m
+        The reference point, vehicle axes from the vehicle's origin.
+    synchronised : SynchronisedUnits
+    units : tuple of UnitReconstruction
+        Each unit for itself, at the reference point.
+    comparison : UnitComparison or None
+        None for a single unit.
+    combined : UnitReconstruction or None
+        Of the weighted mean of the units, where it was asked for and there are several.
+    findings : tuple of Finding
+        What a person should know, of everything that was done.
+    """
+
+    point: tuple[float, float, float]
+    synchronised: SynchronisedUnits = field(repr=False)
+    units: tuple[UnitReconstruction, ...]
+    comparison: UnitComparison | None
+    combined: UnitReconstruction | None
+    findings: tuple[Finding, ...]
+
+    @property
+    def main(self) -> UnitReconstruction:
+        """The mean of the units, or the first one."""
+        return self.units[0] if self.combined is None else self.combined
+
+    def unit(self, name: str) -> UnitReconstruction:
+        """Find a unit by its name.
+
+        Raises
+        ------
+        ConfigError
+            There is none of that name.
+        """
+        for unit in self.units:
+            if unit.name == name:
+                return unit
+        raise ConfigError(
+            f"there is no unit '{name}'",
+            quantity="unit",
+            remedy=f"use one of {', '.join(u.name for u in self.units)}",
+        )
+
+
+def reconstruct_crash(
+    units: Sequence[CrashUnit],
+    entry: Entry | None,
+    *,
+    point: Sequence[float] = (0.0, 0.0, 0.0),
+    window: Sequence[float] = WINDOW,
+    rate: float = 200.0,
+    clock: str = "trigger",
+    combine: bool = True,
+    preparation: Mapping[str, Any] | None = None,
+    peak_window: float = PEAK_WINDOW,
+    rule: EventRule = PART_563,
+    gravity: float = STANDARD_GRAVITY,
+    mechanization: NorthEastDown | None = None,
+) -> CrashReconstruction:
+    """Reconstruct a crash.
+
+    Parameters
+    ----------
+    units : sequence of CrashUnit
+        Of one rigid vehicle, as recorded.
+    entry : Entry or None
+        Velocity, heading and instant that the path is tied to. None: the vehicle stood still at
+        the beginning of the record, and the path is told in its axes at the trigger.
+    point : sequence of float, (3,), m
+        Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
+    window : (float, float), s
+        Of the path, from the trigger.
+    rate : float, Hz
+        Of the common stamps. Faster channels are decimated without aliasing.
+    clock : {'trigger', 'correlation'}
+        As `synchronise`.
+    combine : bool
+        Also reconstruct the weighted mean of the units.
+    preparation : mapping, optional
+        Options of `prepare_unit`, for all units alike.
+    peak_window : float, s
+        Of the change of velocity that severity is usually told by.
+    rule : EventRule
+        What an event is: 49 CFR 563 by default.
+    gravity : float, m/s²
+        At the place.
+    mechanization : NorthEastDown, optional
+
+    Returns
+    -------
+    CrashReconstruction
+        All bounds hold 95 %. Without an event in the record there are no changes of velocity,
+        and a finding tells how near it came; the path is there all the same.
+
+    Raises
+    ------
+    DataError
+        A record cannot be used: the message names unit, sensor, row, quantity and remedy.
+    ConfigError
+        An option is out of range.
+    DivergenceError
+        A path left what a vehicle can do.
+    """
+    if not units:
+        raise DataError(
+            "there is none", quantity="units", remedy="give the record of at least one unit"
+        )
+    together = synchronise(units, method=clock, rate=rate)
+    findings = list(together.findings)
+    options = {"gravity": gravity, **(preparation or {})}
+    there: list[AtPoint] = []
+    for unit in together.units:
+        prepared = prepare_unit(unit.unit, **options)
+        findings += prepared.findings
+        there.append(at_point(prepared, point, time_sd=unit.time_sd))
+
+    def answers(of: AtPoint) -> UnitReconstruction:
+        return reconstruct_unit(
+            of,
+            entry,
+            window=window,
+            peak_window=peak_window,
+            rule=rule,
+            gravity=gravity,
+            mechanization=mechanization,
+        )
+
+    found = tuple(answers(of) for of in there)
+    comparison = compare_units(there) if len(there) > 1 else None
+    combined = answers(combine_units(there)) if combine and len(there) > 1 else None
+    for reconstruction in (*found, *(() if combined is None else (combined,))):
+        findings += reconstruction.findings
+    if comparison is not None:
+        findings += comparison.findings
+    x, y, z = (float(v) for v in point)
+    return CrashReconstruction(
+        (x, y, z), together, found, comparison, combined, tuple(dict.fromkeys(findings))
+    )
