@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.crash.unit_at_point import Contributor, UnitAtPoint
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.lever_arm import cross_matrix
 from strapdown.tables import imu_table
 
 Array = NDArray[np.float64]
@@ -90,6 +91,9 @@ def combine_units(units: Sequence[UnitAtPoint], method: str = "weighted") -> Uni
         noise=noise,
         gyro_noise=gyro_noise,
         contributors=tuple(contributors),
+        gyro_bias_sd=np.sqrt(
+            np.tensordot(quiet**2, np.array([u.gyro_bias_sd**2 for u in at]), axes=1)
+        ),
     )
 
 
@@ -117,6 +121,8 @@ def _at(unit: UnitAtPoint, time: Array) -> UnitAtPoint:
         noise=at(_with_lever(unit)),
         gyro_noise=at(unit.gyro_noise),
         contributors=tuple(replace(c, effect=at(c.effect)) for c in _all_contributors(unit)),
+        position_sd=0.0,
+        angles_sd=0.0,
         moved=None,
     )
 
@@ -127,12 +133,13 @@ def _with_lever(unit: UnitAtPoint) -> Array:
 
 
 def _all_contributors(unit: UnitAtPoint) -> tuple[Contributor, ...]:
-    if unit.moved is None or unit.position_sd == 0.0:
-        return unit.contributors
-    return (
-        *unit.contributors,
-        Contributor("position", unit.lever(), unit.position_sd**2 * np.eye(3)),
-    )
+    more: list[Contributor] = []
+    if unit.moved is not None and unit.position_sd > 0.0:
+        more.append(Contributor("position", unit.lever(), unit.position_sd**2 * np.eye(3)))
+    if unit.angles_sd > 0.0:
+        tilt = cross_matrix(unit.force)
+        more.append(Contributor("mounting angles", tilt, unit.angles_sd**2 * np.eye(3)))
+    return (*unit.contributors, *more)
 
 
 def _inverse_weights(units: Sequence[UnitAtPoint]) -> Array:

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.lever_arm_check import LeverArmCheck, check_lever_arm, lever_arm_findings
-from strapdown.crash.match_axes import AxisMatch, axis_findings, match_axes
+from strapdown.crash.lever_arm_check import check_lever_arm, lever_arm_findings
+from strapdown.crash.match_axes import axis_findings, match_axes
 from strapdown.crash.mounting_rotation import (
-    MountingRotation,
     mounting_rotation,
     rotation_findings,
 )
 from strapdown.crash.unit_at_point import UnitAtPoint
+from strapdown.crash.unit_comparison import UnitAgainstAll, UnitComparison, UnitPair
 from strapdown.crash.unit_differences import (
     VelocityIncrements,
     common_edges,
@@ -26,106 +25,11 @@ from strapdown.exceptions import ConfigError, Finding
 
 Array = NDArray[np.float64]
 
-__all__ = ["UnitAgainstAll", "UnitComparison", "UnitPair", "compare_units"]
+__all__ = ["compare_units"]
 
 AXES = ("forward", "right", "down")
 # Relative to the largest variance: below it a covariance is rounding.
 FLOOR = 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class UnitPair:
-    """Two units at their common point.
-
-    Attributes
-    ----------
-    first, second : str
-    edges : ndarray, (m + 1,), s
-    difference : ndarray, (m + 1, 3), m/s
-        Integral of the first one's specific force minus that of the second's, vehicle axes,
-        from the first edge.
-    sd : ndarray, (m + 1, 3), m/s
-        As both state it.
-    force_difference, force_sd : ndarray, (m, 3), m/s²
-        Means over each piece.
-    chi_square, freedom : float, int
-        Of all pieces and axes together, with their covariance.
-    probability : float
-        Of a chi-square as large or larger, where the statements are right.
-    agree : bool
-    axes : AxisMatch
-    turned : MountingRotation
-    lever_arm : LeverArmCheck
-    findings : tuple of Finding
-    """
-
-    first: str
-    second: str
-    edges: Array
-    difference: Array
-    sd: Array
-    force_difference: Array
-    force_sd: Array
-    chi_square: float
-    freedom: int
-    probability: float
-    agree: bool
-    axes: AxisMatch
-    turned: MountingRotation
-    lever_arm: LeverArmCheck
-    findings: tuple[Finding, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class UnitAgainstAll:
-    """One unit against the combination of all.
-
-    Attributes
-    ----------
-    name : str
-    difference, sd : ndarray, (m + 1, 3), m/s
-        Its delta-V minus the combination's, and as stated: what it shares with the combination
-        is taken into account.
-    chi_square, freedom, probability
-        As `UnitPair`.
-    """
-
-    name: str
-    difference: Array
-    sd: Array
-    chi_square: float
-    freedom: int
-    probability: float
-
-
-@dataclass(frozen=True, eq=False)
-class UnitComparison:
-    """All units of a vehicle at one point.
-
-    Attributes
-    ----------
-    edges : ndarray, (m + 1,), s
-    pairs : tuple of UnitPair
-    combined : ndarray, (m + 1, 3), m/s
-        Delta-V of the best weighted combination, gravity still in it, body axes.
-    combined_sd : ndarray, (m + 1, 3), m/s
-    against : tuple of UnitAgainstAll
-    chi_square, freedom, probability
-        Of all units against the combination.
-    agree : bool
-    findings : tuple of Finding
-    """
-
-    edges: Array
-    pairs: tuple[UnitPair, ...]
-    combined: Array
-    combined_sd: Array
-    against: tuple[UnitAgainstAll, ...]
-    chi_square: float
-    freedom: int
-    probability: float
-    agree: bool
-    findings: tuple[Finding, ...]
 
 
 def compare_units(

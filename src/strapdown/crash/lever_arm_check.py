@@ -73,7 +73,7 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
         )
     lever = np.mean(shares, axis=0)
     difference = (first.values - second.values).ravel()
-    covariance = first.covariance + second.covariance
+    covariance = first.without_position + second.without_position
     covariance = covariance + 1e-12 * np.trace(covariance) / len(covariance) * np.eye(
         len(covariance)
     )

@@ -94,7 +94,7 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
     """
     variance = float(np.trace(first.whole + second.whole)) / first.values.size
     accel, lead, sure, other = _best(first.values, second.values, variance)
-    turn = first.turn_sd**2 + second.turn_sd**2
+    turn = float(np.trace(first.turned_covariance + second.turned_covariance)) / first.turned.size
     gyro, gyro_lead, gyro_sure, _ = _best(first.turned, second.turned, turn)
     return AxisMatch(accel, gyro, lead, gyro_lead, sure, gyro_sure, other)
 

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.crash.unit_differences import VelocityIncrements
 from strapdown.exceptions import Finding
+from strapdown.sensors.lever_arm import cross_matrix
 
 Array = NDArray[np.float64]
 
 __all__ = ["MountingRotation", "mounting_rotation", "rotation_findings"]
 
 SIGMAS = 4.0
+ROUNDS = 3
+FLOOR, TINY = 1e-12, 1e-30
 # A direction about which less is known than this is not known.
 MOST_SD = 0.2  # rad
 
@@ -63,21 +66,16 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
     Notes
     -----
     The rotation of least squares (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
-    1988, J. Astronaut. Sci. 36, 245), forces and rates weighed by their stated variances. Its
-    covariance is the inverse of ``sum w (|b|² I - b bᵀ)`` over the vectors b (Shuster and Oh
-    1981, doi:10.2514/3.19717).
+    1988, J. Astronaut. Sci. 36, 245), forces and rates weighed by their stated variances; then
+    steps of Gauss and Newton with the whole covariances, since a bias is the same in every
+    piece. Its covariance is the inverse of their normal matrix.
     """
-    force = float(np.trace(first.whole + second.whole)) / first.values.size
-    turn = first.turn_sd**2 + second.turn_sd**2
-    a = np.vstack([first.values / max(force, 1e-30) ** 0.5, first.turned / max(turn, 1e-30) ** 0.5])
-    b = np.vstack(
-        [second.values / max(force, 1e-30) ** 0.5, second.turned / max(turn, 1e-30) ** 0.5]
-    )
-    u, _, vt = np.linalg.svd(a.T @ b)
-    C = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    turned = b @ C.T
-    misfit = float(np.sqrt(((a - turned) ** 2).sum() / (a.size - 3)))
-    normal = (turned**2).sum() * np.eye(3) - turned.T @ turned
+    C = _wahba(first, second)
+    normal, step, square = np.eye(3), np.zeros(3), 0.0
+    for _ in range(ROUNDS):
+        normal, step, square = _refine(first, second, C)
+        C = rotation.dcm_from_rotation_vector(step) @ C
+    misfit = float(np.sqrt(max(square, 0.0) / (first.values.size + first.turned.size - 3)))
     values, vectors = np.linalg.eigh(normal)
     variances = np.minimum(max(1.0, misfit) ** 2 / np.maximum(values, 1e-12), np.pi**2)
     return MountingRotation(
@@ -86,6 +84,39 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
         np.asarray((vectors * variances) @ vectors.T),
         misfit,
     )
+
+
+def _wahba(first: VelocityIncrements, second: VelocityIncrements) -> Array:
+    """Rotation of least squares, each kind of vector with one variance."""
+    force = float(np.trace(first.without_angles + second.without_angles)) / first.values.size
+    turn = float(np.trace(first.turned_covariance + second.turned_covariance)) / first.turned.size
+    product = first.values.T @ second.values / max(force, TINY)
+    product = product + first.turned.T @ second.turned / max(turn, TINY)
+    u, _, vt = np.linalg.svd(product)
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def _refine(
+    first: VelocityIncrements, second: VelocityIncrements, C: Array
+) -> tuple[Array, Array, float]:
+    """Normal matrix, small rotation and chi-square of the residuals, by all covariances."""
+    normal, right, square = np.zeros((3, 3)), np.zeros(3), 0.0
+    for a, b, own, other in (
+        (first.values, second.values, first.without_angles, second.without_angles),
+        (first.turned, second.turned, first.turned_covariance, second.turned_covariance),
+    ):
+        turned = b @ C.T
+        blocks = np.kron(np.eye(len(a)), C)
+        covariance = own + blocks @ other @ blocks.T
+        covariance += max(FLOOR * float(np.diag(covariance).max()), TINY) * np.eye(len(covariance))
+        # (1 + [φ×]) v = v - [v×] φ.
+        effect, left = -cross_matrix(turned).reshape(-1, 3), (a - turned).ravel()
+        weighed = np.linalg.solve(covariance, np.column_stack([effect, left]))
+        normal += effect.T @ weighed[:, :3]
+        right += effect.T @ weighed[:, 3]
+        square += float(left @ weighed[:, 3])
+    step = np.linalg.lstsq(normal, right, rcond=1e-9)[0]
+    return normal, np.asarray(step, dtype=np.float64), square - float(right @ step)
 
 
 def rotation_findings(

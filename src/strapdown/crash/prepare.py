@@ -42,6 +42,7 @@ def prepare_unit(
     gravity: float = 9.80665,
     rest: str | tuple[float, float] = "auto",
     levelling: tuple[float, float, float] | None = None,
+    impact: float = 0.0,
     moving_at_impact: bool = True,
     steady_acceleration: float = 0.3,
     steady_rate: float = 0.01,
@@ -67,6 +68,8 @@ def prepare_unit(
         lowest range is then taken from gravity in that attitude, where this says more of it
         than is stated: so are channels that were zeroed before the test given back what they
         lost.
+    impact : float, s
+        Of the first contact, where the trigger is known to be late or early.
     moving_at_impact : bool
         As `find_pre_crash_rest`.
     steady_acceleration : float, m/s²
@@ -105,8 +108,10 @@ def prepare_unit(
     findings: list[Finding] = [*data.findings]
     findings += saturation_findings(unit, data, limits, gyro_limits)
 
-    own = _find_rest(unit, data, rest, moving_at_impact, noise[0], gyro_noise)
-    findings += rest_findings(unit, data.time, own, levelling is not None, steady_acceleration)
+    own = _find_rest(unit, data, rest, impact, moving_at_impact, noise[0], gyro_noise)
+    findings += rest_findings(
+        unit, data.time, impact, own, levelling is not None, steady_acceleration
+    )
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
     turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=steady_rate)
 
@@ -177,6 +182,7 @@ def _find_rest(
     unit: CrashUnit,
     data: UnitArrays,
     rest: str | tuple[float, float],
+    impact: float,
     moving: bool,
     noise: Array,
     gyro_noise: Array,
@@ -189,6 +195,7 @@ def _find_rest(
         return rest_between(table, *rest)
     return find_pre_crash_rest(
         table,
+        impact=impact,
         moving_at_impact=moving,
         accel_noise=float(np.median(noise, axis=0).max()),
         gyro_noise=float(np.median(gyro_noise, axis=0).max()),

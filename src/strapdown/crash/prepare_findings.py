@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 # Beyond this many standard deviations a number contradicts what is stated of it.
 SIGMAS = 4.0
+# A record that begins less than this before the impact has no stretch before it.
+SHORTEST = 0.05  # s
 # Of a specific force at rest that was read in g.
 NEAR_ONE = (0.8, 1.2)
 
@@ -25,6 +27,7 @@ NEAR_ONE = (0.8, 1.2)
 def rest_findings(
     unit: CrashUnit,
     time: Array,
+    impact: float,
     rest: RestStretch | None,
     levelled: bool,
     steady_acceleration: float,
@@ -37,15 +40,15 @@ def rest_findings(
         There is neither, and no levelling is stated.
     """
     if rest is None:
-        if time[0] > -0.05:
+        if time[0] > impact - SHORTEST:
             what = (
-                f"the record starts at {time[0]:.4g} s, in the crash (the trigger is at zero): "
+                f"the record starts at {time[0]:.4g} s, in the crash (impact at {impact:.4g} s): "
                 "nothing before it tells biases or attitude"
             )
         else:
             what = (
                 f"no stationary stretch and none at a constant velocity between {time[0]:.4g} s "
-                "and the trigger"
+                f"and the impact at {impact:.4g} s"
             )
         if not levelled:
             raise DataError(

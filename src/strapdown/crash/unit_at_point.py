@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -62,6 +62,8 @@ class UnitAtPoint:
         Of each coordinate.
     angles_sd : float, rad
         Of each mounting angle.
+    gyro_bias_sd : ndarray, (3,), rad/s
+        What is left of it, vehicle axes.
     moved : MovedImu, optional
         How it came to the point; None for a unit that sits there.
     """
@@ -74,6 +76,7 @@ class UnitAtPoint:
     position: Array = field(default_factory=lambda: np.zeros(3))
     position_sd: float = 0.0
     angles_sd: float = 0.0
+    gyro_bias_sd: Array = field(default_factory=lambda: np.zeros(3))
     moved: MovedImu | None = None
 
     @property
@@ -98,6 +101,33 @@ class UnitAtPoint:
         alpha = self.moved.angular_acceleration
         return lever_matrix(alpha, self.moved.slope.value_of(self.rate))
 
+    def within(self, start: float, end: float) -> UnitAtPoint:
+        """The part of the record that integrals from start to end need, s."""
+        width = 2 if self.moved is None else self.moved.slope.slope.shape[1] + 2
+        a = max(int(np.searchsorted(self.time, start)) - width, 0)
+        b = min(int(np.searchsorted(self.time, end)) + width, len(self.imu))
+        rows = slice(a, b)
+        moved = self.moved
+        if moved is not None:
+            slope = moved.slope
+            # Rows whose windows are cut here lie outside start and end.
+            first = np.clip(slope.first[rows] - a, 0, max(b - a - slope.slope.shape[1], 0))
+            moved = replace(
+                moved,
+                imu=moved.imu.iloc[rows],
+                angular_acceleration=moved.angular_acceleration[rows],
+                added=moved.added[rows],
+                slope=replace(slope, first=first, slope=slope.slope[rows], value=slope.value[rows]),
+            )
+        return replace(
+            self,
+            imu=self.imu.iloc[rows],
+            noise=self.noise[rows],
+            gyro_noise=self.gyro_noise[rows],
+            contributors=tuple(replace(c, effect=c.effect[rows]) for c in self.contributors),
+            moved=moved,
+        )
+
     def noise_of_sums(self, weights: Array) -> Array:
         """Covariance of weighted sums of the specific force from the noise of the samples.
 
@@ -112,7 +142,7 @@ class UnitAtPoint:
             it, with its correlation from sample to sample: it all but cancels in a delta-V.
         """
         m = len(weights)
-        spread = np.einsum("an,nik->aink", weights, _root_of(self.noise)).reshape(3 * m, -1)
+        spread = np.einsum("an,nik->aink", weights, root_of(self.noise)).reshape(3 * m, -1)
         out = spread @ spread.T
         if self.moved is None or not self.moved.lever_arm.any():
             return np.asarray(out)
@@ -124,7 +154,7 @@ class UnitAtPoint:
             for other in range(3):
                 rows = weights * turn[:, axis, other]
                 effect[:, :, axis, other] += slope.weighted(rows)[1]
-        half = np.einsum("anij,njk->aink", effect, _root_of(self.gyro_noise)).reshape(3 * m, -1)
+        half = np.einsum("anij,njk->aink", effect, root_of(self.gyro_noise)).reshape(3 * m, -1)
         return np.asarray(out + half @ half.T)
 
 
@@ -149,7 +179,8 @@ def unit_at_point(
     -------
     UnitAtPoint
         Its contributors are, per range: bias, scale factor, misalignment, nonlinearity, each
-        where that range spoke; mounting angles, position and trigger. Vibration rectification
+        where that range spoke; and the trigger. Position and mounting angles are kept apart,
+        since a comparison looks for them. Vibration rectification
         is left out. Errors of the levelling are all units' alike on one vehicle and no
         reason to differ.
     """
@@ -162,9 +193,6 @@ def unit_at_point(
         speaks = (prepared.range_spoken == j).astype(np.float64)
         found += _of_range(prepared, j, triad.name, own, speaks, C)
     angles = math.radians(unit.mounting.angles_sd_deg)
-    force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
-    if angles > 0.0:
-        found.append(Contributor("mounting angles", -cross_matrix(force), angles**2 * np.eye(3)))
     if unit.trigger_sd > 0.0:
         at = moved.imu[ACCEL].to_numpy(dtype=np.float64)
         change = np.gradient(at, moved.imu.index.to_numpy(dtype=np.float64), axis=0)
@@ -178,11 +206,12 @@ def unit_at_point(
         position=np.asarray(unit.mounting.position),
         position_sd=unit.mounting.position_sd,
         angles_sd=angles,
+        gyro_bias_sd=np.sqrt(C**2 @ np.asarray(prepared.gyro_bias_sd) ** 2),
         moved=moved,
     )
 
 
-def _root_of(covariances: Array) -> Array:
+def root_of(covariances: Array) -> Array:
     """Matrices whose product with their transpose is the covariance of each sample."""
     values, vectors = np.linalg.eigh(covariances)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_at_point import UnitAtPoint
+from strapdown.crash.unit_at_point import UnitAtPoint, root_of
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.lever_arm import cross_matrix
 
 Array = NDArray[np.float64]
 
@@ -25,15 +26,16 @@ class VelocityIncrements:
     edges : ndarray, (m + 1,), s
     values : ndarray, (m, 3), m/s
     covariance : ndarray, (3 m, 3 m), (m/s)²
-        Noise and every contributor, but not what is not known of the position: that is
-        `position_sd` times `lever`.
+        Noise and every contributor, but not what is not known of position and mounting angles.
     lever : ndarray, (3 m, 3), 1/s
         What an error of the position (true minus stated) does to them.
     position_sd : float, m
+    angles_sd : float, rad
+        Of each mounting angle.
     turned : ndarray, (m, 3), rad
         Integrals of the rates.
-    turn_sd : float, rad
-        Noise of these, root mean square over pieces and axes.
+    turned_covariance : ndarray, (3 m, 3 m), rad²
+        Noise and bias of the gyro, but not the mounting angles.
     """
 
     edges: Array
@@ -41,12 +43,25 @@ class VelocityIncrements:
     covariance: Array
     lever: Array
     position_sd: float
+    angles_sd: float
     turned: Array
-    turn_sd: float
+    turned_covariance: Array
 
     @property
     def whole(self) -> Array:
-        """Covariance with the position's share."""
+        """Covariance with the shares of position and mounting angles."""
+        place = self.position_sd**2 * (self.lever @ self.lever.T)
+        return np.asarray(self.without_position + place)
+
+    @property
+    def without_position(self) -> Array:
+        """Covariance with the share of the mounting angles."""
+        tilt = cross_matrix(self.values).reshape(-1, 3)
+        return np.asarray(self.covariance + self.angles_sd**2 * (tilt @ tilt.T))
+
+    @property
+    def without_angles(self) -> Array:
+        """Covariance with the share of the position."""
         return np.asarray(self.covariance + self.position_sd**2 * (self.lever @ self.lever.T))
 
 
@@ -137,6 +152,7 @@ def velocity_increments(unit: UnitAtPoint, edges: Array) -> VelocityIncrements:
     VelocityIncrements
         In body axes, which turn: what two units on one body share at every instant.
     """
+    unit = unit.within(float(edges[0]), float(edges[-1]))
     weights = sum_weights(unit.time, edges, str(unit.imu.attrs["sampling"]))
     m = len(weights)
     covariance = unit.noise_of_sums(weights)
@@ -144,13 +160,15 @@ def velocity_increments(unit: UnitAtPoint, edges: Array) -> VelocityIncrements:
         effect = np.einsum("an,nik->aik", weights, c.effect).reshape(3 * m, -1)
         covariance = covariance + effect @ c.covariance @ effect.T
     lever = np.einsum("an,nik->aik", weights, unit.lever()).reshape(3 * m, 3)
-    turn = np.einsum("an,an,nii->a", weights, weights, unit.gyro_noise) / 3.0
+    constant = np.kron(weights.sum(axis=1)[:, None], np.diag(unit.gyro_bias_sd))
+    spread = np.einsum("an,nik->aink", weights, root_of(unit.gyro_noise)).reshape(3 * m, -1)
     return VelocityIncrements(
         edges,
         weights @ unit.force,
         np.asarray(0.5 * (covariance + covariance.T)),
         lever,
         unit.position_sd,
+        unit.angles_sd,
         weights @ unit.rate,
-        float(np.sqrt(turn.mean())),
+        np.asarray(spread @ spread.T + constant @ constant.T),
     )

@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84
 from strapdown.results import RestStretch
-from strapdown.sensors.rest import MAX_GYRO_SD, MAX_MEAN_RATE, find_rests, rest_between
+from strapdown.sensors.rest import (
+    LEAST_LENGTH,
+    MAX_GYRO_SD,
+    MAX_MEAN_RATE,
+    find_rests,
+    rest_between,
+)
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -81,14 +87,16 @@ def find_pre_crash_rest(
     if len(before) < LEAST_IN_BLOCK:
         return None
     floors = (accel_noise, gyro_noise)
-    candidates = find_rests(before[GYRO])
+    stamps = before.index.to_numpy(dtype=np.float64)
+    candidates = [(r.start, r.end) for r in find_rests(before[GYRO])]
+    # A fast gyro is noisier in each sample than any that `find_rests` takes for quiet.
+    if not candidates:
+        candidates = [(float(stamps[0]), float(stamps[-1]))]
     spans = [
         span
-        for rest in candidates
-        for span in _parts(
-            before[(before.index >= rest.start) & (before.index <= rest.end)], LONG_BLOCK, floors
-        )
-        if span[1] - span[0] >= 1.0
+        for start, end in candidates
+        for span in _parts(before[(stamps >= start) & (stamps <= end)], LONG_BLOCK, floors)
+        if _length(span) >= LEAST_LENGTH
     ]
     still = [s for s in spans if s[1] < impact - LAST_STOP or not moving_at_impact]
     if still:
@@ -96,7 +104,7 @@ def find_pre_crash_rest(
         best = max(recent, key=_length) if recent else max(still, key=lambda s: s[1])
         return rest_between(before, *best, grade="still")
     if not spans:
-        late = before[before.index >= impact - SHORT_REACH]
+        late = before[stamps >= impact - SHORT_REACH]
         spans = [s for s in _parts(late, SHORT_BLOCK, floors) if _length(s) >= LEAST_STEADY]
     if not spans:
         return None

@@ -109,6 +109,7 @@ def test_honest_units_agree_and_their_chi_square_is_one():
     for k in range(25):
         units = [unit(n, p, 10 * k + i) for i, (n, p) in enumerate((("A", A), ("B", B), ("C", C)))]
         out = compare_units(units)
+        assert not out.findings
         assert all(p.axes.kind == "agree" for p in out.pairs)
         chi.append([p.chi_square for p in out.pairs])
         freedom = out.pairs[0].freedom
@@ -119,15 +120,6 @@ def test_honest_units_agree_and_their_chi_square_is_one():
     assert 1.0 - 5 * math.sqrt(2 / freedom / 25) < mean < 1.0 + 5 * math.sqrt(2 / freedom / 25)
     assert np.mean(total) == pytest.approx(1.0, abs=5 * math.sqrt(2 / (2 * freedom) / 25))
     assert np.mean(np.array(against) < 0.5) == pytest.approx(0.5, abs=5 * 0.5 / math.sqrt(25))
-
-
-def test_false_alarms_are_as_rare_as_stated():
-    findings = [
-        f
-        for k in range(20)
-        for f in compare_units([unit("A", A, k), unit("B", B, 1000 + k)]).findings
-    ]
-    assert not findings
 
 
 def test_units_of_different_rates_are_compared_without_resampling():
