@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import pymap3d
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from strapdown import rotation
 from strapdown.crash.indices.asi import asi
@@ -23,6 +22,7 @@ from strapdown.crash.indices.pulse import from_start, integrals
 from strapdown.crash.indices.thiv import thiv
 from strapdown.crash.severity import find_severity_model
 from strapdown.crash.severity_model import injury_risk
+from strapdown.dsp.channel_class import cfc_filter
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.formats.nhtsa_select import accelerations, imu_of
 from strapdown.increments import motion_increments
@@ -42,8 +42,7 @@ ZERO_SPEED = 0.02
 
 
 def channel_class(values, cfc):
-    """Channel frequency class by SAE J211: two passes of two poles, wd = 2π 2.0775 CFC."""
-    return sosfiltfilt(butter(2, 2.0775 * cfc, fs=1.0 / STEP, output="sos"), values)
+    return cfc_filter(values, STEP, cfc, "sae")
 
 
 def zeroed(test, number):
