@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,8 @@ TOGETHER = 64
 
 
 def ratios() -> Iterator[Ratio]:
+    from numba import njit
+
     from strapdown._kernels.ned import ROW, ned_advance
     from strapdown.crash.monte_carlo import sample_paths
 
@@ -26,10 +28,16 @@ def ratios() -> Iterator[Ratio]:
     steps = len(leg.rows)
     nothing = np.empty(0)
 
+    @njit(nogil=True, error_model="numpy")
+    def many(state, rows, reference, earth, options, history, runs):
+        own = state.copy()
+        for _ in range(runs):
+            own[:] = state
+            ned_advance(own, rows, reference, earth, options, history)
+
     def bare(_: int) -> None:
         history = np.empty((steps, ROW))
-        for _ in range(TOGETHER):
-            ned_advance(leg.state.copy(), leg.rows, nothing, leg.earth, leg.options, history)
+        many(leg.state, leg.rows, nothing, leg.earth, leg.options, history, TOGETHER)
 
     def mechanization() -> None:
         with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -44,3 +52,18 @@ def ratios() -> Iterator[Ratio]:
         "ns",
         3.0,
     )
+
+
+def _path() -> Any:
+    """Path of a simulated pole impact from its entry on, with everything that is not known."""
+    from strapdown.crash.entry import Entry
+    from strapdown.simulation.crash_recording import record_crash
+    from strapdown.simulation.crash_scenarios import find_crash
+    from strapdown.simulation.paper_recorders import paper_units
+    from strapdown.systems.crash_reconstruction import reconstruct_crash
+
+    crash = find_crash("pole")
+    design = next(d for d in paper_units() if d.gyro is not None)
+    unit, _ = record_crash(crash.motion, design, impact=crash.impacts[0], seed=1)
+    entry = Entry.from_speed(7.1, 0.05, slip_sd_deg=1.0)
+    return reconstruct_crash([unit], entry, rate=RATE, window=(0.0, 0.75)).main.path
