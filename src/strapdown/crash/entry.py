@@ -31,9 +31,10 @@ class Entry:
     heading_deg : float, deg
         Of the vehicle, clockwise from north. Where the path is told in axes of the vehicle at
         the entry, zero: "north" is then forward at the entry, "east" right of it.
-    unknowns : tuple of (name, contributor, nine numbers)
+    unknowns : tuple of (name, contributor, nine or fifteen numbers)
         What one standard deviation of each independent unknown does to attitude (rotation vector
-        in local level, rad), velocity (m/s) and place (m).
+        in local level, rad), velocity (m/s) and place (m); and, for what was estimated with them,
+        to every sample of the rates (rad/s) and of the specific force (m/s²), vehicle axes.
     attitude_deg : tuple of float, deg, optional
         Roll and pitch at that instant, where they are known from elsewhere than the rest.
     lat_deg, lon_deg, alt : float, deg, m

@@ -176,8 +176,8 @@ def reconstruct_path(
     start = np.zeros((len(names), 9))
     start[: len(begin.errors)] = begin.errors
     if origin.unknowns:
-        start[-len(origin.unknowns) :] = [u[2] for u in origin.unknowns]
-    padded = _padded(effects, len(names) - len(effects.names))
+        start[-len(origin.unknowns) :] = [u[2][:9] for u in origin.unknowns]
+    padded = _padded(effects, len(begin.names), [u[2][9:] for u in origin.unknowns])
     back = make_leg(
         mechanization, begin.state, imu, padded, slice(first, anchor + 1), backward=True
     )
@@ -310,13 +310,17 @@ def _rows(
     return first, anchor, last
 
 
-def _padded(effects: SampleEffects, more: int) -> SampleEffects:
-    """Effects with unknowns that act on no sample."""
+def _padded(
+    effects: SampleEffects, more: int, constants: Sequence[Sequence[float]]
+) -> SampleEffects:
+    """Effects with unknowns that act on no sample, and others that act on all alike."""
     n = len(effects.force_noise)
+    each = np.array([c if len(c) else (0.0,) * 6 for c in constants]).reshape(-1, 1, 6)
+    none, rest = np.zeros((more, n, 3)), np.tile(each, (1, n, 1))
     return replace(
         effects,
-        force=np.concatenate([effects.force, np.zeros((more, n, 3))]),
-        rate=np.concatenate([effects.rate, np.zeros((more, n, 3))]),
+        force=np.concatenate([effects.force, none, rest[:, :, 3:]]),
+        rate=np.concatenate([effects.rate, none, rest[:, :, :3]]),
     )
 
 

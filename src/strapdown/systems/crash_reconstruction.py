@@ -12,6 +12,7 @@ from strapdown.crash.combine_units import combine_units
 from strapdown.crash.compare_units import UnitComparison, compare_units
 from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import PART_563, EventRule
+from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.path import WINDOW
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.unit_reconstruction import (
@@ -76,7 +77,7 @@ class CrashReconstruction:
 
 def reconstruct_crash(
     units: Sequence[CrashUnit],
-    entry: Entry | None,
+    entry: Entry | GnssEntry | None,
     *,
     point: Sequence[float] = (0.0, 0.0, 0.0),
     window: Sequence[float] = WINDOW,
@@ -95,8 +96,10 @@ def reconstruct_crash(
     ----------
     units : sequence of CrashUnit
         Of one rigid vehicle, as recorded.
-    entry : Entry or None
-        Velocity, heading and instant that the path is tied to. None: the vehicle stood still at
+    entry : Entry, GnssEntry or None
+        Velocity, heading and instant that the path is tied to; or fixes of a satellite receiver
+        before the crash, from which each unit finds them together with its biases (the mean of
+        the units is then tied to the entry of the first). None: the vehicle stood still at
         the beginning of the record, and the path is told in its axes at the trigger.
     point : sequence of float, (3,), m
         Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
@@ -146,10 +149,16 @@ def reconstruct_crash(
         findings += prepared.findings
         there.append(at_point(prepared, point, time_sd=unit.time_sd))
 
-    def answers(of: AtPoint) -> UnitReconstruction:
+    tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
+    if isinstance(entry, GnssEntry):
+        for k, of in enumerate(there):
+            there[k], tied[k], state = start_from_gnss(of, entry, point)
+            findings += state.findings
+
+    def answers(of: AtPoint, start: Entry | None) -> UnitReconstruction:
         return reconstruct_unit(
             of,
-            entry,
+            start,
             window=window,
             peak_window=peak_window,
             rule=rule,
@@ -157,9 +166,9 @@ def reconstruct_crash(
             mechanization=mechanization,
         )
 
-    found = tuple(answers(of) for of in there)
+    found = tuple(answers(of, start) for of, start in zip(there, tied, strict=True))
     comparison = compare_units(there) if len(there) > 1 else None
-    combined = answers(combine_units(there)) if combine and len(there) > 1 else None
+    combined = answers(combine_units(there), tied[0]) if combine and len(there) > 1 else None
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings
     if comparison is not None:
