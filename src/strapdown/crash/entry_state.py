@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.crash.angle_rates import angle_rates
 from strapdown.exceptions import Finding
 from strapdown.nav_state import NavState
 
@@ -110,15 +111,7 @@ class EntryState:
     @property
     def roll_pitch_heading_sd(self) -> Array:
         """Standard deviations of these angles to first order, (3,), deg; not near a pitch of 90."""
-        _, pitch, heading = np.radians(self.state.roll_pitch_heading)
-        c, s, secant, tangent = np.cos(heading), np.sin(heading), 1.0 / np.cos(pitch), np.tan(pitch)
-        turned = np.array(
-            [
-                [c * secant, s * secant, 0.0],
-                [-s, c, 0.0],
-                [c * tangent, s * tangent, 1.0],
-            ]
-        )
+        turned = angle_rates(self.state.roll_pitch_heading[None])[0]
         block = turned @ self.covariance[ATTITUDE, ATTITUDE] @ turned.T
         return np.asarray(np.degrees(np.sqrt(np.diag(block))))
 

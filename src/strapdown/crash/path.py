@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown import frames, rotation
 from strapdown._kernels.ned import ALT, LAT, LON, Q, V
+from strapdown.crash.angle_rates import angle_rates
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
 from strapdown.crash.sample_effects import SampleEffects
@@ -82,7 +83,7 @@ class CrashPath:
         Of the angles to first order, away from a pitch of 90 deg.
         """
         root = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
-        to_angles = _angle_rates(self.table[EULER].to_numpy())
+        to_angles = angle_rates(self.table[EULER].to_numpy())
         turned = np.einsum("nij,njk,nlk->nil", to_angles, self.covariance[:, :3, :3], to_angles)
         angles = np.degrees(np.sqrt(np.diagonal(turned, axis1=1, axis2=2)))
         values = np.concatenate([root[:, PLACE], root[:, VELOCITY], angles], axis=1)
@@ -359,18 +360,6 @@ def _states(leg: Leg) -> Array:
     if leg.backward:
         states[:, V : V + 3] *= -1.0
     return states
-
-
-def _angle_rates(angles: Array) -> Array:
-    """Small turn in local level to changes of roll, pitch, heading, (n, 3, 3), rad per rad."""
-    pitch, heading = np.radians(angles[:, 1]), np.radians(angles[:, 2])
-    c, s = np.cos(heading), np.sin(heading)
-    out = np.zeros((len(angles), 3, 3))
-    out[:, 0, 0], out[:, 0, 1] = c / np.cos(pitch), s / np.cos(pitch)
-    out[:, 1, 0], out[:, 1, 1] = -s, c
-    out[:, 2, 0], out[:, 2, 1] = c * np.tan(pitch), s * np.tan(pitch)
-    out[:, 2, 2] = 1.0
-    return out
 
 
 def _triple(values: Array) -> tuple[float, float, float]:

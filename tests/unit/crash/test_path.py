@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown._kernels.perturbed_runs import perturbed_runs
@@ -22,7 +23,6 @@ from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.earth_motion import Origin
 from strapdown.tables import ACCEL, GYRO, NED
-from tests.unit.crash.crash_case import RATE, prepared
 
 IMPACT = 2.0
 LENGTH = 0.113
@@ -89,7 +89,7 @@ def _again(rate):
 
 
 def test_backward_and_forward_meet(case):
-    _, imu, unit, effects, entry, path = case
+    _, imu, unit, effects, _, path = case
     # Tied to its own state 0.5 s later, the path is the same.
     row = int(np.searchsorted(path.time, 0.5))
     late = path.table.iloc[row]
