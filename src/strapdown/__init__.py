@@ -16,6 +16,11 @@ Three lines that answer a question::
     import strapdown
     bench = strapdown.bench_attitude("alexiev-fig4", rate=100)
     print(bench.summary)
+
+And of a crash, from the records of its units (see the page "Crash" of the manual)::
+
+    crash = strapdown.reconstruct_crash(units, strapdown.Entry.from_speed(14.0, 0.3))
+    print(crash.summary())
 """
 
 from __future__ import annotations
@@ -23,9 +28,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from strapdown.crash.entry import Entry
+    from strapdown.crash.monte_carlo import sample_paths
     from strapdown.evaluation.trajectory_differences import trajectory_differences
     from strapdown.evaluation.trajectory_summary import summarise_differences
     from strapdown.formats import read_log
+    from strapdown.formats.nhtsa import read_nhtsa
     from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.formats.trajectory_writers import write_trajectory
     from strapdown.increments import motion_increments
@@ -35,21 +43,32 @@ if TYPE_CHECKING:
     from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
+    from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+    from strapdown.sensors.triad_uncertainty import TriadUncertainty
     from strapdown.systems.attitude_bench import bench_attitude
+    from strapdown.systems.crash_reconstruction import reconstruct_crash
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "CrashUnit",
+    "Entry",
+    "Mounting",
     "NavState",
     "NavTracker",
     "NorthEastDown",
+    "RecordedTriad",
+    "TriadUncertainty",
     "__version__",
     "bench_attitude",
     "motion_increments",
     "read_log",
+    "read_nhtsa",
     "read_trajectory",
+    "reconstruct_crash",
     "reproduce",
     "run_mechanization",
+    "sample_paths",
     "simulate",
     "summarise_differences",
     "trajectory_differences",
@@ -60,15 +79,23 @@ __all__ = [
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
+    "CrashUnit": "strapdown.sensors.crash_unit",
+    "Entry": "strapdown.crash.entry",
+    "Mounting": "strapdown.sensors.crash_unit",
     "NavState": "strapdown.nav_state",
     "NavTracker": "strapdown.mechanization",
     "NorthEastDown": "strapdown.mechanization",
+    "RecordedTriad": "strapdown.sensors.crash_unit",
+    "TriadUncertainty": "strapdown.sensors.triad_uncertainty",
     "bench_attitude": "strapdown.systems.attitude_bench",
     "motion_increments": "strapdown.increments",
     "read_log": "strapdown.formats",
+    "read_nhtsa": "strapdown.formats.nhtsa",
     "read_trajectory": "strapdown.formats.trajectory_readers",
+    "reconstruct_crash": "strapdown.systems.crash_reconstruction",
     "reproduce": "strapdown.report.reproduction",
     "run_mechanization": "strapdown.mechanization",
+    "sample_paths": "strapdown.crash.monte_carlo",
     "simulate": "strapdown.report.simulation",
     "summarise_differences": "strapdown.evaluation.trajectory_summary",
     "trajectory_differences": "strapdown.evaluation.trajectory_differences",

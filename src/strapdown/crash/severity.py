@@ -2,8 +2,8 @@
 
 A model is here only if its table can be named. URGENCY and its successors (Malliaris 1997,
 Bahouth 2004, Kononen 2011) and the MAIS3+ model of the planner by Geisslinger and others (2023)
-are not: their coefficients were found in programs, and no table of a publication was at hand to
-hold them against. `severity_file.load_severity_model` takes them from a user who has the source.
+are not: their coefficients were found in programs that name no table of a publication.
+`severity_file.load_severity_model` takes them from a user who has the source.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ __all__ = ["SEVERITY_MODELS", "find_severity_model"]
 
 WANG_NOTE = (
     "Logistic regression on NASS-CDS 2010-2015, all occupants together, belted or not. The report "
-    "itself was not at hand: the coefficients are those that four public programs quote alike, two "
-    "of which name the tables (A-3, A-6, A-9; the first two also 4-1 and 4-3). The range given is "
-    "that in which the curves of one table keep their order (a graver injury is less likely), and "
-    "not the report's own. There is no curve for side impacts alone."
+    "itself was not at hand: the coefficients are as two public programs quote them, which name "
+    "the tables, A-3 of all crashes and A-6 of frontal ones (also as 4-1 and 4-3). The range given "
+    "is that in which the curves of one table keep their order (a graver injury is less likely), "
+    "and not the report's own. Its tables of other directions were not seen."
 )
-# Where two curves of a table cross first, in mph, rounded down: 56.3, 60.4 and 47.8.
-WANG_RANGE = {"all": 56.0, "front": 60.0, "rear": 47.0}
-WANG_TABLE = {"all": "A-3", "front": "A-6", "rear": "A-9"}
+# Where two curves of a table cross first, in mph, rounded down: 56.3 and 60.4.
+WANG_RANGE = {"all": 56.0, "front": 60.0}
+WANG_TABLE = {"all": "A-3", "front": "A-6"}
 
 
 def _wang(crash: str, outcome: str, intercept: float, slope: float) -> SeverityModel:
@@ -55,12 +55,6 @@ SEVERITY_MODELS: dict[str, SeverityModel] = {
     "wang_2022_front_mais4": _wang("front", "MAIS4+", -8.4254, 0.1586),
     "wang_2022_front_mais5": _wang("front", "MAIS5+", -8.8355, 0.1566),
     "wang_2022_front_fatal": _wang("front", "fatal", -9.0422, 0.1571),
-    "wang_2022_rear_mais1": _wang("rear", "MAIS1+", -1.8199, 0.0671),
-    "wang_2022_rear_mais2": _wang("rear", "MAIS2+", -6.1818, 0.1482),
-    "wang_2022_rear_mais3": _wang("rear", "MAIS3+", -8.0329, 0.1793),
-    "wang_2022_rear_mais4": _wang("rear", "MAIS4+", -11.8787, 0.2210),
-    "wang_2022_rear_mais5": _wang("rear", "MAIS5+", -12.1944, 0.2276),
-    "wang_2022_rear_fatal": _wang("rear", "fatal", -12.1982, 0.2255),
 }
 
 
