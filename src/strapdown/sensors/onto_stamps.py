@@ -18,7 +18,7 @@ from strapdown.sensors.triad_channels import AxisGroup, TriadChannels
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-__all__ = ["TriadAtStamps", "allowed_stamps", "onto_stamps"]
+__all__ = ["TriadAtStamps", "allowed_stamps", "at_rows", "onto_stamps"]
 
 # Stamps that agree to this part of a step are the same.
 SAME_STAMP = 1e-3
@@ -152,6 +152,32 @@ def onto_stamps(
         next(m for m in order if m in methods),
     )
     return result, findings
+
+
+def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
+    """The same triad at some of its stamps.
+
+    Parameters
+    ----------
+    triad : TriadAtStamps
+    stamps : ndarray, (m,), s
+        Consecutive, among those of the triad.
+    rate : float, Hz
+        Of both.
+    """
+    table = triad.triad.table
+    first = round((stamps[0] - float(table.index[0])) * rate)
+    rows = slice(first, first + len(stamps))
+    part = table.iloc[rows]
+    part.attrs = dict(table.attrs)
+    return TriadAtStamps(
+        RecordedTriad(part, triad.triad.uncertainty, triad.triad.name),
+        triad.noise_factor[rows],
+        triad.noise[rows],
+        triad.clipped[rows],
+        triad.whole[rows],
+        triad.method,
+    )
 
 
 def _held(g: AxisGroup, held: Flags, values: Array, at: Array, limits: Array) -> Array:

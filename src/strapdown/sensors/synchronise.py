@@ -13,7 +13,7 @@ from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
-from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, onto_stamps
+from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, at_rows, onto_stamps
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.unit_clocks import (
     UnitChannels,
@@ -75,7 +75,7 @@ class SynchronisedUnits:
     units : tuple of SynchronisedUnit
         In the order given.
     time : ndarray, (n,), s
-        Common stamps ``k/rate``, zero at the trigger.
+        Common stamps ``k/rate``, zero at the trigger, that all units share.
     rate : float, Hz
     reference : str or None
         Unit whose clock is the common one, with method 'correlation'.
@@ -118,6 +118,7 @@ def synchronise(
     reference: str | None = None,
     sampling: str = "instantaneous",
     attenuation: float = 80.0,
+    cut: bool = True,
 ) -> SynchronisedUnits:
     """Bring units onto one clock and common stamps.
 
@@ -137,11 +138,14 @@ def synchronise(
         frequency (to twice of that the low-pass falls by `attenuation`), or true means over the
         step that ends at the stamp, whose sums are the integral.
     attenuation : float, dB
+    cut : bool
+        To what all units cover; otherwise each unit, with the gyro that it borrows, keeps what it
+        covers itself, as the rest before the crash that a laboratory's record does not have.
 
     Returns
     -------
     SynchronisedUnits
-        Cut to what all units cover. The delay of the low-pass before each sampler, its time
+        The delay of the low-pass before each sampler, its time
         constant for signals slow against it, is taken off every channel's stamps. Faster channels
         are decimated (or averaged), without delay;
         others are interpolated where they were not sampled at the common stamps, and a finding
@@ -169,28 +173,34 @@ def synchronise(
         clocks, said = clocks_by_correlation(given, chosen)
         findings += said
         reference, zero_sd = chosen.unit.name, chosen.unit.trigger_sd
-    time = _common_stamps(given, clocks, rate, sampling)
+    spans = {
+        u.unit.name: _spans(u, clock, rate, sampling)
+        for u, clock in zip(given, clocks, strict=True)
+    }
+    time = _stamps([s for own in spans.values() for s in own], rate)
     done: dict[str, SynchronisedUnit] = {}
     # Lenders first: borrowers take what has been made of theirs.
     for u, clock in sorted(zip(given, clocks, strict=True), key=lambda p: p[0].gyro is None):
         triads = []
+        borrowed = u.unit.gyro_from if u.gyro is None else None
+        own = time
+        if not cut:
+            own = _stamps([*spans[u.unit.name], *(spans[borrowed] if borrowed else ())], rate)
         for channels, triad, columns in _parts(u):
             late = clock.offset + _delay(triad)
-            at, said = onto_stamps(
-                channels, triad, columns, late, time, rate, sampling, attenuation
-            )
+            at, said = onto_stamps(channels, triad, columns, late, own, rate, sampling, attenuation)
             triads.append(at)
             findings += said
         gyro, gyro_sd = (triads.pop() if u.gyro is not None else None), 0.0
-        borrowed = u.unit.gyro_from if gyro is None else None
         if borrowed is not None:
             lender = done[borrowed]
             assert lender.gyro is not None
-            gyro = turned_gyro(lender.gyro, lender.unit.mounting, u.unit.mounting)
+            lent = at_rows(lender.gyro, own, rate)
+            gyro = turned_gyro(lent, lender.unit.mounting, u.unit.mounting)
             gyro_sd = math.hypot(clock.sd, lender.time_sd)
         done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, borrowed, gyro_sd)
     ordered = tuple(done[u.name] for u in units)
-    findings += _ends(ordered, time)
+    findings += _ends(ordered)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
 
 
@@ -260,14 +270,18 @@ def _reference(given: list[UnitChannels], name: str | None) -> UnitChannels:
     return having[0]
 
 
-def _common_stamps(
-    given: list[UnitChannels], clocks: list[UnitClock], rate: float, sampling: str
-) -> Array:
-    spans = [
+def _spans(
+    u: UnitChannels, clock: UnitClock, rate: float, sampling: str
+) -> list[tuple[str, float, float]]:
+    """What each triad of a unit can serve: its name, the first and the last common instant."""
+    return [
         (channels.source, *allowed_stamps(channels, clock.offset + _delay(triad), rate, sampling))
-        for u, clock in zip(given, clocks, strict=True)
         for channels, triad, _ in _parts(u)
     ]
+
+
+def _stamps(spans: list[tuple[str, float, float]], rate: float) -> Array:
+    """Common stamps that all of the triads can serve."""
     latest = max(spans, key=lambda s: s[1])
     earliest = min(spans, key=lambda s: s[2])
     first = math.ceil(latest[1] * rate - 1e-6)
@@ -283,14 +297,14 @@ def _common_stamps(
     return np.arange(first, last + 1) / rate
 
 
-def _ends(units: tuple[SynchronisedUnit, ...], time: Array) -> list[Finding]:
+def _ends(units: tuple[SynchronisedUnit, ...]) -> list[Finding]:
     found = []
     for u in units:
         own = (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
         for t in own:
             if t.whole.all():
                 continue
-            inner = np.flatnonzero(t.whole)
+            inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
             kept = (
                 f"whole from {time[inner[0]]:.4g} to {time[inner[-1]]:.4g} s"
                 if inner.size
