@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.at_point import AtPoint, at_point
+from strapdown.crash.at_point import AtPoint
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.compare_units import UnitComparison, compare_units
 from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.path import WINDOW
-from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.prepare_together import prepare_together
 from strapdown.crash.unit_reconstruction import (
     PEAK_WINDOW,
     UnitReconstruction,
@@ -112,7 +112,8 @@ def reconstruct_crash(
     combine : bool
         Also reconstruct the weighted mean of the units.
     preparation : mapping, optional
-        Options of `prepare_unit`, for all units alike.
+        Options of `prepare_unit`, for all units alike; under the name of a unit, a mapping of its
+        own ones.
     peak_window : float, s
         Of the change of velocity that severity is usually told by.
     rule : EventRule
@@ -140,15 +141,11 @@ def reconstruct_crash(
         raise DataError(
             "there is none", quantity="units", remedy="give the record of at least one unit"
         )
-    together = synchronise(units, method=clock, rate=rate)
+    together = synchronise(units, method=clock, rate=rate, cut=False)
     findings = list(together.findings)
-    options = {"gravity": gravity, **(preparation or {})}
-    there: list[AtPoint] = []
-    for unit in together.units:
-        prepared = prepare_unit(unit.unit, **options)
-        findings += prepared.findings
-        there.append(at_point(prepared, point, time_sd=unit.time_sd))
-
+    there = prepare_together(together, point, gravity, preparation or {})
+    for of in there:
+        findings += () if of.prepared is None else of.prepared.findings
     tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
     if isinstance(entry, GnssEntry):
         for k, of in enumerate(there):
