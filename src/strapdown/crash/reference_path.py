@@ -12,12 +12,9 @@ from strapdown.crash.delta_v_bound import TWO_SIDED_95
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
 from strapdown.exceptions import DataError
-from strapdown.tables import NED
+from strapdown.tables import NED, POSITION_SD
 
 Array = NDArray[np.float64]
-
-#: Columns of the standard deviation of a reference.
-NED_SD = ["north_sd", "east_sd", "down_sd"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +133,8 @@ def _columns(reference: pd.DataFrame, time: Array) -> tuple[Array, Array]:
             remedy="give north, east and down in m",
         )
     values = reference[NED].to_numpy(dtype=np.float64)
-    has_sd = set(NED_SD) <= set(reference.columns)
-    sd = reference[NED_SD].to_numpy(dtype=np.float64) if has_sd else np.zeros_like(values)
+    has_sd = set(POSITION_SD) <= set(reference.columns)
+    sd = reference[POSITION_SD].to_numpy(dtype=np.float64) if has_sd else np.zeros_like(values)
     bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
     if bad.any() or (sd < 0.0).any() or (np.diff(time) <= 0.0).any() or not len(time):
         row = int(np.flatnonzero(bad)[0]) if bad.any() else 0

@@ -46,7 +46,7 @@ def path_from_cameras(
     DataFrame
         Index ``time``, s, of the frames of the first camera at which both see the marker, not
         corrected for any offset; ``north east down`` in m in the frame of the scene;
-        ``sd_north sd_east sd_down`` in m; ``residual`` in px, root of the mean square of what
+        ``north_sd east_sd down_sd`` in m; ``residual`` in px, root of the mean square of what
         the four readings leave over. The second camera's readings are interpolated linearly
         between its frames, which at 1000 frames/s and 130 m/s² leaves 2e-5 m.
 
@@ -92,7 +92,7 @@ def path_from_cameras(
         {
             **dict(zip(("north", "east", "down"), place.T, strict=True)),
             **{
-                f"sd_{axis}": np.sqrt(covariance[:, k, k])
+                f"{axis}_sd": np.sqrt(covariance[:, k, k])
                 for k, axis in enumerate(("north", "east", "down"))
             },
             "residual": np.sqrt((left * left).mean(axis=1)),

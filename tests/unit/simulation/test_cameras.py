@@ -25,7 +25,7 @@ from strapdown.simulation.stationary import StationaryMotion
 MOTION = Pushed()
 MARKER = (-0.4, 0.3, -0.5)
 NED = ["north", "east", "down"]
-SD = [f"sd_{axis}" for axis in NED]
+SD = [f"{axis}_sd" for axis in NED]
 # What a camera states of itself.
 STATED = ("reading_sd", "position_sd", "angles_sd_deg", "focal_sd", "k1_sd", "clock_sd")
 
@@ -177,7 +177,7 @@ def test_a_late_clock_shows_the_vehicle_where_it_was():
     # what they see of north, each by its own clock.
     before = path[path.index < -0.02]
     np.testing.assert_allclose(truth(before.index)[:, 0] - before["north"], 0.142, atol=1e-12)
-    assert before["sd_north"].between(0.142 / np.sqrt(2.0) * 0.95, 0.142).all()
+    assert before["north_sd"].between(0.142 / np.sqrt(2.0) * 0.95, 0.142).all()
 
 
 def test_one_late_clock_is_as_its_own_view():
@@ -203,7 +203,7 @@ def test_frames_that_differ_are_interpolated():
     noisy = tuple(replace(c, reading_sd=0.5) for c in pair)
     whole = tuple(replace(c, reading_sd=0.5) for c in (top, side))
     mixed, plain = (path_from_cameras(*filmed(p), p, marker="mark") for p in (noisy, whole))
-    down = mixed["sd_down"] / plain["sd_down"].reindex(mixed.index)
+    down = mixed["down_sd"] / plain["down_sd"].reindex(mixed.index)
     assert down.min() == pytest.approx(np.sqrt(0.5), abs=0.01)
     assert down.max() == pytest.approx(1.0, abs=0.01)
 
