@@ -1,0 +1,1 @@
+"""Simulated crashes through the whole chain, compared with exact truth."""
