@@ -25,6 +25,7 @@ from strapdown.tables import VELOCITY as VELOCITIES
 
 Array = NDArray[np.float64]
 
+#: Where a path is wanted if nothing is said, s from the trigger: Tadic and Vukajlovic (2016).
 WINDOW = (-0.1, 0.75)
 #: What the columns of an error are, in its order.
 ERROR = ["phi_n", "phi_e", "phi_d", *VELOCITIES, *NED]
@@ -118,7 +119,7 @@ def reconstruct_path(
     level_time: float | None,
     entry: Entry | None,
     *,
-    window: Sequence[float] = WINDOW,
+    window: Sequence[float] | None = None,
     mechanization: NorthEastDown | None = None,
 ) -> CrashPath:
     """Navigate from the entry forward and backward, and grow what is not known along the way.
@@ -137,8 +138,9 @@ def reconstruct_path(
     entry : Entry or None
         None: the velocity follows from a vehicle that stood still until `level_time`, the path
         is tied to time zero, and told in axes of the vehicle there.
-    window : (float, float), s
-        The path is given over the samples within.
+    window : (float, float), s, optional
+        The path is given over the samples within; -0.1 to 0.75 s, as far as the record has them,
+        if not given.
     mechanization : NorthEastDown, optional
 
     Returns
@@ -163,7 +165,8 @@ def reconstruct_path(
     time = imu.index.to_numpy(dtype=np.float64)
     mechanization = mechanization or NorthEastDown()
     origin = entry or Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
-    first, anchor, last = _rows(imu, time, window, origin.time)
+    wanted = _usual(time, origin.time) if window is None else window
+    first, anchor, last = _rows(imu, time, wanted, origin.time)
     if origin.attitude_deg is not None:
         begin = _Begin(_state(origin, *origin.attitude_deg, float(time[anchor])), *_NOTHING)
     else:
@@ -280,6 +283,14 @@ def _carried(
         tuple(f"noise before the entry {k + 1}" for k in range(len(columns))),
         tuple("sensor noise" for _ in columns),
         np.concatenate([errors, columns]),
+    )
+
+
+def _usual(time: Array, at: float) -> tuple[float, float]:
+    """The usual window, as far as there is a record; the entry is within in any case."""
+    return (
+        min(max(WINDOW[0], float(time[0])), at),
+        max(min(WINDOW[1], float(time[-1])), at + 1e-6),
     )
 
 

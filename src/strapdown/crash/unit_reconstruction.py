@@ -18,7 +18,7 @@ from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_b
 from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.events import CrashEvents, detect_events
-from strapdown.crash.path import WINDOW, CrashPath, reconstruct_path
+from strapdown.crash.path import CrashPath, reconstruct_path
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
 from strapdown.exceptions import Finding
@@ -68,7 +68,7 @@ def reconstruct_unit(
     at_point: AtPoint,
     entry: Entry | None,
     *,
-    window: Sequence[float] = WINDOW,
+    window: Sequence[float] | None = None,
     peak_window: float = PEAK_WINDOW,
     rule: EventRule = PART_563,
     gravity: float = STANDARD_GRAVITY,
@@ -81,7 +81,7 @@ def reconstruct_unit(
     at_point : AtPoint
     entry : Entry or None
         As `reconstruct_path`.
-    window : (float, float), s
+    window : (float, float), s, optional
         Of the path.
     peak_window : float, s
     rule : EventRule

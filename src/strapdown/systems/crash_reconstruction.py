@@ -13,7 +13,6 @@ from strapdown.crash.compare_units import UnitComparison, compare_units
 from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
-from strapdown.crash.path import WINDOW
 from strapdown.crash.prepare_together import prepare_together
 from strapdown.crash.unit_reconstruction import (
     PEAK_WINDOW,
@@ -80,8 +79,9 @@ def reconstruct_crash(
     entry: Entry | GnssEntry | None,
     *,
     point: Sequence[float] = (0.0, 0.0, 0.0),
-    window: Sequence[float] = WINDOW,
+    window: Sequence[float] | None = None,
     rate: float = 200.0,
+    sampling: str = "instantaneous",
     clock: str = "trigger",
     combine: bool = True,
     preparation: Mapping[str, Any] | None = None,
@@ -103,10 +103,14 @@ def reconstruct_crash(
         the beginning of the record, and the path is told in its axes at the trigger.
     point : sequence of float, (3,), m
         Reference point in vehicle axes (forward, right, down) from the vehicle's origin.
-    window : (float, float), s
-        Of the path, from the trigger.
+    window : (float, float), s, optional
+        Of the path, from the trigger; -0.1 to 0.75 s, as far as a unit's record has them, if not
+        given.
     rate : float, Hz
         Of the common stamps. Faster channels are decimated without aliasing.
+    sampling : {'instantaneous', 'mean'}
+        What the samples at the common stamps are: values of a band-limited signal, or true means
+        over the step, in which nothing of a fast channel is lost to the change of velocity.
     clock : {'trigger', 'correlation'}
         As `synchronise`.
     combine : bool
@@ -141,7 +145,7 @@ def reconstruct_crash(
         raise DataError(
             "there is none", quantity="units", remedy="give the record of at least one unit"
         )
-    together = synchronise(units, method=clock, rate=rate, cut=False)
+    together = synchronise(units, method=clock, rate=rate, sampling=sampling, cut=False)
     findings = list(together.findings)
     there = prepare_together(together, point, gravity, preparation or {})
     for of in there:
