@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_differences import VelocityIncrements
+from strapdown.crash.unit_differences import VelocityIncrements, difference_covariance
 from strapdown.exceptions import Finding
 
 Array = NDArray[np.float64]
@@ -90,11 +90,14 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
     or of the best fit's residuals where these are larger. Among permutations that cannot be told
     apart the one nearest to the identity is taken. Accelerometers and gyros are judged apart,
     since either may be wired wrong; a rigid body turns everywhere alike, and its forces agree
-    after both are moved to one point, to which a wrong axis of the gyro does harm, too.
+    after both are moved to one point, to which a wrong axis of the gyro does harm, too. A gyro
+    that both share is not judged.
     """
-    variance = float(np.trace(first.whole + second.whole)) / first.values.size
+    variance = float(np.trace(difference_covariance(first, second))) / first.values.size
     accel, lead, sure, other = _best(first.values, second.values, variance)
-    turn = float(np.trace(first.turned_covariance + second.turned_covariance)) / first.turned.size
+    if first.borrows(second):
+        return AxisMatch(accel, np.eye(3), lead, 0.0, sure, 0.0, other)
+    turn = float(np.trace(difference_covariance(first, second, of="rate"))) / first.turned.size
     gyro, gyro_lead, gyro_sure, _ = _best(first.turned, second.turned, turn)
     return AxisMatch(accel, gyro, lead, gyro_lead, sure, gyro_sure, other)
 

@@ -182,13 +182,14 @@ def synchronise(
             triads.append(at)
             findings += said
         gyro, gyro_sd = (triads.pop() if u.gyro is not None else None), 0.0
-        borrowed = u.unit.gyro_from if gyro is None else None
-        if borrowed is not None:
-            lender = done[borrowed]
-            assert lender.gyro is not None
-            gyro = turned_gyro(lender.gyro, lender.unit.mounting, u.unit.mounting)
-            gyro_sd = math.hypot(clock.sd, lender.time_sd)
-        done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, borrowed, gyro_sd)
+        lender = None
+        if gyro is None and u.unit.gyro_from is not None:
+            lent = done[u.unit.gyro_from]
+            assert lent.gyro is not None
+            lender = lent.unit
+            gyro = turned_gyro(lent.gyro, lender.mounting, u.unit.mounting)
+            gyro_sd = math.hypot(clock.sd, lent.time_sd)
+        done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, lender, gyro_sd)
     ordered = tuple(done[u.name] for u in units)
     findings += _ends(ordered, time)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
@@ -199,7 +200,7 @@ def _made(
     clock: UnitClock,
     accelerometers: tuple[TriadAtStamps, ...],
     gyro: TriadAtStamps | None,
-    lender: str | None,
+    lender: CrashUnit | None,
     gyro_time_sd: float,
 ) -> SynchronisedUnit:
     made = replace(
@@ -208,9 +209,17 @@ def _made(
         gyro=None if gyro is None else gyro.triad,
         trigger=0.0,
         trigger_sd=clock.sd,
+        lender=lender,
     )
     return SynchronisedUnit(
-        made, accelerometers, gyro, clock.offset, clock.sd, clock.how, lender, gyro_time_sd
+        made,
+        accelerometers,
+        gyro,
+        clock.offset,
+        clock.sd,
+        clock.how,
+        None if lender is None else lender.name,
+        gyro_time_sd,
     )
 
 
