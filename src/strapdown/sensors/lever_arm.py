@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.local_slope import LocalSlope, local_slope
 from strapdown.exceptions import ConfigError
-from strapdown.sensors.local_slope import LocalSlope, local_slope
 from strapdown.sensors.prepared_unit import PreparedUnit
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
 from strapdown.tables.checks import check_columns
