@@ -134,20 +134,24 @@ def difference_covariance(
         Between the same edges.
     of, without
         As `joint_covariance`.
-    turn : ndarray, (3, 3), optional
+    turn : ndarray, (..., 3, 3), optional
         By which those of the second are turned before.
 
     Returns
     -------
-    ndarray, (3 m, 3 m)
+    ndarray, (..., 3 m, 3 m)
         What both share is not in it.
     """
-    size = first.values.size
-    blocks = np.eye(size) if turn is None else np.kron(np.eye(len(first.values)), turn)
+    size, pieces = first.values.size, len(first.values)
+    turned = np.eye(3) if turn is None else turn
+    blocks = np.einsum("ab,...ij->...aibj", np.eye(pieces), turned)
+    blocks = blocks.reshape(*turned.shape[:-2], size, size)
+    back = np.swapaxes(blocks, -1, -2)
     both = joint_covariance((first, second), of=of, without=without)
-    mixed = both[:size, size:] @ blocks.T
-    out = both[:size, :size] + blocks @ both[size:, size:] @ blocks.T - mixed - mixed.T
-    return np.asarray(0.5 * (out + out.T))
+    mixed = both[:size, size:] @ back
+    out = both[:size, :size] + blocks @ both[size:, size:] @ back
+    out = out - mixed - np.swapaxes(mixed, -1, -2)
+    return np.asarray(0.5 * (out + np.swapaxes(out, -1, -2)))
 
 
 def floored(covariance: Array) -> Array:
