@@ -15,7 +15,7 @@ from strapdown.crash.sample_effects import SampleEffects, unit_effects
 from strapdown.results import RestStretch
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
-from strapdown.tables import ACCEL
+from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,27 @@ class AtPoint:
     rest_accel_sd: float = 0.0
     prepared: PreparedUnit | None = field(default=None, repr=False)
     moved: MovedImu | None = field(default=None, repr=False)
+
+    @property
+    def time(self) -> Array:
+        """Stamps, (n,), s."""
+        return np.asarray(self.imu.index.to_numpy(), dtype=np.float64)
+
+    @property
+    def force(self) -> Array:
+        """Specific force, (n, 3), m/s²."""
+        return np.ascontiguousarray(self.imu[ACCEL].to_numpy(dtype=np.float64))
+
+    @property
+    def rate(self) -> Array:
+        """Rates, (n, 3), rad/s."""
+        return np.ascontiguousarray(self.imu[GYRO].to_numpy(dtype=np.float64))
+
+    @property
+    def gyro(self) -> str:
+        """Name of the unit that has the gyro, which others may borrow."""
+        lender = None if self.prepared is None else self.prepared.unit.lender
+        return self.name if lender is None else lender.name
 
     def resting_force(self, gravity: float) -> tuple[Array, Array]:
         """Mean specific force before the crash and how well it is known, (3,) each, m/s².

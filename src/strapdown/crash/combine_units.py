@@ -8,9 +8,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_at_point import Contributor, UnitAtPoint
+from strapdown import rotation
+from strapdown.alignment.levelling import level
+from strapdown.crash.at_point import AtPoint
+from strapdown.crash.combined_effects import SampleWeights, combine_effects
+from strapdown.crash.sample_effects import SampleEffects, level_turned_by
+from strapdown.crash.unit_differences import TINY, floored
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.sensors.lever_arm import cross_matrix
+from strapdown.results import RestStretch
+from strapdown.sensors.prepared_unit import Levelling
+from strapdown.sensors.rest import LEAST_SAMPLES, rest_between
 from strapdown.tables import imu_table
 
 Array = NDArray[np.float64]
@@ -18,35 +25,44 @@ Array = NDArray[np.float64]
 __all__ = ["COMBINATIONS", "combine_units"]
 
 COMBINATIONS = ("weighted", "median")
-# Relative to the largest variance: what a perfect unit is given, so that it can be inverted.
-FLOOR = 1e-12
+# Near the impact: rates are weighed by how well they tell the turn over it.
+TURN_WINDOW = (-0.1, 0.75)
 
 
-def combine_units(units: Sequence[UnitAtPoint], method: str = "weighted") -> UnitAtPoint:
+def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint:
     """Combine units that were moved to one point.
 
     Parameters
     ----------
-    units : sequence of UnitAtPoint
+    units : sequence of AtPoint
         Of one vehicle, at one point; the stamps of the first are kept, where all have samples,
         and the others are interpolated linearly.
     method : {'weighted', 'median'}
-        Each sample weighed by the inverse of its covariance (noise, contributors, position); or,
-        of three units or more, the median of each axis, which one unit gone astray does not move
-        far.
+        Each sample weighed by the inverse of its covariance (noise and all unknowns); or, of three
+        units or more, the median of each axis, which one unit gone astray does not move far.
 
     Returns
     -------
-    UnitAtPoint
-        With the noise and all contributors of its parts, each with its weight. Rates are weighed
-        by their noise. What two units share, as a borrowed gyro, is taken as independent.
+    AtPoint
+        With the unknowns of all its parts, each with the weight of its unit: one that two units
+        share, as the bias of a borrowed gyro, is one. Rates are weighed by how well they tell the
+        turn from 0.1 s before to 0.75 s after the trigger. It is
+        level where the mean of its specific force at rest is, over what all have in common of
+        their rests; without such, and where an attitude was stated, at the mean of theirs.
 
     Raises
     ------
     DataError
-        There are fewer than two units, or fewer than two common samples.
+        There are fewer than two common samples.
     ConfigError
-        The method is unknown, or the median is asked of two.
+        There are too few units, or the method is unknown.
+
+    Notes
+    -----
+    Weights follow from what each unit states for itself, and any that sum to one are right; those
+    of units that share unknowns are not the best. Samples of a combination are taken for
+    independent, though what the noise of the gyros does through a lever arm is not: this states
+    more than there is.
     """
     if method not in COMBINATIONS:
         raise ConfigError(
@@ -60,6 +76,54 @@ def combine_units(units: Sequence[UnitAtPoint], method: str = "weighted") -> Uni
             quantity="units",
             remedy="give two units or more, three or more for a median",
         )
+    time = _common_stamps(units)
+    at = [_at(u, time) for u in units]
+    force = np.array([u.force for u in at])
+    weights = _inverse_weights(at) if method == "weighted" else _median_weights(force)
+    turning = _rate_weights(at)
+    name = f"{method} of {', '.join(u.name for u in units)}"
+    imu = imu_table(
+        time,
+        np.tensordot(turning, np.array([u.rate for u in at]), axes=1),
+        np.einsum("unij,unj->ni", weights, force),
+        sampling=str(units[0].imu.attrs["sampling"]),
+        source=name,
+    )
+    common = _common_rest(units, time)
+    if common is None:
+        at_rest, rest = weights.mean(axis=1), None
+    else:
+        rest = rest_between(imu, *common, grade=units[0].rest.grade if units[0].rest else "stated")
+        at_rest = weights[:, (time >= rest.start) & (time <= rest.end)].mean(axis=1)
+    # A third of the trace: one number a unit that sums to one.
+    share = np.trace(at_rest, axis1=1, axis2=2) / 3.0
+    levelled = rest is not None and all(u.levelling.from_rest for u in units)
+    parts = [_without_own_tilt(u) if levelled else u.effects for u in at]
+    effects = combine_effects(
+        parts,
+        [
+            SampleWeights(w, r, float(s), float(q))
+            for w, r, s, q in zip(weights, at_rest, share, turning, strict=True)
+        ],
+    )
+    mean = _mean_levelling(units, share)
+    if levelled and rest is not None and rest.accel_mean is not None:
+        roll, pitch = level(rest.accel_mean)
+        mean = replace(mean, roll_deg=roll, pitch_deg=pitch)
+        tilt = level_turned_by(effects.rest_force, _level(mean))
+        effects = replace(effects, tilt=effects.tilt + tilt)
+    return AtPoint(
+        name,
+        imu,
+        effects,
+        mean,
+        rest,
+        # The vehicle's own, which all units feel alike.
+        float(share @ [u.rest_accel_sd for u in units]),
+    )
+
+
+def _common_stamps(units: Sequence[AtPoint]) -> Array:
     first = max(float(u.time[0]) for u in units)
     last = min(float(u.time[-1]) for u in units)
     time = units[0].time
@@ -70,45 +134,21 @@ def combine_units(units: Sequence[UnitAtPoint], method: str = "weighted") -> Uni
             quantity="units",
             remedy="look whether their clocks agree",
         )
-    at = [_at(u, time) for u in units]
-    force = np.array([u.force for u in at])
-    weights = _inverse_weights(at) if method == "weighted" else _median_weights(force)
-    noise = np.zeros((time.size, 3, 3))
-    contributors: list[Contributor] = []
-    for u, w in zip(at, weights, strict=True):
-        noise += w @ _with_lever(u) @ w.transpose(0, 2, 1)
-        for c in _all_contributors(u):
-            contributors.append(Contributor(f"{u.name}: {c.name}", w @ c.effect, c.covariance))
-    total = np.einsum("unij,unj->ni", weights, force)
-    quiet = np.array([1.0 / max(float(np.einsum("nii->", u.gyro_noise)), 1e-30) for u in at])
-    quiet = quiet / quiet.sum()
-    rate = np.tensordot(quiet, np.array([u.rate for u in at]), axes=1)
-    gyro_noise = np.tensordot(quiet**2, np.array([u.gyro_noise for u in at]), axes=1)
-    name = f"{method} of {', '.join(u.name for u in units)}"
-    return UnitAtPoint(
-        name=name,
-        imu=imu_table(time, rate, total, sampling=str(units[0].imu.attrs["sampling"]), source=name),
-        noise=noise,
-        gyro_noise=gyro_noise,
-        contributors=tuple(contributors),
-        gyro_bias_sd=np.sqrt(
-            np.tensordot(quiet**2, np.array([u.gyro_bias_sd**2 for u in at]), axes=1)
-        ),
-    )
+    return time
 
 
-def _at(unit: UnitAtPoint, time: Array) -> UnitAtPoint:
+def _at(unit: AtPoint, time: Array) -> AtPoint:
     """A unit at other stamps, on straight lines between its own."""
     own = unit.time
     if own.size == time.size and np.array_equal(own, time):
         return unit
+    k = np.clip(np.searchsorted(own, time, side="right") - 1, 0, own.size - 2)
+    part = ((time - own[k]) / (own[k + 1] - own[k]))[:, None]
 
     def at(values: Array) -> Array:
-        flat = values.reshape(own.size, -1)
-        columns = [np.interp(time, own, flat[:, k]) for k in range(flat.shape[1])]
-        return np.stack(columns, axis=1).reshape(time.size, *values.shape[1:])
+        return np.asarray((1.0 - part) * values[..., k, :] + part * values[..., k + 1, :])
 
-    # The noise of a value between two samples is less than theirs; theirs is kept.
+    effects = unit.effects
     return replace(
         unit,
         imu=imu_table(
@@ -118,38 +158,56 @@ def _at(unit: UnitAtPoint, time: Array) -> UnitAtPoint:
             sampling=str(unit.imu.attrs["sampling"]),
             source=unit.name,
         ),
-        noise=at(_with_lever(unit)),
-        gyro_noise=at(unit.gyro_noise),
-        contributors=tuple(replace(c, effect=at(c.effect)) for c in _all_contributors(unit)),
-        position_sd=0.0,
-        angles_sd=0.0,
+        # The noise of a value between two samples is less than theirs; theirs is kept.
+        effects=replace(
+            effects,
+            force=at(effects.force),
+            rate=at(effects.rate),
+            force_noise=at(effects.force_noise),
+            rate_noise=at(effects.rate_noise),
+        ),
         moved=None,
     )
 
 
-def _with_lever(unit: UnitAtPoint) -> Array:
-    """Noise of a sample with what the gyro adds through the lever arm."""
-    return unit.noise if unit.moved is None else unit.noise + unit.moved.added
+def _common_rest(units: Sequence[AtPoint], time: Array) -> tuple[float, float] | None:
+    rests: list[RestStretch] = [u.rest for u in units if u.rest is not None]
+    if len(rests) < len(units):
+        return None
+    start, end = max(r.start for r in rests), min(r.end for r in rests)
+    within = (time >= start) & (time <= end)
+    return (start, end) if within.sum() >= LEAST_SAMPLES else None
 
 
-def _all_contributors(unit: UnitAtPoint) -> tuple[Contributor, ...]:
-    more: list[Contributor] = []
-    if unit.moved is not None and unit.position_sd > 0.0:
-        more.append(Contributor("position", unit.lever(), unit.position_sd**2 * np.eye(3)))
-    if unit.angles_sd > 0.0:
-        tilt = cross_matrix(unit.force)
-        more.append(Contributor("mounting angles", tilt, unit.angles_sd**2 * np.eye(3)))
-    return (*unit.contributors, *more)
+def _mean_levelling(units: Sequence[AtPoint], share: Array) -> Levelling:
+    levels = [u.levelling for u in units]
+    return Levelling(
+        float(share @ [v.roll_deg for v in levels]),
+        float(share @ [v.pitch_deg for v in levels]),
+        # One unknown of the vehicle, as its name says.
+        float(share @ [v.sd_deg for v in levels]),
+        all(v.from_rest for v in levels),
+    )
 
 
-def _inverse_weights(units: Sequence[UnitAtPoint]) -> Array:
+def _level(levelling: Levelling) -> Array:
+    return rotation.dcm_from_euler([levelling.roll_deg, levelling.pitch_deg, 0.0])
+
+
+def _without_own_tilt(unit: AtPoint) -> SampleEffects:
+    """Effects without the tilt that follows from the force at rest: it is that of the mean."""
+    effects = unit.effects
+    tilt = level_turned_by(effects.rest_force, _level(unit.levelling))
+    return replace(effects, tilt=effects.tilt - tilt)
+
+
+def _inverse_weights(units: Sequence[AtPoint]) -> Array:
     information = []
     for u in units:
-        covariance = _with_lever(u).copy()
-        for c in _all_contributors(u):
-            covariance += c.effect @ c.covariance @ c.effect.transpose(0, 2, 1)
-        floor = max(FLOOR * float(np.einsum("nii->n", covariance).max()), 1e-30)
-        information.append(np.linalg.inv(covariance + floor * np.eye(3)))
+        effects = u.effects
+        covariance = np.einsum("pni,pnj->nij", effects.force, effects.force, optimize=True)
+        covariance += effects.force_noise[:, :, None] ** 2 * np.eye(3)
+        information.append(np.linalg.inv(floored(covariance)))
     total = np.linalg.inv(np.sum(information, axis=0))
     return np.array([total @ i for i in information])
 
@@ -164,3 +222,19 @@ def _median_weights(force: Array) -> Array:
     for place in middle:
         weights[order[place], n, axes, axes] = 1.0 / len(middle)
     return weights
+
+
+def _rate_weights(units: Sequence[AtPoint]) -> Array:
+    """One number a unit; a gyro that several have counts once."""
+    time = units[0].time
+    steps = np.gradient(time)
+    within = (time >= TURN_WINDOW[0]) & (time <= TURN_WINDOW[1])
+    steps = np.where(within, steps, 0.0) if within.any() else steps
+    known, weights = set(), []
+    for u in units:
+        turned = np.tensordot(steps, u.effects.rate, axes=(0, 1))
+        noise = steps[:, None] ** 2 * u.effects.rate_noise**2
+        variance = float((turned**2).sum() + noise.sum())
+        weights.append(0.0 if u.gyro in known else 1.0 / max(variance, TINY))
+        known.add(u.gyro)
+    return np.asarray(np.array(weights) / np.sum(weights))

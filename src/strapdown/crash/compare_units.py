@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.crash.at_point import AtPoint
 from strapdown.crash.lever_arm_check import check_lever_arm, lever_arm_findings
 from strapdown.crash.match_axes import axis_findings, match_axes
 from strapdown.crash.mounting_rotation import (
     mounting_rotation,
     rotation_findings,
 )
-from strapdown.crash.unit_at_point import UnitAtPoint
 from strapdown.crash.unit_comparison import UnitAgainstAll, UnitComparison, UnitPair
 from strapdown.crash.unit_differences import (
     VelocityIncrements,
     common_edges,
+    difference_covariance,
+    floored,
+    joint_covariance,
     velocity_increments,
 )
 from strapdown.exceptions import ConfigError, Finding
@@ -28,12 +32,10 @@ Array = NDArray[np.float64]
 __all__ = ["compare_units"]
 
 AXES = ("forward", "right", "down")
-# Relative to the largest variance: below it a covariance is rounding.
-FLOOR = 1e-12
 
 
 def compare_units(
-    units: Sequence[UnitAtPoint],
+    units: Sequence[AtPoint],
     *,
     window: tuple[float, float] | None = None,
     pieces: int = 20,
@@ -43,7 +45,7 @@ def compare_units(
 
     Parameters
     ----------
-    units : sequence of UnitAtPoint
+    units : sequence of AtPoint
         Two or more, of one rigid vehicle, at one point.
     window : (start, end), s, optional
         What is compared; -0.1 to 0.75 s, as far as all have samples, if not given.
@@ -61,9 +63,11 @@ def compare_units(
     Notes
     -----
     With the difference d of the increments of velocity and its covariance C from all that both
-    units state, ``dᵀ C⁻¹ d`` is chi-square. Ringing that the structure has at one place and not at
-    the other, and whatever else was not stated, shows as a disagreement; its words say where it
-    is largest. Swapped axes, a turned mounting and wrong positions are looked for in each pair.
+    units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the attitude that
+    all were levelled at) cancels in d and in C. Ringing that the structure has at one place and
+    not at the other, and whatever else was not stated, shows as a disagreement; its words say
+    where it is largest. Swapped axes, a turned mounting and wrong positions are looked for in each
+    pair.
 
     Raises
     ------
@@ -84,19 +88,16 @@ def compare_units(
         _pair(units[i], units[j], increments[i], increments[j], level)
         for i, j in itertools.combinations(range(len(units)), 2)
     )
-    combined, covariance, against = _against_all(units, increments)
-    chi = sum(_square(v.values.ravel() - combined, v.whole) for v in increments)
+    combined, covariance, chi, against = _against_all(units, increments)
     freedom = combined.size * (len(units) - 1)
     probability = _tail(chi, freedom)
     findings = [f for p in pairs for f in p.findings]
     findings += _odd_one(units, pairs)
-    total = np.kron(np.tril(np.ones((edges.size - 1, edges.size - 1))), np.eye(3))
-    sd = np.sqrt(np.maximum(np.diag(total @ covariance @ total.T), 0.0))
     return UnitComparison(
         edges,
         pairs,
         _curve(combined),
-        np.vstack([np.zeros(3), sd.reshape(-1, 3)]),
+        _curve_sd(covariance),
         against,
         chi,
         freedom,
@@ -107,14 +108,14 @@ def compare_units(
 
 
 def _pair(
-    first: UnitAtPoint,
-    second: UnitAtPoint,
+    first: AtPoint,
+    second: AtPoint,
     a: VelocityIncrements,
     b: VelocityIncrements,
     level: float,
 ) -> UnitPair:
     edges = a.edges
-    difference, covariance = (a.values - b.values).ravel(), a.whole + b.whole
+    difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)
     chi, freedom = _square(difference, covariance), difference.size
     probability = _tail(chi, freedom)
     curve, sd = _curve(difference), _curve_sd(covariance)
@@ -126,14 +127,15 @@ def _pair(
     if not agree:
         findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
     found = axis_findings(axes, first.name, second.name)
-    if not found:
+    if not found and first.prepared is not None and second.prepared is not None:
         # A small rotation or a wrong place means nothing where an axis is another.
-        angles = float(np.hypot(first.angles_sd, second.angles_sd))
+        mounted = first.prepared.unit.mounting, second.prepared.unit.mounting
+        angles = math.radians(math.hypot(*(m.angles_sd_deg for m in mounted)))
         found = rotation_findings(turned, angles, first.name, second.name)
         found += lever_arm_findings(
             lever,
-            float(np.hypot(a.position_sd, b.position_sd)),
-            first.position - second.position,
+            math.hypot(*(m.position_sd for m in mounted)),
+            np.subtract(mounted[0].position, mounted[1].position),
             first.name,
             second.name,
         )
@@ -157,39 +159,31 @@ def _pair(
 
 
 def _against_all(
-    units: Sequence[UnitAtPoint], increments: Sequence[VelocityIncrements]
-) -> tuple[Array, Array, tuple[UnitAgainstAll, ...]]:
-    """Weighted mean of the increments, its covariance, and each unit against it."""
-    information = [np.linalg.inv(_floored(v.whole)) for v in increments]
-    covariance = np.linalg.inv(np.sum(information, axis=0))
-    weighed = [i @ v.values.ravel() for i, v in zip(information, increments, strict=True)]
-    combined = covariance @ np.sum(weighed, axis=0)
+    units: Sequence[AtPoint], increments: Sequence[VelocityIncrements]
+) -> tuple[Array, Array, float, tuple[UnitAgainstAll, ...]]:
+    """Weighted mean of the increments, its covariance, chi-square, and each unit against it."""
+    size = increments[0].values.size
+    joint = floored(joint_covariance(increments))
+    whole = np.tile(np.eye(size), (len(units), 1))
+    given = np.concatenate([v.values.ravel() for v in increments])
+    weighed = np.linalg.solve(joint, np.column_stack([whole, given]))
+    covariance = np.linalg.inv(whole.T @ weighed[:, :size])
+    combined = covariance @ (whole.T @ weighed[:, size])
+    left = given - whole @ combined
     against = []
-    for u, v in zip(units, increments, strict=True):
-        difference = v.values.ravel() - combined
+    for k, u in enumerate(units):
+        rows = slice(k * size, (k + 1) * size)
         # The unit is part of the combination: their covariance is the combination's.
-        own = _floored(v.whole) - covariance
-        chi = _square(difference, own)
+        own = joint[rows, rows] - covariance
+        chi = _square(left[rows], own)
         against.append(
-            UnitAgainstAll(
-                u.name,
-                _curve(difference),
-                _curve_sd(own),
-                chi,
-                difference.size,
-                _tail(chi, difference.size),
-            )
+            UnitAgainstAll(u.name, _curve(left[rows]), _curve_sd(own), chi, size, _tail(chi, size))
         )
-    return combined, covariance, tuple(against)
-
-
-def _floored(covariance: Array) -> Array:
-    floor = max(FLOOR * float(np.diag(covariance).max()), 1e-30)
-    return np.asarray(covariance + floor * np.eye(len(covariance)))
+    return combined, np.asarray(covariance), _square(left, joint), tuple(against)
 
 
 def _square(difference: Array, covariance: Array) -> float:
-    return float(difference @ np.linalg.solve(_floored(covariance), difference))
+    return float(difference @ np.linalg.solve(floored(covariance), difference))
 
 
 def _tail(chi_square: float, freedom: int) -> float:
@@ -210,8 +204,8 @@ def _curve_sd(covariance: Array) -> Array:
 
 
 def _disagreement(
-    first: UnitAtPoint,
-    second: UnitAtPoint,
+    first: AtPoint,
+    second: AtPoint,
     edges: Array,
     curve: Array,
     sd: Array,
@@ -234,7 +228,7 @@ def _disagreement(
     )
 
 
-def _odd_one(units: Sequence[UnitAtPoint], pairs: Sequence[UnitPair]) -> list[Finding]:
+def _odd_one(units: Sequence[AtPoint], pairs: Sequence[UnitPair]) -> list[Finding]:
     """Of three or more, the one without which the others agree."""
     if len(units) < 3 or all(p.agree for p in pairs):
         return []

@@ -7,7 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_differences import VelocityIncrements
+from strapdown.crash.sample_effects import LEVER_ARM
+from strapdown.crash.unit_differences import (
+    VelocityIncrements,
+    difference_covariance,
+    floored,
+)
 from strapdown.exceptions import Finding
 
 Array = NDArray[np.float64]
@@ -61,7 +66,7 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
     Notes
     -----
     Units that were moved with positions that are off by e₁ and e₂ (true minus stated) differ by
-    ``([α×] + [ω×]²) (e₁ - e₂)``: generalised least squares, with noise and every contributor of
+    ``([α×] + [ω×]²) (e₁ - e₂)``: generalised least squares, with noise and every unknown of
     both but for the positions as covariance. ``[α×] + [ω×]²`` has no word on the axis of a turn
     that keeps its direction: the normal matrix tells which directions are seen. Noise of the
     angular acceleration pulls the estimate towards zero by its share of the signal's power.
@@ -73,10 +78,7 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
         )
     lever = np.mean(shares, axis=0)
     difference = (first.values - second.values).ravel()
-    covariance = first.without_position + second.without_position
-    covariance = covariance + 1e-12 * np.trace(covariance) / len(covariance) * np.eye(
-        len(covariance)
-    )
+    covariance = floored(difference_covariance(first, second, without=(LEVER_ARM,)))
     weighed = np.linalg.solve(covariance, np.column_stack([lever, difference]))
     normal = lever.T @ weighed[:, :3]
     values, vectors = np.linalg.eigh(0.5 * (normal + normal.T))

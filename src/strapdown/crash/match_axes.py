@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_differences import VelocityIncrements
+from strapdown.crash.unit_differences import VelocityIncrements, difference_covariance, floored
 from strapdown.exceptions import Finding
 
 Array = NDArray[np.float64]
@@ -86,27 +86,33 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
 
     Notes
     -----
-    Least squares over the pieces, with one variance for all: that of the stated uncertainties,
-    or of the best fit's residuals where these are larger. Among permutations that cannot be told
-    apart the one nearest to the identity is taken. Accelerometers and gyros are judged apart,
-    since either may be wired wrong; a rigid body turns everywhere alike, and its forces agree
-    after both are moved to one point, to which a wrong axis of the gyro does harm, too.
+    Least squares over the pieces with the whole covariance of the difference, since a bias is the
+    same in every piece. What the least residuals exceed it by is added to every piece alike: moved
+    by wrong rates, or with forces that were wrong before they were moved, nothing fits. Among
+    permutations that cannot be told apart the one nearest to the identity is taken. Accelerometers
+    and gyros are judged apart, since either may be wired wrong; a rigid body turns everywhere
+    alike, and its forces agree after both are moved to one point, to which a wrong axis of the
+    gyro does harm, too. A gyro that both share is not judged.
     """
-    variance = float(np.trace(first.whole + second.whole)) / first.values.size
-    accel, lead, sure, other = _best(first.values, second.values, variance)
-    turn = float(np.trace(first.turned_covariance + second.turned_covariance)) / first.turned.size
-    gyro, gyro_lead, gyro_sure, _ = _best(first.turned, second.turned, turn)
+    accel, lead, sure, other = _best(first, second, "force")
+    if first.borrows(second):
+        return AxisMatch(accel, np.eye(3), lead, 0.0, sure, 0.0, other)
+    gyro, gyro_lead, gyro_sure, _ = _best(first, second, "rate")
     return AxisMatch(accel, gyro, lead, gyro_lead, sure, gyro_sure, other)
 
 
 def _best(
-    first: Array, second: Array, variance: float
+    first: VelocityIncrements, second: VelocityIncrements, of: str
 ) -> tuple[Array, float, float, tuple[str, ...]]:
     candidates = signed_permutations()
-    left = first[None] - second @ candidates.transpose(0, 2, 1)
-    cost = (left**2).sum(axis=(1, 2))
-    scale = max(variance, float(cost.min()) / first.size, 1e-30)
-    behind = (cost - cost.min()) / scale
+    a, b = (v.values if of == "force" else v.turned for v in (first, second))
+    left = (a[None] - b @ candidates.transpose(0, 2, 1)).reshape(len(candidates), -1, 1)
+    covariance = floored(difference_covariance(first, second, of=of, turn=candidates))
+    stated = np.trace(covariance, axis1=1, axis2=2) / a.size
+    unstated = max(float(((left**2).mean(axis=(1, 2)) - stated).min()), 0.0)
+    covariance = covariance + unstated * np.eye(a.size)
+    cost = (left * np.linalg.solve(covariance, left)).sum(axis=(1, 2))
+    behind = (cost - cost.min()) / max(1.0, float(cost.min()) / a.size)
     possible = np.flatnonzero(behind <= POSSIBLE)
     # Nearest to the identity: most ones on the diagonal.
     near = np.trace(candidates[possible], axis1=1, axis2=2)

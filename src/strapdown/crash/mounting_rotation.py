@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.unit_differences import VelocityIncrements
+from strapdown.crash.sample_effects import MOUNTING
+from strapdown.crash.unit_differences import (
+    VelocityIncrements,
+    difference_covariance,
+    floored,
+)
 from strapdown.exceptions import Finding
 from strapdown.sensors.lever_arm import cross_matrix
 
@@ -18,7 +23,9 @@ __all__ = ["MountingRotation", "mounting_rotation", "rotation_findings"]
 
 SIGMAS = 4.0
 ROUNDS = 3
-FLOOR, TINY = 1e-12, 1e-30
+TINY = 1e-30
+# What is looked for is not taken for known to be small.
+_TURN = (MOUNTING,)
 # A direction about which less is known than this is not known.
 MOST_SD = 0.2  # rad
 
@@ -68,14 +75,16 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
     The rotation of least squares (Wahba 1965, doi:10.1137/1007077) by singular values (Markley
     1988, J. Astronaut. Sci. 36, 245), forces and rates weighed by their stated variances; then
     steps of Gauss and Newton with the whole covariances, since a bias is the same in every
-    piece. Its covariance is the inverse of their normal matrix.
+    piece. Its covariance is the inverse of their normal matrix. Rates of a gyro that both share
+    are left out.
     """
     C = _wahba(first, second)
     normal, step, square = np.eye(3), np.zeros(3), 0.0
     for _ in range(ROUNDS):
         normal, step, square = _refine(first, second, C)
         C = rotation.dcm_from_rotation_vector(step) @ C
-    misfit = float(np.sqrt(max(square, 0.0) / (first.values.size + first.turned.size - 3)))
+    size = first.values.size + (0 if first.borrows(second) else first.turned.size)
+    misfit = float(np.sqrt(max(square, 0.0) / (size - 3)))
     values, vectors = np.linalg.eigh(normal)
     variances = np.minimum(max(1.0, misfit) ** 2 / np.maximum(values, 1e-12), np.pi**2)
     return MountingRotation(
@@ -86,12 +95,20 @@ def mounting_rotation(first: VelocityIncrements, second: VelocityIncrements) -> 
     )
 
 
+def _observed(
+    first: VelocityIncrements, second: VelocityIncrements
+) -> list[tuple[Array, Array, str]]:
+    """Forces, and rates where they are not of one gyro."""
+    rates = [] if first.borrows(second) else [(first.turned, second.turned, "rate")]
+    return [(first.values, second.values, "force"), *rates]
+
+
 def _wahba(first: VelocityIncrements, second: VelocityIncrements) -> Array:
     """Rotation of least squares, each kind of vector with one variance."""
-    force = float(np.trace(first.without_angles + second.without_angles)) / first.values.size
-    turn = float(np.trace(first.turned_covariance + second.turned_covariance)) / first.turned.size
-    product = first.values.T @ second.values / max(force, TINY)
-    product = product + first.turned.T @ second.turned / max(turn, TINY)
+    product = np.zeros((3, 3))
+    for a, b, of in _observed(first, second):
+        variance = float(np.trace(difference_covariance(first, second, of=of, without=_TURN)))
+        product += a.T @ b / max(variance / a.size, TINY)
     u, _, vt = np.linalg.svd(product)
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
 
@@ -101,14 +118,9 @@ def _refine(
 ) -> tuple[Array, Array, float]:
     """Normal matrix, small rotation and chi-square of the residuals, by all covariances."""
     normal, right, square = np.zeros((3, 3)), np.zeros(3), 0.0
-    for a, b, own, other in (
-        (first.values, second.values, first.without_angles, second.without_angles),
-        (first.turned, second.turned, first.turned_covariance, second.turned_covariance),
-    ):
+    for a, b, of in _observed(first, second):
         turned = b @ C.T
-        blocks = np.kron(np.eye(len(a)), C)
-        covariance = own + blocks @ other @ blocks.T
-        covariance += max(FLOOR * float(np.diag(covariance).max()), TINY) * np.eye(len(covariance))
+        covariance = floored(difference_covariance(first, second, of=of, without=_TURN, turn=C))
         # (1 + [φ×]) v = v - [v×] φ.
         effect, left = -cross_matrix(turned).reshape(-1, 3), (a - turned).ravel()
         weighed = np.linalg.solve(covariance, np.column_stack([effect, left]))

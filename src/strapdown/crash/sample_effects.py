@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,13 +13,18 @@ from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.triad_curves import AXES, Curve, constant, triad_curves
 from strapdown.exceptions import DataError
 from strapdown.sensors.crash_unit import RecordedTriad
-from strapdown.sensors.lever_arm import MovedImu, lever_matrix, rate_effect
+from strapdown.sensors.lever_arm import MovedImu
 from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
 GYRO_BIAS = "gyro bias"
+LEVER_ARM = "lever arm"
+MOUNTING = "mounting"
+# What is alike for all units of one vehicle.
+VEHICLE = "vehicle"
+ANGLES = ("roll", "pitch", "heading")
 # What is faster than this part of a record is vibration to it.
 VIBRATION = 0.025  # s
 
@@ -31,7 +36,7 @@ class SampleEffects:
     Attributes
     ----------
     names : tuple of str
-        Of each unknown.
+        Of each unknown. Unknowns of one name are one unknown, in whatever unit they appear.
     contributors : tuple of str
         The line of the error budget that each belongs to.
     force : ndarray, (p, n, 3), m/s²
@@ -81,7 +86,8 @@ def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.
         Bias, scale factor, misalignment, nonlinearity and vibration rectification of every range
         that speaks, with what its bias was taken from; the same of the gyro, with its sensitivity
         to specific force and what it does through the lever arm; mounting; lever arm; timing.
-        An unknown without a standard deviation is left out.
+        An unknown without a standard deviation is left out. Those of a borrowed gyro have the
+        name of its unit, and are along its axes; those of the levelling are of the vehicle.
 
     Notes
     -----
@@ -105,13 +111,15 @@ class _UnitEffects:
                 remedy="name the unit whose gyro this one borrows (gyro_from)",
             )
         self.prepared, self.time_sd = prepared, time_sd
-        self.gyro: RecordedTriad = unit.gyro
-        self.turn = unit.mounting.C_vs
+        lender = unit.lender or unit
+        assert lender.gyro is not None
+        self.lender, self.gyro = lender, lender.gyro
+        self.turn, self.gyro_turn = unit.mounting.C_vs, lender.mounting.C_vs
         self.time = prepared.imu.index.to_numpy(dtype=np.float64)
         self.force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
         self.rate = prepared.imu[GYRO].to_numpy(dtype=np.float64)
         # As the sensors have them.
-        self.felt, self.turned = self.force @ self.turn, self.rate @ self.turn
+        self.felt, self.turned = self.force @ self.turn, self.rate @ self.gyro_turn
         rest = prepared.rest
         has_rest = rest is not None and rest.accel_mean is not None
         self.rest_felt = (
@@ -119,8 +127,6 @@ class _UnitEffects:
         )
         self.has_rest = has_rest
         self.moved = moved
-        self.turning = moved.slope.value_of(self.rate)
-        self.lever = lever_matrix(moved.angular_acceleration, self.turning)
         self.names: list[str] = []
         self.contributors: list[str] = []
         self.forces: list[Array] = []
@@ -145,14 +151,10 @@ class _UnitEffects:
             np.array(self.rates).reshape(count, n, 3),
             np.array(self.rests).reshape(count, 3),
             np.array(self.tilts).reshape(count, 3),
-            # Axes of the vehicle see what those of the sensors have, by the squares.
             # What the gyro's noise adds through the arm is told as if each sample had its own:
             # more than there is, since a slope's noise comes back with the other sign.
-            np.sqrt(
-                self.prepared.noise**2 @ (self.turn.T**2)
-                + np.diagonal(self.moved.added, axis1=1, axis2=2)
-            ),
-            np.sqrt(self.prepared.gyro_noise**2 @ (self.turn.T**2)),
+            _sd(self.prepared.noise_covariance + self.moved.added),
+            _sd(self.prepared.gyro_noise_covariance),
         )
 
     def _add(
@@ -169,7 +171,7 @@ class _UnitEffects:
         n = len(self.time)
         added = np.zeros((n, 3)) if force is None else force
         if rate is not None and through_arm and self.moved.lever_arm.any():
-            added = added + self._through_arm(rate)
+            added = added + self.moved.of_rate(rate)
         # The correction that makes the force at rest as long as gravity takes back what an
         # unknown adds along it.
         if self.prepared.gravity_matched and self.has_rest and rest.any():
@@ -177,7 +179,10 @@ class _UnitEffects:
             along = along / np.sqrt(along @ along)
             taken = (rest @ along) * along
             added, rest = added - taken, rest - taken
-        self.names.append(f"{owner or self.prepared.unit.name} {name}")
+        name = f"{owner or self.prepared.unit.name} {name}"
+        # Two parts of one name have unknowns of their own.
+        again = sum(known.split("#")[0] == name for known in self.names)
+        self.names.append(f"{name}#{again + 1}" if again else name)
         self.contributors.append(contributor)
         self.forces.append(added)
         self.rates.append(np.zeros((n, 3)) if rate is None else rate)
@@ -185,17 +190,9 @@ class _UnitEffects:
         self.tilts.append(self._tilted(rest) if tilt is None else tilt)
 
     def _tilted(self, rest: Array) -> Array:
-        """Turn of the level by what was added to the force that it was found from."""
         if not self.prepared.levelling.from_rest:
             return np.zeros(3)
-        north, east, _ = self.level @ rest / GRAVITY
-        return np.array([-east, north, 0.0])
-
-    def _through_arm(self, rate: Array) -> Array:
-        """What an error of the rate adds to the force at the point."""
-        arm, slope = self.moved.lever_arm, self.moved.slope
-        turned = np.einsum("nij,nj->ni", rate_effect(self.turning, arm), slope.value_of(rate))
-        return np.asarray(np.cross(slope.slope_of(rate), arm) + turned)
+        return level_turned_by(rest, self.level)
 
     def _range(self, number: int) -> None:
         triad = self.prepared.unit.accelerometers[number]
@@ -279,12 +276,14 @@ class _UnitEffects:
         )
 
     def _gyro(self) -> None:
-        sd = self.gyro.uncertainty
-        owner = self.prepared.unit.gyro_from or self.prepared.unit.name
-        none = np.zeros(3)
+        sd, owner, none = self.gyro.uncertainty, self.lender.name, np.zeros(3)
+        # Prepared in the axes of this unit; a bias at rest is one of the part's axes.
+        square = (self.gyro_turn.T @ self.turn) ** 2
+        biases = np.sqrt(square @ np.square(self.prepared.gyro_bias_sd))
+        felt = (self.force - self.turn @ self.rest_felt) @ self.gyro_turn
         for axis in range(3):
-            direction = self.turn[:, axis]
-            bias = self.prepared.gyro_bias_sd[axis]
+            direction = self.gyro_turn[:, axis]
+            bias = biases[axis]
             if bias > 0.0:
                 rate = np.tile(bias * direction, (len(self.time), 1))
                 self._add(f"gyro bias {AXES[axis]}", GYRO_BIAS, None, rate, none, owner)
@@ -293,7 +292,7 @@ class _UnitEffects:
             slope = sd.axis("g_sensitivity")[axis]
             if slope > 0.0:
                 for j in range(3):
-                    one = slope * (self.felt[:, j] - self.rest_felt[j])
+                    one = slope * felt[:, j]
                     self._add(
                         f"g-sensitivity {AXES[axis]} of {AXES[j]}",
                         "gyro g-sensitivity",
@@ -313,23 +312,28 @@ class _UnitEffects:
         mounting = self.prepared.unit.mounting
         angle = np.radians(mounting.angles_sd_deg)
         rest = self.turn @ self.rest_felt if self.has_rest else np.zeros(3)
+        lent = self.lender is not self.prepared.unit
         for axis in range(3):
-            unit = np.eye(3)[axis]
+            unit, name = np.eye(3)[axis], f"mounting {ANGLES[axis]}"
             if angle > 0.0:
                 felt, left = self.force, rest
                 if self.prepared.bias_from[0] == FROM_GRAVITY:
                     felt, left = self.force - rest, np.zeros(3)
                 self._add(
-                    f"mounting {('roll', 'pitch', 'heading')[axis]}",
-                    "mounting",
+                    name,
+                    MOUNTING,
                     angle * np.cross(unit, felt),
-                    angle * np.cross(unit, self.rate),
+                    None if lent else angle * np.cross(unit, self.rate),
                     angle * np.cross(unit, left),
                 )
+            turned = np.radians(self.lender.mounting.angles_sd_deg)
+            if lent and turned > 0.0:
+                rate = turned * np.cross(unit, self.rate)
+                self._add(name, MOUNTING, None, rate, np.zeros(3), self.lender.name)
             if mounting.position_sd > 0.0:
                 # The sensor sits further along the axis, so that the arm is shorter there.
-                force = self.lever @ (-mounting.position_sd * unit)
-                self._add(f"lever arm {AXES[axis]}", "lever arm", force, None, np.zeros(3))
+                force = self.moved.lever @ (-mounting.position_sd * unit)
+                self._add(f"lever arm {AXES[axis]}", LEVER_ARM, force, None, np.zeros(3))
 
     def _levelling(self) -> None:
         sd = np.radians(self.prepared.levelling.sd_deg)
@@ -342,13 +346,13 @@ class _UnitEffects:
                 shift = -self.level.T @ np.cross(tilt, [0.0, 0.0, -GRAVITY])
             if sd > 0.0:
                 force = np.tile(shift, (n, 1))
-                self._add(f"levelling {name}", "levelling", force, None, shift, tilt=tilt)
+                self._add(f"levelling {name}", "levelling", force, None, shift, VEHICLE, tilt)
         steady = self.prepared.rest_accel_sd
         if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
             for axis in range(3):
                 force = np.tile(steady * np.eye(3)[axis], (n, 1))
                 name = f"steady acceleration {AXES[axis]}"
-                self._add(name, "accelerometer bias", force, None, np.zeros(3))
+                self._add(name, "accelerometer bias", force, None, np.zeros(3), VEHICLE)
 
     def _timing(self) -> None:
         if self.time_sd > 0.0:
@@ -359,43 +363,24 @@ class _UnitEffects:
             self._add("timing", "timing", force, rate, np.zeros(3), through_arm=False)
 
 
-def combine_effects(parts: Sequence[SampleEffects], weights: Sequence[float]) -> SampleEffects:
-    """Effects on a weighted mean of units at one point.
+def level_turned_by(rest: Array, level: Array) -> Array:
+    """Turn of the level by what was added to the force at rest that it was found from.
 
     Parameters
     ----------
-    parts : sequence of SampleEffects
-        Of units on the same stamps and at the same point. Unknowns of one name are one unknown,
-        as of a gyro that two units share; the others are independent.
-    weights : sequence of float
-        Summing to one.
+    rest : ndarray, (..., 3), m/s²
+        Vehicle axes.
+    level : ndarray, (3, 3)
+        From vehicle axes into local level, heading zero.
 
     Returns
     -------
-    SampleEffects
-        The attitude at rest is that of the mean force at rest.
+    ndarray, (..., 3), rad
+        Rotation vector in local level.
     """
-    force: dict[str, Array] = {}
-    rate: dict[str, Array] = {}
-    rest: dict[str, Array] = {}
-    tilt: dict[str, Array] = {}
-    contributors: dict[str, str] = {}
-    for weight, part in zip(weights, parts, strict=True):
-        for k, name in enumerate(part.names):
-            contributors[name] = part.contributors[k]
-            force[name] = force.get(name, 0.0) + weight * part.force[k]
-            rate[name] = rate.get(name, 0.0) + weight * part.rate[k]
-            rest[name] = rest.get(name, 0.0) + weight * part.rest_force[k]
-            tilt[name] = tilt.get(name, 0.0) + weight * part.tilt[k]
-    count, rows = len(force), parts[0].force.shape[1:]
-    squares = [float(weight) ** 2 for weight in weights]
-    return SampleEffects(
-        tuple(contributors),
-        tuple(contributors.values()),
-        np.array(list(force.values())).reshape(count, *rows),
-        np.array(list(rate.values())).reshape(count, *rows),
-        np.array(list(rest.values())).reshape(count, 3),
-        np.array(list(tilt.values())).reshape(count, 3),
-        np.sqrt(sum(k * p.force_noise**2 for k, p in zip(squares, parts, strict=True))),
-        np.sqrt(sum(k * p.rate_noise**2 for k, p in zip(squares, parts, strict=True))),
-    )
+    felt = rest @ level.T / GRAVITY
+    return np.stack([-felt[..., 1], felt[..., 0], np.zeros(felt.shape[:-1])], axis=-1)
+
+
+def _sd(covariances: Array) -> Array:
+    return np.asarray(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)))

@@ -2,71 +2,172 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_at_point import UnitAtPoint, root_of
+from strapdown.crash.at_point import AtPoint
+from strapdown.crash.noise_of_sums import NoiseOfSums, noise_of_sums
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.sensors.lever_arm import cross_matrix
 
 Array = NDArray[np.float64]
 
-__all__ = ["VelocityIncrements", "common_edges", "sum_weights", "velocity_increments"]
+__all__ = [
+    "TINY",
+    "VelocityIncrements",
+    "common_edges",
+    "difference_covariance",
+    "floored",
+    "joint_covariance",
+    "sum_weights",
+    "velocity_increments",
+]
+
+# Relative to the largest variance: below it a covariance is rounding.
+FLOOR, TINY = 1e-12, 1e-30
 
 
 @dataclass(frozen=True, eq=False)
 class VelocityIncrements:
-    """Integrals of a unit's specific force over pieces of time.
+    """Integrals of a unit's specific force and rates over pieces of time.
+
+    Rows of the matrices are ordered by piece, then axis.
 
     Attributes
     ----------
     edges : ndarray, (m + 1,), s
     values : ndarray, (m, 3), m/s
-    covariance : ndarray, (3 m, 3 m), (m/s)²
-        Noise and every contributor, but not what is not known of position and mounting angles.
-    lever : ndarray, (3 m, 3), 1/s
-        What an error of the position (true minus stated) does to them.
-    position_sd : float, m
-    angles_sd : float, rad
-        Of each mounting angle.
     turned : ndarray, (m, 3), rad
         Integrals of the rates.
-    turned_covariance : ndarray, (3 m, 3 m), rad²
-        Noise and bias of the gyro, but not the mounting angles.
+    names, contributors : tuple of str
+        Of p unknowns, as `SampleEffects`.
+    effects : ndarray, (3 m, p), m/s
+        What one standard deviation of each does to the values.
+    turned_effects : ndarray, (3 m, p), rad
+        The same to `turned`.
+    noise : NoiseOfSums
+    lever : ndarray, (3 m, 3), 1/s
+        What an error of the position (true minus stated) does to the values.
     """
 
     edges: Array
     values: Array
-    covariance: Array
-    lever: Array
-    position_sd: float
-    angles_sd: float
     turned: Array
-    turned_covariance: Array
+    names: tuple[str, ...]
+    contributors: tuple[str, ...]
+    effects: Array
+    turned_effects: Array
+    noise: NoiseOfSums
+    lever: Array
 
-    @property
-    def whole(self) -> Array:
-        """Covariance with the shares of position and mounting angles."""
-        place = self.position_sd**2 * (self.lever @ self.lever.T)
-        return np.asarray(self.without_position + place)
+    def borrows(self, other: VelocityIncrements) -> bool:
+        """Whether both have the rates of one gyro, so that their agreement says nothing."""
+        return self.noise.gyro == other.noise.gyro
 
-    @property
-    def without_position(self) -> Array:
-        """Covariance with the share of the mounting angles."""
-        tilt = cross_matrix(self.values).reshape(-1, 3)
-        return np.asarray(self.covariance + self.angles_sd**2 * (tilt @ tilt.T))
 
-    @property
-    def without_angles(self) -> Array:
-        """Covariance with the share of the position."""
-        return np.asarray(self.covariance + self.position_sd**2 * (self.lever @ self.lever.T))
+def joint_covariance(
+    increments: Sequence[VelocityIncrements],
+    *,
+    of: str = "force",
+    without: Collection[str] = (),
+) -> Array:
+    """Covariance of the increments of several units together.
+
+    Parameters
+    ----------
+    increments : sequence of VelocityIncrements
+        Of k units, between the same edges.
+    of : {'force', 'rate'}
+    without : collection of str
+        Contributors that are left out.
+
+    Returns
+    -------
+    ndarray, (3 m k, 3 m k)
+        Unknowns of one name are one unknown, and the noise of a gyro that several borrow is one
+        noise, as far as they have it at the same samples.
+    """
+    columns: dict[str, int] = {}
+    gyros: dict[tuple[str, int], list[int]] = {}
+    for k, unit in enumerate(increments):
+        for name, contributor in zip(unit.names, unit.contributors, strict=True):
+            if contributor not in without:
+                columns.setdefault(name, len(columns))
+        gyros.setdefault((unit.noise.gyro, unit.noise.turned.shape[1]), []).append(k)
+    size = increments[0].values.size
+    spread = np.zeros((len(increments), size, len(columns)))
+    out = np.zeros((len(increments), size, len(increments), size))
+    for k, unit in enumerate(increments):
+        kept = [i for i, c in enumerate(unit.contributors) if c not in without]
+        given = unit.effects if of == "force" else unit.turned_effects
+        spread[k][:, [columns[unit.names[i]] for i in kept]] = given[:, kept]
+        if of == "force":
+            out[k, :, k] += unit.noise.of_force
+    for of_one in gyros.values():
+        for i in of_one:
+            for j in of_one:
+                one, other = increments[i].noise, increments[j].noise
+                if of == "force":
+                    out[i, :, j] += one.through_arm @ other.through_arm.T
+                else:
+                    out[i, :, j] += one.turned @ other.turned.T
+    whole = len(increments) * size
+    flat = spread.reshape(whole, -1)
+    return np.asarray(out.reshape(whole, whole) + flat @ flat.T)
+
+
+def difference_covariance(
+    first: VelocityIncrements,
+    second: VelocityIncrements,
+    *,
+    of: str = "force",
+    without: Collection[str] = (),
+    turn: Array | None = None,
+) -> Array:
+    """Covariance of the increments of one unit less those of another.
+
+    Parameters
+    ----------
+    first, second : VelocityIncrements
+        Between the same edges.
+    of, without
+        As `joint_covariance`.
+    turn : ndarray, (..., 3, 3), optional
+        By which those of the second are turned before.
+
+    Returns
+    -------
+    ndarray, (..., 3 m, 3 m)
+        What both share is not in it.
+    """
+    size, pieces = first.values.size, len(first.values)
+    turned = np.eye(3) if turn is None else turn
+    blocks = np.einsum("ab,...ij->...aibj", np.eye(pieces), turned)
+    blocks = blocks.reshape(*turned.shape[:-2], size, size)
+    back = np.swapaxes(blocks, -1, -2)
+    both = joint_covariance((first, second), of=of, without=without)
+    mixed = both[:size, size:] @ back
+    out = both[:size, :size] + blocks @ both[size:, size:] @ back
+    out = out - mixed - np.swapaxes(mixed, -1, -2)
+    return np.asarray(0.5 * (out + np.swapaxes(out, -1, -2)))
+
+
+def floored(covariance: Array) -> Array:
+    """A covariance that can be inverted: raised by what is rounding to its largest variance.
+
+    Parameters
+    ----------
+    covariance : ndarray, (..., k, k)
+        One, or several with one floor.
+    """
+    largest = float(np.diagonal(covariance, axis1=-2, axis2=-1).max())
+    return np.asarray(covariance + max(FLOOR * largest, TINY) * np.eye(covariance.shape[-1]))
 
 
 def common_edges(
-    units: Sequence[UnitAtPoint], window: tuple[float, float] | None, pieces: int
+    units: Sequence[AtPoint], window: tuple[float, float] | None, pieces: int
 ) -> Array:
     """Edges of equal pieces over a window that all units cover.
 
@@ -139,12 +240,12 @@ def sum_weights(time: Array, edges: Array, sampling: str) -> Array:
     return np.diff(cumulative, axis=0)
 
 
-def velocity_increments(unit: UnitAtPoint, edges: Array) -> VelocityIncrements:
-    """Integrate a unit's specific force between edges, with the covariance of the result.
+def velocity_increments(unit: AtPoint, edges: Array) -> VelocityIncrements:
+    """Integrate a unit's specific force and rates between edges.
 
     Parameters
     ----------
-    unit : UnitAtPoint
+    unit : AtPoint
     edges : ndarray, (m + 1,), s
 
     Returns
@@ -152,23 +253,22 @@ def velocity_increments(unit: UnitAtPoint, edges: Array) -> VelocityIncrements:
     VelocityIncrements
         In body axes, which turn: what two units on one body share at every instant.
     """
-    unit = unit.within(float(edges[0]), float(edges[-1]))
     weights = sum_weights(unit.time, edges, str(unit.imu.attrs["sampling"]))
-    m = len(weights)
-    covariance = unit.noise_of_sums(weights)
-    for c in unit.contributors:
-        effect = np.einsum("an,nik->aik", weights, c.effect).reshape(3 * m, -1)
-        covariance = covariance + effect @ c.covariance @ effect.T
-    lever = np.einsum("an,nik->aik", weights, unit.lever()).reshape(3 * m, 3)
-    constant = np.kron(weights.sum(axis=1)[:, None], np.diag(unit.gyro_bias_sd))
-    spread = np.einsum("an,nik->aink", weights, root_of(unit.gyro_noise)).reshape(3 * m, -1)
+    effects, size = unit.effects, 3 * len(weights)
+    within = weights.any(axis=0)
+    few = weights[:, within]
+    if unit.moved is None:
+        lever = np.zeros((size, 3))
+    else:
+        lever = np.einsum("an,nik->aik", few, unit.moved.lever[within]).reshape(size, 3)
     return VelocityIncrements(
         edges,
         weights @ unit.force,
-        np.asarray(0.5 * (covariance + covariance.T)),
-        lever,
-        unit.position_sd,
-        unit.angles_sd,
         weights @ unit.rate,
-        np.asarray(spread @ spread.T + constant @ constant.T),
+        effects.names,
+        effects.contributors,
+        np.einsum("an,pni->aip", few, effects.force[:, within], optimize=True).reshape(size, -1),
+        np.einsum("an,pni->aip", few, effects.rate[:, within], optimize=True).reshape(size, -1),
+        noise_of_sums(unit, weights),
+        lever,
     )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.fitted_weights import bandwidth, fitted_weights, slope_response
 from strapdown.dsp.local_weights import LocalWeights
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.exceptions import ConfigError, DataError
@@ -74,17 +75,12 @@ class SlidingFit:
 
     def weights(self, at: int = 0) -> Array:
         """Weights of the slope at sample `at` of the window, -half to half, in 1/s."""
-        u = np.arange(-self.half, self.half + 1) / self.half
-        from numpy.polynomial import legendre
+        slope = fitted_weights(self._window[None], np.array([at * self.step]), self.degree)[1]
+        return np.asarray(slope[0])
 
-        basis = legendre.legvander(u, self.degree)
-        slope = np.array(
-            [
-                legendre.legval(at / self.half, legendre.legder(row))
-                for row in np.eye(self.degree + 1)
-            ]
-        )
-        return np.asarray(slope @ np.linalg.pinv(basis) / (self.half * self.step))
+    @property
+    def _window(self) -> Array:
+        return self.step * np.arange(-self.half, self.half + 1, dtype=np.float64)
 
     def noise_gain(self, at: int = 0) -> float:
         """Standard deviation of the slope per that of white noise of the samples, in 1/s."""
@@ -98,24 +94,16 @@ class SlidingFit:
         frequency : array_like, Hz
             Above zero.
         """
-        omega = 2.0 * np.pi * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-        u = self.step * np.arange(-self.half, self.half + 1)
-        return np.asarray(np.sin(np.outer(omega, u)) @ self.weights() / omega)
+        given = np.atleast_1d(np.asarray(frequency, dtype=np.float64))
+        return np.asarray(self._response(given).real)
+
+    def _response(self, frequency: Array) -> NDArray[np.complex128]:
+        return slope_response(self.weights(), self._window, frequency)
 
     def bandwidth(self, loss: float = 0.01) -> float:
         """Frequency in Hz below which a sine's derivative is off by no more than `loss`."""
         # The response first leaves 1 before the first zero of the window's transform.
-        grid = np.linspace(0.0, 0.5 / self.step, 64 * (2 * self.half + 1))[1:]
-        over = np.abs(1.0 - self.response(grid)) > loss
-        k = int(np.argmax(over)) if over.any() else len(grid) - 1
-        low, high = (grid[k - 1] if k else 0.0), grid[k]
-        for _ in range(50):
-            middle = 0.5 * (low + high)
-            if abs(1.0 - self.response(middle)[0]) > loss:
-                high = middle
-            else:
-                low = middle
-        return float(low)
+        return bandwidth(self._response, 0.5 / self.step, 64 * (2 * self.half + 1), loss)
 
     def pulse_loss(self, duration: float) -> float:
         """What the peak of a haversine pulse of the derivative loses, relative.
@@ -125,8 +113,7 @@ class SlidingFit:
         duration : float, s
             T of ``sin²(π t/T)``; the samples are its integral, and one lies at the peak.
         """
-        t = self.step * np.arange(-self.half, self.half + 1)
-        t = np.clip(t, -0.5 * duration, 0.5 * duration)
+        t = np.clip(self._window, -0.5 * duration, 0.5 * duration)
         # About the peak the pulse is cos²(π t/T).
         turned = 0.5 * t + duration / (4.0 * np.pi) * np.sin(2.0 * np.pi * t / duration)
         return 1.0 - float(self.weights() @ turned)

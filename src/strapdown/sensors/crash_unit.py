@@ -100,6 +100,8 @@ class CrashUnit:
         Instant of the common trigger on this unit's clock.
     trigger_sd : float, s
         How well that instant is known.
+    lender : CrashUnit, optional
+        The unit of that name, once its gyro stands in `gyro`, turned into these sensor axes.
     """
 
     name: str
@@ -109,3 +111,4 @@ class CrashUnit:
     gyro_from: str | None = None
     trigger: float | None = None
     trigger_sd: float = 0.0
+    lender: CrashUnit | None = None

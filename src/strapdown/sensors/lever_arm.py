@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.local_slope import LocalSlope, local_slope
 from strapdown.exceptions import ConfigError
-from strapdown.sensors.local_slope import LocalSlope, local_slope
 from strapdown.sensors.prepared_unit import PreparedUnit
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
 from strapdown.tables.checks import check_columns
@@ -51,6 +52,53 @@ class MovedImu:
     def added_sd(self) -> Array:
         """Standard deviation that is added to each sample, (n, 3), m/s²."""
         return np.asarray(np.sqrt(np.diagonal(self.added, axis1=1, axis2=2)), dtype=np.float64)
+
+    @cached_property
+    def turning(self) -> Array:
+        """Rates where the angular acceleration is taken, (n, 3), rad/s."""
+        return self.slope.value_of(self.imu[GYRO].to_numpy(dtype=np.float64))
+
+    @cached_property
+    def lever(self) -> Array:
+        """What a longer lever arm adds to each sample, (n, 3, 3), 1/s²."""
+        return lever_matrix(self.angular_acceleration, self.turning)
+
+    def of_rate(self, rate: Array) -> Array:
+        """What small errors of the rates add to the specific force through the lever arm.
+
+        Parameters
+        ----------
+        rate : ndarray, (n, 3), rad/s
+
+        Returns
+        -------
+        ndarray, (n, 3), m/s²
+        """
+        by_value = rate_effect(self.turning, self.lever_arm)
+        turned = np.einsum("nij,nj->ni", by_value, self.slope.value_of(rate))
+        return np.asarray(np.cross(self.slope.slope_of(rate), self.lever_arm) + turned)
+
+    def of_rates_in_sums(self, weights: Array) -> Array:
+        """Weights of the errors of the rates in sums of the specific force.
+
+        Parameters
+        ----------
+        weights : ndarray, (m, n)
+            Of the samples of the specific force in each of m sums.
+
+        Returns
+        -------
+        ndarray, (m, n, 3, 3)
+            From an error of each rate to each axis of each sum.
+        """
+        by_slope = self.slope.weighted(weights)[0]
+        out = np.einsum("an,ij->anij", by_slope, -cross_matrix(self.lever_arm))
+        by_value = rate_effect(self.turning, self.lever_arm)
+        for axis in range(3):
+            for other in range(3):
+                rows = weights * by_value[:, axis, other]
+                out[:, :, axis, other] += self.slope.weighted(rows)[1]
+        return np.asarray(out)
 
 
 def move_imu(
@@ -144,8 +192,7 @@ def move_unit(
     MovedImu
         In vehicle axes.
     """
-    C = prepared.unit.mounting.C_vs
-    noise = np.einsum("ij,nj,kj->nik", C, prepared.gyro_noise**2, C)
+    noise = prepared.gyro_noise_covariance
     arm = np.asarray(point, dtype=np.float64) - np.asarray(prepared.unit.mounting.position)
     return move_imu(prepared.imu, arm, gyro_noise=noise, window=window, gyro_delay=gyro_delay)
 

@@ -95,3 +95,17 @@ class PreparedUnit:
     gravity_matched: bool
     gravity_correction: float = 0.0
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def noise_covariance(self) -> Array:
+        """Covariance of each sample of the specific force, vehicle axes, (n, 3, 3), (m/s²)²."""
+        return self._in_vehicle_axes(self.noise)
+
+    @property
+    def gyro_noise_covariance(self) -> Array:
+        """Covariance of each sample of the rates, vehicle axes, (n, 3, 3), (rad/s)²."""
+        return self._in_vehicle_axes(self.gyro_noise)
+
+    def _in_vehicle_axes(self, sd: Array) -> Array:
+        C = self.unit.mounting.C_vs
+        return np.asarray(np.einsum("ij,nj,kj->nik", C, sd**2, C))

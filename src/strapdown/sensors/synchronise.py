@@ -192,13 +192,15 @@ def synchronise(
             triads.append(at)
             findings += said
         gyro, gyro_sd = (triads.pop() if u.gyro is not None else None), 0.0
+        lender = None
         if borrowed is not None:
-            lender = done[borrowed]
-            assert lender.gyro is not None
-            lent = at_rows(lender.gyro, own, rate)
-            gyro = turned_gyro(lent, lender.unit.mounting, u.unit.mounting)
-            gyro_sd = math.hypot(clock.sd, lender.time_sd)
-        done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, borrowed, gyro_sd)
+            lent = done[borrowed]
+            assert lent.gyro is not None
+            lender = lent.unit
+            there = at_rows(lent.gyro, own, rate)
+            gyro = turned_gyro(there, lender.mounting, u.unit.mounting)
+            gyro_sd = math.hypot(clock.sd, lent.time_sd)
+        done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, lender, gyro_sd)
     ordered = tuple(done[u.name] for u in units)
     findings += _ends(ordered)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
@@ -209,7 +211,7 @@ def _made(
     clock: UnitClock,
     accelerometers: tuple[TriadAtStamps, ...],
     gyro: TriadAtStamps | None,
-    lender: str | None,
+    lender: CrashUnit | None,
     gyro_time_sd: float,
 ) -> SynchronisedUnit:
     made = replace(
@@ -218,9 +220,17 @@ def _made(
         gyro=None if gyro is None else gyro.triad,
         trigger=0.0,
         trigger_sd=clock.sd,
+        lender=lender,
     )
     return SynchronisedUnit(
-        made, accelerometers, gyro, clock.offset, clock.sd, clock.how, lender, gyro_time_sd
+        made,
+        accelerometers,
+        gyro,
+        clock.offset,
+        clock.sd,
+        clock.how,
+        None if lender is None else lender.name,
+        gyro_time_sd,
     )
 
 

@@ -9,11 +9,12 @@ from typing import Any
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.combine_units import combine_units
-from strapdown.crash.compare_units import UnitComparison, compare_units
+from strapdown.crash.compare_units import compare_units
 from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.prepare_together import prepare_together
+from strapdown.crash.unit_comparison import UnitComparison
 from strapdown.crash.unit_reconstruction import (
     PEAK_WINDOW,
     UnitReconstruction,

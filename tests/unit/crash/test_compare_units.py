@@ -9,13 +9,20 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
+from strapdown.crash.at_point import at_point
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.compare_units import compare_units
 from strapdown.crash.match_axes import signed_permutations
-from strapdown.crash.unit_at_point import Contributor, UnitAtPoint
-from strapdown.crash.unit_differences import sum_weights, velocity_increments
+from strapdown.crash.unit_differences import (
+    difference_covariance,
+    joint_covariance,
+    sum_weights,
+    velocity_increments,
+)
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.sensors.lever_arm import move_imu
+from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, imu_table
 
 G = 9.80665
@@ -58,6 +65,8 @@ def unit(
     position_sd=0.0,
     start=-0.5,
     wobble=3.0,
+    gyro_bias_sd=0.0,
+    gyro_seed=None,
 ):
     """A unit with bias, scale and noise drawn from what it states, moved to P."""
     rng = np.random.default_rng(seed)
@@ -65,25 +74,40 @@ def unit(
     bias, scale = BIAS_SD * rng.normal(size=3), SCALE_SD * rng.normal(size=3)
     read = force * (1 + errors * scale) + errors * bias
     read = read + errors * SD * rng.normal(size=force.shape)
+    if gyro_seed is not None:
+        rng = np.random.default_rng(gyro_seed)
     turned = omega + errors * GYRO_SD * rng.normal(size=omega.shape)
+    turned = turned + errors * gyro_bias_sd * rng.normal(size=3)
     read = read if accel_axes is None else read @ np.asarray(accel_axes)
     turned = turned if gyro_axes is None else turned @ np.asarray(gyro_axes)
     position = np.asarray(place if stated is None else stated, dtype=float)
-    moved = move_imu(imu_table(time, turned, read), P - position, gyro_noise=GYRO_SD)
-    n = time.size
-    return UnitAtPoint(
-        name=name,
-        imu=moved.imu,
-        noise=np.tile(SD**2 * np.eye(3), (n, 1, 1)),
-        gyro_noise=np.tile(GYRO_SD**2 * np.eye(3), (n, 1, 1)),
-        contributors=(
-            Contributor("bias", np.tile(np.eye(3), (n, 1, 1)), BIAS_SD**2 * np.eye(3)),
-            Contributor("scale", read[:, :, None] * np.eye(3), SCALE_SD**2 * np.eye(3)),
-        ),
-        position=position,
-        position_sd=position_sd,
-        moved=moved,
+    imu = imu_table(time, turned, read)
+    never = np.zeros(read.shape, dtype=bool)
+    made = CrashUnit(
+        name,
+        (RecordedTriad(imu[ACCEL], TriadUncertainty(bias=BIAS_SD, scale=SCALE_SD), "accel"),),
+        RecordedTriad(imu[GYRO], TriadUncertainty(), "gyro"),
+        Mounting(tuple(position), position_sd=position_sd),
     )
+    if gyro_seed is not None:
+        made = replace(made, lender=replace(made, name="the lender"))
+    there = PreparedUnit(
+        unit=made,
+        imu=imu,
+        range_spoken=np.zeros(read.shape, dtype=np.int8),
+        clipped=never,
+        gyro_clipped=never,
+        noise=np.full(read.shape, SD),
+        gyro_noise=np.full(read.shape, GYRO_SD),
+        rest=None,
+        rest_accel_sd=0.0,
+        levelling=Levelling(0.0, 0.0, 0.0, False),
+        gyro_bias_sd=(gyro_bias_sd,) * 3,
+        bias_from=(None,),
+        bias_sd=((0.0, 0.0, 0.0),),
+        gravity_matched=False,
+    )
+    return at_point(there, P)
 
 
 A, B, C = (-0.6, 0.5, -0.2), (0.4, -0.5, 0.1), (0.9, 0.3, -0.3)
@@ -120,6 +144,29 @@ def test_honest_units_agree_and_their_chi_square_is_one():
     assert 1.0 - 5 * math.sqrt(2 / freedom / 25) < mean < 1.0 + 5 * math.sqrt(2 / freedom / 25)
     assert np.mean(total) == pytest.approx(1.0, abs=5 * math.sqrt(2 / (2 * freedom) / 25))
     assert np.mean(np.array(against) < 0.5) == pytest.approx(0.5, abs=5 * 0.5 / math.sqrt(25))
+
+
+def test_a_gyro_that_both_borrow_is_no_reason_to_differ_twice():
+    def covariance(bias, seed):
+        units = [unit(n, A, 1, gyro_bias_sd=bias, gyro_seed=seed) for n in ("A", "B")]
+        edges = np.linspace(-0.1, 0.75, 21)
+        return difference_covariance(*(velocity_increments(u, edges) for u in units))
+
+    # At one place what the gyro does is the same in both.
+    none = covariance(0.0, 5)
+    assert np.allclose(covariance(0.3, 5), none, atol=1e-12 * np.trace(none))
+    assert np.trace(covariance(0.3, None)) > 2.0 * np.trace(none)
+    chi = []
+    for k in range(25):
+        pair = [
+            unit(n, p, 10 * k + i, gyro_bias_sd=0.3, gyro_seed=900 + k)
+            for i, (n, p) in enumerate((("A", A), ("B", B)))
+        ]
+        found = compare_units(pair).pairs[0]
+        assert np.array_equal(found.axes.gyro, np.eye(3))
+        chi.append(found.chi_square / found.freedom)
+    # The square of the bias, 0.1 rad²/s² on half a metre, is second order: 0.05 of 0.5 m/s².
+    assert np.mean(chi) == pytest.approx(1.0, abs=5 * math.sqrt(2 / found.freedom / 25))
 
 
 def test_units_of_different_rates_are_compared_without_resampling():
@@ -221,7 +268,7 @@ def test_a_combination_is_better_than_its_parts_and_says_how_much():
         true = (w @ truth)[0]
         got = velocity_increments(both, edges)
         error = got.values[0] - true
-        z.append(error @ np.linalg.solve(got.whole, error))
+        z.append(error @ np.linalg.solve(joint_covariance([got]), error))
         whole.append(np.sum(error**2))
         parts.append(np.sum((velocity_increments(units[0], edges).values[0] - true) ** 2))
     # Chi-square of three degrees of freedom; noise of the gyro is taken as white in a

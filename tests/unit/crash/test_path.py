@@ -10,11 +10,12 @@ from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown._kernels.perturbed_runs import perturbed_runs
+from strapdown.crash.combined_effects import combine_effects
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY
 from strapdown.crash.monte_carlo import sample_paths
 from strapdown.crash.path import reconstruct_path
-from strapdown.crash.sample_effects import combine_effects, unit_effects
+from strapdown.crash.sample_effects import unit_effects
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
@@ -157,7 +158,7 @@ def test_an_error_is_truth_less_computed(case):
     turned = rotation.rotation_vector_from_quaternion(
         rotation.compose(other.q_nb[-1], rotation.conjugate(path.q_nb[-1]))
     )
-    k = path.names.index("imu1 levelling north")
+    k = path.names.index("vehicle levelling north")
     grown = path.errors[k, -1] * np.radians(1.0) / np.radians(unit.levelling.sd_deg)
     # Second order of a degree: 1e-4 of the turn, which is 0.017.
     assert np.allclose(turned, grown[:3], atol=3e-4)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_coeffs, savgol_filter
 
+from strapdown.dsp.local_slope import local_slope
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.lever_arm import move_imu
-from strapdown.sensors.local_slope import local_slope
 from strapdown.tables import ACCEL, imu_table
 
 R = np.array([-0.6, 0.5, -0.2])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -9,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.fitted_weights import bandwidth, fitted_weights, slope_response
+from strapdown.dsp.local_weights import LocalWeights
 from strapdown.exceptions import ConfigError, DataError
 
 if TYPE_CHECKING:
@@ -35,7 +38,8 @@ class LocalSlope:
         Weights of the samples of the window: of the slope, in 1/s, and of the value.
     bandwidth : float, Hz
         Frequency at which the slope in the middle of a record has fallen to 1/√2 of the true
-        one. Its delay is zero there: the window is symmetric.
+        one (where the signal is late: is off by as much). Its delay is zero there: the window is
+        symmetric.
     window : float, s
         From the first to the last sample of a window.
     """
@@ -48,11 +52,11 @@ class LocalSlope:
 
     def slope_of(self, y: Array) -> Array:
         """Slope of samples (n, k) at each stamp, in their unit per s."""
-        return self._apply(self.slope, y)
+        return LocalWeights(self.first, self.slope).apply(y)
 
     def value_of(self, y: Array) -> Array:
         """Value of the signal (n, k) where the slopes are taken."""
-        return self._apply(self.value, y)
+        return LocalWeights(self.first, self.value).apply(y)
 
     def weighted(self, rows: Array) -> tuple[Array, Array]:
         """Weights of the samples in sums of slopes and of values.
@@ -81,12 +85,6 @@ class LocalSlope:
         slope = csr_array((self.slope.ravel(), columns, starts), shape=(n, n))
         return slope, csr_array((self.value.ravel(), columns, starts), shape=(n, n))
 
-    def _apply(self, weights: Array, y: Array) -> Array:
-        out = np.zeros((len(weights), y.shape[1]))
-        for j in range(weights.shape[1]):
-            out += weights[:, j, None] * y[self.first + j]
-        return out
-
 
 def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0) -> LocalSlope:
     """Weights of a parabola fitted by least squares to each sample and its neighbours.
@@ -103,9 +101,9 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
     Returns
     -------
     LocalSlope
-        With equal steps the Savitzky-Golay filter of order two (Savitzky and Golay 1964,
-        doi:10.1021/ac60214a047). White noise s becomes ``s sqrt(sum(slope²))``. Without delay
-        the values are the samples themselves.
+        With equal steps the filter of Savitzky and Golay, as `SlidingFit` of degree two. White
+        noise s becomes ``s sqrt(sum(slope²))``. Without delay the values are the samples
+        themselves.
 
     Raises
     ------
@@ -140,24 +138,16 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
     slope, value = np.empty((n, width)), np.empty((n, width))
     for a in range(0, n, CHUNK):
         rows = slice(a, min(a + CHUNK, n))
-        at = time[first[rows][:, None] + np.arange(width)] - time[rows][:, None] - delay
-        x = at / step
-        # Normal equations of 1, x, x² about the instant: value and slope are two coefficients.
-        basis = np.stack([np.ones_like(x), x, x * x][: min(3, width)], axis=1)
-        inverse = np.linalg.solve(basis @ basis.transpose(0, 2, 1), basis)
-        value[rows], slope[rows] = inverse[:, 0], inverse[:, 1] / step
+        near = time[first[rows][:, None] + np.arange(width)]
+        value[rows], slope[rows] = fitted_weights(near, time[rows] + delay, min(2, width - 1))
     if delay == 0.0:
         value = (first[:, None] + np.arange(width) == np.arange(n)[:, None]).astype(np.float64)
     middle = n // 2
     at = time[first[middle] + np.arange(width)] - time[middle] - delay
     span = float(time[min(n - 1, int(first[middle]) + width - 1)] - time[first[middle]])
-    return LocalSlope(first, slope, value, _bandwidth(slope[middle], at, step), span)
 
+    def response(frequency: Array) -> NDArray[np.complex128]:
+        return slope_response(slope[middle], at, frequency)
 
-def _bandwidth(weights: Array, at: Array, step: float) -> float:
-    """Where the response falls to 1/√2 of ``i 2 pi f``."""
-    f = np.linspace(1e-4, 0.5, 2000) / step
-    turn = 2.0 * np.pi * np.outer(f, at)
-    response = np.abs(np.exp(1j * turn) @ weights) / (2.0 * np.pi * f)
-    below = np.flatnonzero(response < np.sqrt(0.5))
-    return float(f[below[0]]) if below.size else float(f[-1])
+    band = bandwidth(response, 0.5 / step, 64 * width, 1.0 - math.sqrt(0.5))
+    return LocalSlope(first, slope, value, band, span)
