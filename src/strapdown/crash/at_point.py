@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
+from strapdown.crash.acceleration import force_at_rest
 from strapdown.crash.sample_effects import SampleEffects, unit_effects
 from strapdown.results import RestStretch
 from strapdown.sensors.lever_arm import MovedImu, move_unit
@@ -81,9 +81,9 @@ class AtPoint:
         """
         rest, level = self.rest, self.levelling
         if rest is None:
-            C_bn = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0]).T
             tilt = gravity * math.radians(level.sd_deg)
-            return C_bn @ np.array([0.0, 0.0, -gravity]), np.array([tilt, tilt, 0.0])
+            force = force_at_rest(level.roll_deg, level.pitch_deg, gravity)
+            return force, np.array([tilt, tilt, 0.0])
         within = (self.imu.index >= rest.start - 1e-9) & (self.imu.index <= rest.end + 1e-9)
         mean = self.imu.loc[within, ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
         noise = np.zeros(3) if rest.accel_mean_sd is None else np.asarray(rest.accel_mean_sd)

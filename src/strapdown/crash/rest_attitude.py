@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.alignment.levelling import level
+from strapdown.crash.acceleration import force_at_rest
 from strapdown.exceptions import DataError
 from strapdown.results import RestStretch
 from strapdown.sensors.prepared_unit import Levelling
@@ -94,8 +94,7 @@ def from_stated_attitude(
     known = math.hypot(gravity * math.radians(sd), unknown, max(rest.accel_mean_sd))
     if known >= float(bias_sd.max()):
         return levelling, None
-    C_nb = rotation.dcm_from_euler([roll, pitch, 0.0])
-    return levelling, np.asarray(rest.accel_mean) - C_nb.T @ np.array([0.0, 0.0, -gravity])
+    return levelling, np.asarray(rest.accel_mean) - force_at_rest(roll, pitch, gravity)
 
 
 def gravity_correction(

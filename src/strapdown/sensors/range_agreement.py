@@ -21,9 +21,6 @@ MOST_SD = 0.1
 # An element this far from the unit matrix is another axis or another sign, no scale factor.
 OTHER_AXIS = 0.5
 LEAST_SAMPLES = 20
-# A lower range that is clear for fewer samples than this before and in the crash says nothing
-# of the higher one.
-NEAR_END = 0.9
 
 
 def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:

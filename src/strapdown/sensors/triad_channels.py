@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
+from strapdown.tables import ACCEL, SAMPLINGS, find_gaps
 from strapdown.tables.checks import check_rows, check_time
 
 Array = NDArray[np.float64]
@@ -278,8 +278,3 @@ def _over_range(
             remedy=f"check the units of the table and of the range ({hint})",
         )
     ]
-
-
-def columns_of(unit: CrashUnit, triad: RecordedTriad) -> list[str]:
-    """Column names of one of the unit's triads."""
-    return GYRO if triad is unit.gyro else ACCEL

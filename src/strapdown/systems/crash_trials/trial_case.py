@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown.crash.entry import Entry
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.sensors.crash_unit import CrashUnit, Mounting
+from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.error_draws import child
 from strapdown.simulation import CrashScenario, Ringing
 from strapdown.simulation.crash_recording import record_crash
