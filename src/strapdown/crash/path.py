@@ -19,6 +19,7 @@ from strapdown.exceptions import DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.sensors.prepared_unit import Levelling
+from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import EULER, NED
 from strapdown.tables import VELOCITY as VELOCITIES
 
@@ -184,7 +185,7 @@ def reconstruct_path(
     ahead = make_leg(
         mechanization, begin.state, imu, padded, slice(anchor, last + 1), backward=False
     )
-    origin = replace(origin, velocity=_triple(begin.state.v_n))
+    origin = replace(origin, velocity=triad_of(begin.state.v_n))
     return _joined((back, ahead), origin, names, contributors, start)
 
 
@@ -367,7 +368,3 @@ def _angle_rates(angles: Array) -> Array:
     out[:, 2, 0], out[:, 2, 1] = c * np.tan(pitch), s * np.tan(pitch)
     out[:, 2, 2] = 1.0
     return out
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
