@@ -16,10 +16,14 @@ __all__ = [
     "MAG_UNITS",
     "STANDARD_GRAVITY",
     "TIME_UNITS",
+    "TWO_SIDED_95",
 ]
 
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665
+
+#: 95 % of a normal distribution lie within so many standard deviations.
+TWO_SIDED_95 = 1.959963984540054
 
 _DEGREE = math.pi / 180.0
 

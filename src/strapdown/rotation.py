@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 __all__ = [
     "compose",
     "conjugate",
+    "cross_matrix",
     "dcm_from_euler",
     "dcm_from_quaternion",
     "dcm_from_rotation_vector",
@@ -582,6 +583,23 @@ def from_scipy(rotation: Rotation) -> Array:
     """
     q: Array = np.ascontiguousarray(rotation.as_quat()[..., [3, 0, 1, 2]], dtype=np.float64)
     return q
+
+
+def cross_matrix(vectors: Array) -> Array:
+    """Matrices of the cross product with vectors, ``[v x] u = v x u``.
+
+    Parameters
+    ----------
+    vectors : ndarray, (..., 3)
+
+    Returns
+    -------
+    ndarray, (..., 3, 3)
+    """
+    out = np.zeros((*vectors.shape, 3))
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -z, y, -x
+    return np.asarray(out - np.swapaxes(out, -1, -2))
 
 
 def within_half_turn(angles_deg: Array) -> Array:

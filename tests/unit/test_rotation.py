@@ -649,3 +649,11 @@ def test_every_public_name_is_exported_and_documented():
         assert f"{b}_from_{a}" in rotation.__all__
     for name in rotation.__all__:
         assert getattr(rotation, name).__doc__
+
+
+def test_cross_matrix_is_the_cross_product():
+    v, u = np.random.default_rng(8).normal(size=(2, 5, 2, 3))
+    assert np.array_equal(
+        np.einsum("...ij,...j->...i", rotation.cross_matrix(v), u).round(14),
+        np.cross(v, u).round(14),
+    )

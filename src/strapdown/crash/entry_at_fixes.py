@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.crash.entry_priors import EntryPriors
-from strapdown.crash.entry_sensitivity import Course, between, skew
+from strapdown.crash.entry_sensitivity import Course, between
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.evaluation.trajectory_at import trajectory_at
 from strapdown.mechanization import NavigationRun
@@ -65,5 +65,5 @@ def by_state(now: AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
     back = by_v @ C_nb.transpose(0, 2, 1)
     out = np.zeros((len(v), 9))
     out[:, 3:6] = back[:, 0]
-    out[:, 6:9] = (back @ skew(now.velocity))[:, 0]
+    out[:, 6:9] = (back @ rotation.cross_matrix(now.velocity))[:, 0]
     return out

@@ -18,7 +18,6 @@ from strapdown.crash.entry_sensitivity import (
     at_fixes,
     noise_between_fixes,
     sensor_errors,
-    skew,
 )
 from strapdown.crash.entry_state import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
 from strapdown.ellipsoids import find_ellipsoid
@@ -278,15 +277,17 @@ class _Search:
         C_nb = rotation.dcm_from_quaternion(now.q_nb)
         look = np.zeros((m, 7, 9))
         look[:, 0:3, 0:3] = look[:, 3:6, 3:6] = np.eye(3)
-        look[:, 0:3, 6:] = -skew(C_nb @ self.arm)
-        look[:, 3:6, 6:] = -skew(np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm)))
+        look[:, 0:3, 6:] = -rotation.cross_matrix(C_nb @ self.arm)
+        look[:, 3:6, 6:] = -rotation.cross_matrix(
+            np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm))
+        )
         look[:, 6] = by_state(now, C_nb, p)
         # Of the antenna, of the clock, and the side slip that stays.
         own = np.zeros((m, 7, STATES + q + 5))
         own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
-        own[:, 3:6, GYRO_BIAS] += C_nb @ skew(self.arm)
+        own[:, 3:6, GYRO_BIAS] += C_nb @ rotation.cross_matrix(self.arm)
         own[:, 0:3, STATES + q : -2] = C_nb
-        own[:, 3:6, STATES + q : -2] = C_nb @ skew(now.rate)
+        own[:, 3:6, STATES + q : -2] = C_nb @ rotation.cross_matrix(now.rate)
         own[:, 0:3, -2], own[:, 3:6, -2] = -now.velocity, -now.acceleration
         own[:, 6, -1] = 1.0
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.rotation import cross_matrix
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 Array = NDArray[np.float64]
@@ -101,7 +102,7 @@ def at_fixes(course: Course, errors: SensorErrors, instants: Array) -> Array:
     phi[:, :, 15:] = -course.C_nb @ errors.gyro
     phi = back_integral(course.time, phi)
     phi[:, :, 6:9] += np.eye(3)
-    v = -skew(pushed) @ phi
+    v = -cross_matrix(pushed) @ phi
     v[:, :, 12:15] -= course.C_nb
     v[:, :, 15:] -= course.C_nb @ errors.accel
     v = back_integral(course.time, v)
@@ -139,7 +140,7 @@ def noise_between_fixes(
         """Of an attitude error at s on velocity and position at t before it."""
         v_s, v_t = between(course.time, gained, s), between(course.time, gained, t)
         s_s, s_t = between(course.time, moved, s), between(course.time, moved, t)
-        return skew(v_s - v_t), -skew(v_s * (s - t)[:, None] - (s_s - s_t))
+        return cross_matrix(v_s - v_t), -cross_matrix(v_s * (s - t)[:, None] - (s_s - s_t))
 
     before = np.concatenate([course.time[-1:], instants[:-1]])
     carry = np.zeros((len(instants), 9, 9))
@@ -183,11 +184,3 @@ def between(time: Array, values: Array, instants: Array) -> Array:
     share = (instants - time[after - 1]) / (time[after] - time[after - 1])
     share = share.reshape((-1,) + (1,) * (values.ndim - 1))
     return np.asarray(values[after - 1] * (1.0 - share) + values[after] * share)
-
-
-def skew(v: Array) -> Array:
-    """Matrices of the cross product with vectors, (..., 3, 3)."""
-    out = np.zeros((*v.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
-    return out

@@ -15,7 +15,6 @@ from strapdown.crash.unit_differences import (
     floored,
 )
 from strapdown.exceptions import Finding
-from strapdown.sensors.lever_arm import cross_matrix
 
 Array = NDArray[np.float64]
 
@@ -122,7 +121,7 @@ def _refine(
         turned = b @ C.T
         covariance = floored(difference_covariance(first, second, of=of, without=_TURN, turn=C))
         # (1 + [φ×]) v = v - [v×] φ.
-        effect, left = -cross_matrix(turned).reshape(-1, 3), (a - turned).ravel()
+        effect, left = -rotation.cross_matrix(turned).reshape(-1, 3), (a - turned).ravel()
         weighed = np.linalg.solve(covariance, np.column_stack([effect, left]))
         normal += effect.T @ weighed[:, :3]
         right += effect.T @ weighed[:, 3]

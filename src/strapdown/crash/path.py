@@ -20,6 +20,7 @@ from strapdown.exceptions import DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.sensors.prepared_unit import Levelling
+from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import EULER, NED
 from strapdown.tables import VELOCITY as VELOCITIES
 
@@ -188,7 +189,7 @@ def reconstruct_path(
     ahead = make_leg(
         mechanization, begin.state, imu, padded, slice(anchor, last + 1), backward=False
     )
-    origin = replace(origin, velocity=_triple(begin.state.v_n))
+    origin = replace(origin, velocity=triad_of(begin.state.v_n))
     return _joined((back, ahead), origin, names, contributors, start)
 
 
@@ -372,6 +373,3 @@ def _states(leg: Leg) -> Array:
         states[:, V : V + 3] *= -1.0
     return states
 
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])

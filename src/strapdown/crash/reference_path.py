@@ -8,10 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.crash.delta_v_bound import TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
 from strapdown.exceptions import DataError
+from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import NED, POSITION_SD
 
 Array = NDArray[np.float64]
@@ -109,9 +110,9 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
     return PathComparison(
         pd.DataFrame(difference, index=index, columns=NED),
         pd.DataFrame(bound, index=index, columns=NED),
-        _triple(np.sqrt((difference**2).mean(axis=0))),
-        _triple(largest),
-        _triple((np.abs(difference) <= bound).mean(axis=0)),
+        triad_of(np.sqrt((difference**2).mean(axis=0))),
+        triad_of(largest),
+        triad_of((np.abs(difference) <= bound).mean(axis=0)),
         float(difference[-1] @ np.linalg.pinv(covariance[-1]) @ difference[-1]),
         float(chi2.ppf(0.95, 3)),
     )
@@ -147,7 +148,3 @@ def _columns(reference: pd.DataFrame, time: Array) -> tuple[Array, Array]:
             remedy="drop such rows, and sort by time",
         )
     return values, sd
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])

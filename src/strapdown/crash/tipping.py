@@ -8,15 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
 
 Array = NDArray[np.float64]
 
 __all__ = ["PASSENGER_CAR", "RollMotion", "TippingBody"]
-
-_Z95 = 1.959963984540054
 
 
 @dataclass(frozen=True)
@@ -172,8 +170,8 @@ class TippingBody:
         share = self.energy_share(roll, rate)[counted]
         best = int(np.argmax(share))
         bounds = [float(share[best])]
-        for drift in (-_Z95 * rate_sd, _Z95 * rate_sd):
-            for tilt in (-_Z95 * start_sd_deg, _Z95 * start_sd_deg):
+        for drift in (-TWO_SIDED_95 * rate_sd, TWO_SIDED_95 * rate_sd):
+            for tilt in (-TWO_SIDED_95 * start_sd_deg, TWO_SIDED_95 * start_sd_deg):
                 moved = roll + math.radians(tilt) + drift * (stamps - stamps[0])
                 bounds.append(float(self.energy_share(moved, rate + drift)[counted].max()))
         turned = roll[counted]

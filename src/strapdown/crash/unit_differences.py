@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.noise_of_sums import NoiseOfSums, noise_of_sums
+from strapdown.crash.window_weights import window_weights
 from strapdown.exceptions import ConfigError, DataError
 
 Array = NDArray[np.float64]
@@ -21,7 +23,6 @@ __all__ = [
     "difference_covariance",
     "floored",
     "joint_covariance",
-    "sum_weights",
     "velocity_increments",
 ]
 
@@ -206,40 +207,6 @@ def common_edges(
     return np.linspace(start, end, min(pieces, most) + 1)
 
 
-def sum_weights(time: Array, edges: Array, sampling: str) -> Array:
-    """Weights of the samples in the integrals between edges.
-
-    Parameters
-    ----------
-    time : ndarray, (n,), s
-    edges : ndarray, (m + 1,), s
-        Within the record.
-    sampling : {'instantaneous', 'mean'}
-        Straight lines between the samples, or each the mean over the interval that ends there.
-
-    Returns
-    -------
-    ndarray, (m, n), s
-    """
-    n, steps = time.size, np.diff(time)
-    k = np.clip(np.searchsorted(time, edges, side="right") - 1, 0, n - 2)
-    since = edges - time[k]
-    rows = np.arange(n)
-    whole = np.zeros(n)
-    cumulative = np.zeros((edges.size, n))
-    if sampling == "mean":
-        whole[1:] = steps
-        cumulative = np.where(rows <= k[:, None], whole, 0.0)
-        cumulative[np.arange(edges.size), k + 1] = since
-        return np.diff(cumulative, axis=0)
-    left, right = np.r_[0.5 * steps, 0.0], np.r_[0.0, 0.5 * steps]
-    cumulative = np.where(rows < k[:, None], left, 0.0) + np.where(rows <= k[:, None], right, 0.0)
-    part = 0.5 * since**2 / steps[k]
-    cumulative[np.arange(edges.size), k] += since - part
-    cumulative[np.arange(edges.size), k + 1] += part
-    return np.diff(cumulative, axis=0)
-
-
 def velocity_increments(unit: AtPoint, edges: Array) -> VelocityIncrements:
     """Integrate a unit's specific force and rates between edges.
 
@@ -253,7 +220,10 @@ def velocity_increments(unit: AtPoint, edges: Array) -> VelocityIncrements:
     VelocityIncrements
         In body axes, which turn: what two units on one body share at every instant.
     """
-    weights = sum_weights(unit.time, edges, str(unit.imu.attrs["sampling"]))
+    sampling = str(unit.imu.attrs["sampling"])
+    weights = np.array(
+        [window_weights(unit.time, *piece, sampling) for piece in itertools.pairwise(edges)]
+    )
     effects, size = unit.effects, 3 * len(weights)
     within = weights.any(axis=0)
     few = weights[:, within]

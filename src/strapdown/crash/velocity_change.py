@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.delta_v import DeltaV
-from strapdown.crash.delta_v_bound import TWO_SIDED_95, DeltaVBound
+from strapdown.crash.delta_v_bound import DeltaVBound
 from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
 from strapdown.crash.pdof_interval import PdofInterval, pdof_interval
 

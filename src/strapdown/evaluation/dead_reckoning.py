@@ -184,7 +184,7 @@ def _sensitivities(
     is what the start was off plus the integral of ``C b_g``.
     """
     n, seconds = len(time) - 1, float(time[-1] - time[0])
-    by_psi = -_cross(steps.force_n)  # (2, n, 3, 3): acceleration by psi
+    by_psi = -rotation.cross_matrix(steps.force_n)  # (2, n, 3, 3): acceleration by psi
     velocity_psi, position_psi = (v[-1].reshape(3, 3) for v in steps.twice(by_psi.reshape(2, n, 9)))
     velocity_a, position_a = (v[-1].reshape(3, 3) for v in steps.twice(steps.turn.reshape(2, n, 9)))
     if levelled:
@@ -209,14 +209,6 @@ def _sensitivities(
         velocity_psi[:, :2],
         position_psi[:, :2],
     )
-
-
-def _cross(vectors: Array) -> Array:
-    """Matrices ``[v x]``."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
 
 
 def _turned(attitude: pd.DataFrame, until: float) -> Array:

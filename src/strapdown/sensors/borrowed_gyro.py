@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.onto_stamps import TriadAtStamps
-from strapdown.sensors.triad_errors import Triad
+from strapdown.sensors.triad_errors import Triad, triad_of
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.tables import GYRO
 
@@ -88,7 +88,7 @@ def _turned(
     uncertainty: TriadUncertainty, square: Array, feels: NDArray[np.bool_]
 ) -> TriadUncertainty:
     def turned(name: str) -> Triad:
-        return _three(np.sqrt(square @ np.square(uncertainty.axis(name))))
+        return triad_of(np.sqrt(square @ np.square(uncertainty.axis(name))))
 
     limits = np.array(uncertainty.axis("full_scale"))
     return replace(
@@ -101,10 +101,5 @@ def _turned(
         g_sensitivity=turned("g_sensitivity"),
         vibration_rectification=turned("vibration_rectification"),
         quantization=turned("quantization"),
-        full_scale=_three(np.where(feels, limits, np.inf).min(axis=1)),
+        full_scale=triad_of(np.where(feels, limits, np.inf).min(axis=1)),
     )
-
-
-def _three(values: Array) -> Triad:
-    x, y, z = (float(v) for v in values)
-    return x, y, z

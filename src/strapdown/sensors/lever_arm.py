@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.local_slope import LocalSlope, local_slope
 from strapdown.exceptions import ConfigError
+from strapdown.rotation import cross_matrix
 from strapdown.sensors.prepared_unit import PreparedUnit
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
 from strapdown.tables.checks import check_columns
@@ -211,22 +212,6 @@ def lever_matrix(alpha: Array, omega: Array) -> Array:
     """
     turning = cross_matrix(omega)
     return cross_matrix(alpha) + turning @ turning
-
-
-def cross_matrix(v: Array) -> Array:
-    """``[v×]`` of each row.
-
-    Parameters
-    ----------
-    v : ndarray, (..., 3)
-
-    Returns
-    -------
-    ndarray, (..., 3, 3)
-    """
-    out = np.zeros((*v.shape, 3))
-    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
-    return out - np.swapaxes(out, -1, -2)
 
 
 def rate_effect(omega: Array, r: Array) -> Array:

@@ -18,6 +18,7 @@ from strapdown.sensors.rest import (
     find_rests,
     rest_between,
 )
+from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -248,21 +249,17 @@ def in_axes(rest: RestStretch, C: Array) -> RestStretch:
     """
 
     def mean(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-        return None if v is None else _triple(C @ np.asarray(v))
+        return None if v is None else triad_of(C @ np.asarray(v))
 
     def sd(v: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
-        return None if v is None else _triple(np.sqrt(C**2 @ np.asarray(v) ** 2))
+        return None if v is None else triad_of(np.sqrt(C**2 @ np.asarray(v) ** 2))
 
     return replace(
         rest,
-        gyro_mean=_triple(C @ np.asarray(rest.gyro_mean)),
-        gyro_sd=_triple(np.sqrt(C**2 @ np.asarray(rest.gyro_sd) ** 2)),
+        gyro_mean=triad_of(C @ np.asarray(rest.gyro_mean)),
+        gyro_sd=triad_of(np.sqrt(C**2 @ np.asarray(rest.gyro_sd) ** 2)),
         accel_mean=mean(rest.accel_mean),
         gyro_mean_sd=sd(rest.gyro_mean_sd),
         accel_sd=sd(rest.accel_sd),
         accel_mean_sd=sd(rest.accel_mean_sd),
     )
-
-
-def _triple(v: Array) -> tuple[float, float, float]:
-    return float(v[0]), float(v[1]), float(v[2])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
 from strapdown.results import RestStretch
+from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -186,17 +187,13 @@ def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> R
     return RestStretch(
         float(time[a]),
         float(time[b - 1]),
-        _triple(gyro[a:b].mean(axis=0)),
-        _triple(gyro[a:b].std(axis=0)),
-        None if force is None else _triple(force.mean(axis=0)),
-        _triple(sd_of_mean(time[a:b], gyro[a:b])),
-        None if force is None else _triple(force.std(axis=0)),
-        None if force is None else _triple(sd_of_mean(time[a:b], force)),
+        triad_of(gyro[a:b].mean(axis=0)),
+        triad_of(gyro[a:b].std(axis=0)),
+        None if force is None else triad_of(force.mean(axis=0)),
+        triad_of(sd_of_mean(time[a:b], gyro[a:b])),
+        None if force is None else triad_of(force.std(axis=0)),
+        None if force is None else triad_of(sd_of_mean(time[a:b], force)),
     )
-
-
-def _triple(values: Array) -> tuple[float, float, float]:
-    return float(values[0]), float(values[1]), float(values[2])
 
 
 def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:

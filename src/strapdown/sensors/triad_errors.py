@@ -156,18 +156,19 @@ def _plain(name: str, value: Any) -> float | Triad | Matrix:
         return _triad(value)
     if name in ("misalignment", "g_sensitivity"):
         first, second, third = value
-        return (_row(first), _row(second), _row(third))
+        return (triad_of(first), triad_of(second), triad_of(third))
     return float(value)
 
 
 def _triad(value: Any) -> Triad:
     if isinstance(value, int | float):
         return (float(value), float(value), float(value))
-    return _row(value)
+    return triad_of(value)
 
 
-def _row(value: Any) -> Triad:
-    x, y, z = value
+def triad_of(values: Any) -> Triad:
+    """Three numbers as plain floats."""
+    x, y, z = values
     return (float(x), float(y), float(z))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.sensors.error_draws import Seed, child
-from strapdown.sensors.triad_errors import Matrix, Triad, TriadErrors
+from strapdown.sensors.triad_errors import Matrix, Triad, TriadErrors, triad_of
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 Array = NDArray[np.float64]
@@ -54,12 +54,12 @@ def draw_errors(uncertainty: TriadUncertainty, seed: Seed, *streams: int) -> Tri
     ]
     return TriadErrors(
         noise_density=uncertainty.noise_density,
-        bias=_triad(bias),
-        scale=_triad(scale),
+        bias=triad_of(bias),
+        scale=triad_of(scale),
         misalignment=_matrix(turned),
         g_sensitivity=_matrix(pulled),
-        nonlinearity_2=_triad(np.clip(bent, -most, most)),
-        vibration_rectification=_triad(shaken),
+        nonlinearity_2=triad_of(np.clip(bent, -most, most)),
+        vibration_rectification=triad_of(shaken),
         quantization=uncertainty.quantization,
         full_scale=uncertainty.full_scale,
         bandwidth=uncertainty.bandwidth,
@@ -75,10 +75,5 @@ def _numbers(sd: Triad, seed: Seed, *place: int) -> Array:
     return rows
 
 
-def _triad(values: Array) -> Triad:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
-
-
 def _matrix(rows: Array) -> Matrix:
-    return (_triad(rows[0]), _triad(rows[1]), _triad(rows[2]))
+    return (triad_of(rows[0]), triad_of(rows[1]), triad_of(rows[2]))

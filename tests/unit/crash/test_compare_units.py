@@ -16,9 +16,9 @@ from strapdown.crash.match_axes import signed_permutations
 from strapdown.crash.unit_differences import (
     difference_covariance,
     joint_covariance,
-    sum_weights,
     velocity_increments,
 )
+from strapdown.crash.window_weights import window_weights
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
@@ -111,21 +111,6 @@ def unit(
 
 
 A, B, C = (-0.6, 0.5, -0.2), (0.4, -0.5, 0.1), (0.9, 0.3, -0.3)
-
-
-def test_integrals_are_exact_for_straight_lines_and_for_means():
-    time = np.cumsum(np.random.default_rng(0).uniform(0.5, 1.5, 50))
-    y = np.random.default_rng(1).normal(size=50)
-    edges = np.array([time[0], time[3], 0.3 * time[3] + 0.7 * time[4], 20.3, time[-1]])
-    fine = np.sort(np.r_[np.linspace(time[0], time[-1], 20001), time, edges])
-    line = np.interp(fine, time, y)
-    area = np.r_[0, np.cumsum(0.5 * (line[1:] + line[:-1]) * np.diff(fine))]
-    expected = np.diff(np.interp(edges, fine, area))
-    # The trapezoid is exact on straight lines: 2e4 roundings of sums of order ten.
-    assert sum_weights(time, edges, "instantaneous") @ y == pytest.approx(expected, abs=1e-10)
-    steps = np.r_[0.0, np.cumsum(y[1:] * np.diff(time))]
-    means = np.diff(np.interp(edges, time, steps))
-    assert sum_weights(time, edges, "mean") @ y == pytest.approx(means, abs=1e-12)
 
 
 def test_honest_units_agree_and_their_chi_square_is_one():
@@ -264,8 +249,7 @@ def test_a_combination_is_better_than_its_parts_and_says_how_much():
         both = combine_units(units)
         time, truth, _ = at_place(P)
         edges = np.array([0.0, 0.3])
-        w = sum_weights(time, edges, "instantaneous")
-        true = (w @ truth)[0]
+        true = window_weights(time, *edges) @ truth
         got = velocity_increments(both, edges)
         error = got.values[0] - true
         z.append(error @ np.linalg.solve(joint_covariance([got]), error))

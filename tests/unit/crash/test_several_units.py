@@ -13,6 +13,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.sample_effects import unit_effects
+from strapdown.crash.unit_reconstruction import reconstruct_unit
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.synchronise import synchronise
@@ -108,6 +109,22 @@ def both_level(at):
     return rotation.dcm_from_euler([at.levelling.roll_deg, at.levelling.pitch_deg, 0.0])
 
 
+@pytest.mark.parametrize("preparation", [None, {"levelling": (0.0, 0.0, 0.5)}])
+def test_medians_and_stated_attitudes_are_reconstructed_too(four, preparation):
+    units, _ = four
+    there = [
+        at_point(prepare_unit(u.unit, **(preparation or {})), (0.0, 0.0, 0.0), time_sd=u.time_sd)
+        for u in synchronise(units).units
+    ]
+    for method in ("weighted", "median"):
+        both = combine_units(there, method)
+        found = reconstruct_unit(both, ENTRY)
+        left = error(found.path)[-1]
+        # Three normal deviates: their chi-square exceeds 21 with a chance of 1e-4.
+        assert left @ np.linalg.solve(found.path.covariance[-1][6:, 6:], left) < 21.0
+        assert both.levelling.from_rest == (preparation is None)
+
+
 def test_one_unknown_of_two_units_stands_once(four):
     _, found = four
     names = found.combined.at_point.effects.names
@@ -119,7 +136,7 @@ def test_one_unknown_of_two_units_stands_once(four):
 
 def test_errors_of_combined_paths_are_what_they_state():
     squares = []
-    for seed in range(25):
+    for seed in range(20):
         there = [
             at_point(prepare_unit(u.unit), (0.0, 0.0, 0.0), time_sd=u.time_sd)
             for u in synchronise(recorded("IMU1", "IMU2", seed=seed)).units
@@ -128,8 +145,8 @@ def test_errors_of_combined_paths_are_what_they_state():
         path = reconstruct_path(both.imu, both.effects, both.levelling, both.rest.end, ENTRY)
         left = error(path)[-1]
         squares.append(left @ np.linalg.solve(path.covariance[-1][6:, 6:], left))
-    # Chi-square of three degrees of freedom: a mean over 25 scatters by sqrt(6/25).
-    assert np.mean(squares) == pytest.approx(3.0, abs=4 * np.sqrt(6 / 25))
+    # Chi-square of three degrees of freedom: a mean over 20 scatters by sqrt(6/20).
+    assert np.mean(squares) == pytest.approx(3.0, abs=4 * np.sqrt(6 / 20))
 
 
 def test_swapped_axes_are_found(four):
