@@ -8,8 +8,9 @@ import numpy as np
 
 from strapdown.crash.entry import Entry
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.sensors.crash_unit import CrashUnit, Mounting
+from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.error_draws import child
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation import CrashScenario, Ringing
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.paper_recorders import paper_units
@@ -196,9 +197,9 @@ def record_untold(
     return replace(unit, accelerometers=accelerometers, trigger_sd=design.trigger_sd)
 
 
-def _bent(uncertainty, more: float):  # type: ignore[no-untyped-def]
-    bend = np.hypot(uncertainty.axis("nonlinearity_2"), more)
-    return replace(uncertainty, nonlinearity_2=tuple(float(b) for b in bend))
+def _bent(uncertainty: TriadUncertainty, more: float) -> TriadUncertainty:
+    x, y, z = np.hypot(uncertainty.axis("nonlinearity_2"), more).tolist()
+    return replace(uncertainty, nonlinearity_2=(x, y, z))
 
 
 def _entry(scenario: CrashScenario, priors: TrialPriors, rng: np.random.Generator) -> Entry:
