@@ -19,6 +19,8 @@ from strapdown.systems.crash_trials.drawn_scenarios import DRAWN
 
 # Places below the seed of a case.
 CASE, RECORDER = range(2)
+# After the impact: the path's 0.75 s, and what filters and late triggers need.
+RECORDED = 0.85  # s
 # Where in a car a recorder may be: forward, right, down from its centre of mass, m.
 CABIN = ((-1.0, 1.0), (-0.7, 0.7), (-0.3, 0.3))
 
@@ -172,7 +174,7 @@ def record_untold(
     Parameters
     ----------
     scenario : CrashScenario
-        Its start is the trigger.
+        Its start is the trigger; recorded from its beginning to 0.85 s after that.
     design : RecorderDesign
         What is told.
     untold : Untold
@@ -189,7 +191,12 @@ def record_untold(
         ),
     )
     unit, _ = record_crash(
-        scenario.motion, really, impact=scenario.start, seed=seed, ringing=ringing
+        scenario.motion,
+        really,
+        impact=scenario.start,
+        seed=seed,
+        end=min(scenario.motion.duration, scenario.start + RECORDED),
+        ringing=ringing,
     )
     accelerometers = tuple(
         replace(t, uncertainty=design.told(k)) for k, t in enumerate(unit.accelerometers)
