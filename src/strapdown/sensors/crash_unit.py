@@ -31,7 +31,7 @@ class Mounting:
     position_sd : float, m
         Standard deviation of each coordinate.
     angles_sd_deg : float, deg
-        Standard deviation of each angle.
+        Standard deviation of a small turn about each of the vehicle's axes.
     """
 
     position: Triad = ZERO

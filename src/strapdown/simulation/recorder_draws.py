@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.error_draws import Seed, child
 from strapdown.sensors.triad_errors import Triad, TriadErrors
@@ -55,7 +56,7 @@ def draw_truth(design: RecorderDesign, root: Seed) -> RecorderTruth:
         gyro,
         Mounting(
             _shifted(told.position, _triad(told.position_sd * moved[:3])),
-            _shifted(told.angles_deg, _triad(told.angles_sd_deg * moved[3:])),
+            _turned(told, moved[3:]),
         ),
         design.clock_offset,
         design.clock_drift_ppm,
@@ -85,6 +86,15 @@ def _uniform(bound: float, root: Seed, which: int) -> Triad:
 def _triad(values: Array) -> Triad:
     x, y, z = (float(v) for v in values)
     return (x, y, z)
+
+
+def _turned(told: Mounting, by: Array) -> Triad:
+    """Angles after a small turn about the vehicle's axes, so that none is known better."""
+    if told.angles_sd_deg == 0.0:
+        return told.angles_deg
+    turn = rotation.quaternion_from_rotation_vector(np.radians(told.angles_sd_deg) * by)
+    there = rotation.quaternion_from_euler(told.angles_deg)
+    return _triad(rotation.euler_from_quaternion(rotation.compose(turn, there)))
 
 
 def _shifted(triad: Triad, by: Triad) -> Triad:

@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
-from multiprocessing import get_context
 
 import numpy as np
 import pandas as pd
 
-from strapdown.exceptions import ConfigError
+from strapdown.systems.crash_trials.many_cases import each_case
 from strapdown.systems.crash_trials.trial_case import TrialPriors, Untold, draw_case
 from strapdown.systems.crash_trials.trial_outcome import TrialOutcome, judge_case
 
 LEVEL = 0.95
-# Cases that a process is handed at a time.
-TOGETHER = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +80,7 @@ def coverage(
     cases : int
     seed : int
     workers : int, optional
-        Processes; all cores, if not given; with 1, all is done in this one. The outcomes do not
-        depend on it.
+        As `many_cases.each_case`; the outcomes do not depend on it.
     priors : TrialPriors, optional
     untold : Untold, optional
         What acts and is in no bound.
@@ -94,23 +88,9 @@ def coverage(
     Returns
     -------
     Trials
-
-    Raises
-    ------
-    ConfigError
-        There is no case, or no worker.
     """
-    count = (os.cpu_count() or 1) if workers is None else workers
-    if cases < 1 or count < 1:
-        raise ConfigError(
-            f"{cases} cases by {count} workers", quantity="cases", remedy="use at least one of each"
-        )
     one = partial(_judged, seed=seed, priors=priors or TrialPriors(), untold=untold or Untold())
-    if count == 1:
-        return gather(map(one, range(cases)))
-    # A fresh process has no threads or locks of this one.
-    with ProcessPoolExecutor(min(count, cases), mp_context=get_context("spawn")) as pool:
-        return gather(pool.map(one, range(cases), chunksize=TOGETHER))
+    return gather(each_case(one, cases, workers))
 
 
 def gather(outcomes: Iterable[TrialOutcome]) -> Trials:

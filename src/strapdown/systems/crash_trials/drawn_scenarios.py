@@ -14,11 +14,11 @@ Draw = Callable[[np.random.Generator], CrashScenario]
 
 
 def _setting(rng: np.random.Generator) -> Setting:
-    # Short, but with rest enough for a bias: what is long about a crash test is the waiting.
+    # Short, but with rest enough to be found as one: what is long is the waiting.
     return Setting(
         heading_deg=float(rng.uniform(0.0, 360.0)),
-        stand=1.5,
-        towing=6.0,
+        stand=2.6,
+        towing=5.0,
         coast=0.4,
         friction=float(rng.uniform(0.2, 0.4)),
         after=0.85,

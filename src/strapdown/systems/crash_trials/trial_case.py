@@ -10,6 +10,7 @@ from strapdown.crash.entry import Entry
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.error_draws import child
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation import CrashScenario, Ringing
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.paper_recorders import paper_units
@@ -18,6 +19,8 @@ from strapdown.systems.crash_trials.drawn_scenarios import DRAWN
 
 # Places below the seed of a case.
 CASE, RECORDER = range(2)
+# After the impact: the path's 0.75 s, and what filters and late triggers need.
+RECORDED = 0.85  # s
 # Where in a car a recorder may be: forward, right, down from its centre of mass, m.
 CABIN = ((-1.0, 1.0), (-0.7, 0.7), (-0.3, 0.3))
 
@@ -171,7 +174,7 @@ def record_untold(
     Parameters
     ----------
     scenario : CrashScenario
-        Its start is the trigger.
+        Its start is the trigger; recorded from its beginning to 0.85 s after that.
     design : RecorderDesign
         What is told.
     untold : Untold
@@ -188,7 +191,12 @@ def record_untold(
         ),
     )
     unit, _ = record_crash(
-        scenario.motion, really, impact=scenario.start, seed=seed, ringing=ringing
+        scenario.motion,
+        really,
+        impact=scenario.start,
+        seed=seed,
+        end=min(scenario.motion.duration, scenario.start + RECORDED),
+        ringing=ringing,
     )
     accelerometers = tuple(
         replace(t, uncertainty=design.told(k)) for k, t in enumerate(unit.accelerometers)
@@ -196,9 +204,9 @@ def record_untold(
     return replace(unit, accelerometers=accelerometers, trigger_sd=design.trigger_sd)
 
 
-def _bent(uncertainty, more: float):  # type: ignore[no-untyped-def]
-    bend = np.hypot(uncertainty.axis("nonlinearity_2"), more)
-    return replace(uncertainty, nonlinearity_2=tuple(float(b) for b in bend))
+def _bent(uncertainty: TriadUncertainty, more: float) -> TriadUncertainty:
+    x, y, z = np.hypot(uncertainty.axis("nonlinearity_2"), more).tolist()
+    return replace(uncertainty, nonlinearity_2=(x, y, z))
 
 
 def _entry(scenario: CrashScenario, priors: TrialPriors, rng: np.random.Generator) -> Entry:

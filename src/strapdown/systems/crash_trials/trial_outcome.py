@@ -57,8 +57,9 @@ class TrialOutcome:
     kind : str
         Of crash.
     excluded : str
-        Why its bounds claim nothing: a sensor was at its end while it counted, or no event was
-        found; empty for one that counts.
+        Why its bounds are not judged: a sensor was at its end, its rest was not found (its bounds
+        then allow for an acceleration that no case has), or there was no event; empty for one
+        that counts.
     answers : dict of str to Judged
     """
 
@@ -68,7 +69,9 @@ class TrialOutcome:
     answers: dict[str, Judged] = field(repr=False)
 
 
-def reconstruct_case(case: TrialCase, point: Triple = (0.0, 0.0, 0.0)) -> UnitReconstruction:
+def reconstruct_case(
+    case: TrialCase, point: Triple = (0.0, 0.0, 0.0), *, sampling: str = "instantaneous"
+) -> UnitReconstruction:
     """Take a case through the chain: synchronise, prepare, move, reconstruct.
 
     Parameters
@@ -76,13 +79,15 @@ def reconstruct_case(case: TrialCase, point: Triple = (0.0, 0.0, 0.0)) -> UnitRe
     case : TrialCase
     point : tuple of float, m
         Reference point, vehicle axes from the vehicle's origin.
+    sampling : {'instantaneous', 'mean'}
+        Of the common stamps.
 
     Returns
     -------
     UnitReconstruction
     """
     there = float(gravity(case.entry.lat_deg, case.entry.alt)[2])
-    unit = synchronise([case.unit]).units[0]
+    unit = synchronise([case.unit], sampling=sampling).units[0]
     prepared = prepare_unit(unit.unit, gravity=there)
     return reconstruct_unit(
         at_point(prepared, point, time_sd=unit.time_sd), case.entry, window=WINDOW, gravity=there
@@ -105,16 +110,24 @@ def judge_case(case: TrialCase, point: Triple = (0.0, 0.0, 0.0)) -> TrialOutcome
         Changes of velocity over the windows that were found, against the true ones over the same
         stretch of time; their directions; the place 750 ms after the impact.
     """
-    kind = case.scenario.name
     try:
         found = reconstruct_case(case, point)
     except StrapdownError as error:
-        return TrialOutcome(case.number, kind, str(error).splitlines()[0], {})
+        return TrialOutcome(case.number, case.scenario.name, str(error).splitlines()[0], {})
+    return judge(case, found, point)
+
+
+def judge(
+    case: TrialCase, found: UnitReconstruction, point: Triple = (0.0, 0.0, 0.0)
+) -> TrialOutcome:
+    """Compare what was reconstructed of a case with the truth; as `judge_case`."""
+    kind = case.scenario.name
     if not found.body:
         return TrialOutcome(case.number, kind, "no event", {})
     truth = ExactAnswers(case.scenario.motion, case.scenario.start, point)
     answers: dict[str, Judged] = {}
-    for changes, axes in ((found.body[0], BODY), (found.ned[0], LEVEL)):
+    which = found.events.events.index(found.events.strongest)
+    for changes, axes in ((found.body[which], BODY), (found.ned[which], LEVEL)):
         if changes is not None:
             answers |= _changes(changes, axes, truth)
     place, velocity = truth.course([END])
@@ -126,7 +139,7 @@ def judge_case(case: TrialCase, point: Triple = (0.0, 0.0, 0.0)) -> TrialOutcome
         ):
             error = float(found.path.table[column].iloc[row] - true)
             answers[f"{what} {axis}"] = _normal(error, float(found.path.sd[column].iloc[row]))
-    return TrialOutcome(case.number, kind, _at_an_end(found), answers)
+    return TrialOutcome(case.number, kind, _not_counted(found), answers)
 
 
 def _normal(error: float, sd: float) -> Judged:
@@ -166,10 +179,12 @@ def _direction(change: VelocityChange, true: Array, frame: str) -> dict[str, Jud
     return {name: Judged(error, sd, interval.contains(angles[1]))}
 
 
-def _at_an_end(found: UnitReconstruction) -> str:
-    """Which sensor stood at its end within the path or an event."""
+def _not_counted(found: UnitReconstruction) -> str:
+    """What keeps a case from being judged: no rest, or a sensor at its end within the path."""
     prepared = found.at_point.prepared
     assert prepared is not None
+    if prepared.rest is None or prepared.rest.grade != "still":
+        return "no rest found"
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     within = (time >= WINDOW[0]) & (time <= WINDOW[1])
     if prepared.clipped[within].any():
