@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.local_slope import LocalSlope, local_slope
 from strapdown.sensors.prepared_unit import PreparedUnit
+from strapdown.sensors.triad_numbers import triple
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
 from strapdown.tables.checks import check_columns
 
@@ -146,7 +147,8 @@ def move_unit(
     """
     C = prepared.unit.mounting.C_vs
     noise = np.einsum("ij,nj,kj->nik", C, prepared.gyro_noise**2, C)
-    arm = np.asarray(point, dtype=np.float64) - np.asarray(prepared.unit.mounting.position)
+    place = triple(point, "point", "give forward, right, down in m from the vehicle's origin")
+    arm = np.asarray(place) - np.asarray(prepared.unit.mounting.position)
     return move_imu(prepared.imu, arm, gyro_noise=noise, window=window, gyro_delay=gyro_delay)
 
 

@@ -14,6 +14,7 @@ from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, onto_stamps
+from strapdown.sensors.synchronise_findings import clipped_findings, cut_findings, end_findings
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.unit_clocks import (
     UnitChannels,
@@ -190,7 +191,9 @@ def synchronise(
             gyro_sd = math.hypot(clock.sd, lender.time_sd)
         done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, borrowed, gyro_sd)
     ordered = tuple(done[u.name] for u in units)
-    findings += _ends(ordered, time)
+    findings += end_findings([(u.unit.name, _own(u)) for u in ordered], time)
+    findings += clipped_findings([(u.unit.name, _last(u)) for u in ordered], time)
+    findings += cut_findings(_spans(given, clocks, rate, sampling), time)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
 
 
@@ -260,14 +263,21 @@ def _reference(given: list[UnitChannels], name: str | None) -> UnitChannels:
     return having[0]
 
 
-def _common_stamps(
+def _spans(
     given: list[UnitChannels], clocks: list[UnitClock], rate: float, sampling: str
-) -> Array:
-    spans = [
+) -> list[tuple[str, float, float]]:
+    """Of every part, its name and the first and last common stamp that it can serve."""
+    return [
         (channels.source, *allowed_stamps(channels, clock.offset + _delay(triad), rate, sampling))
         for u, clock in zip(given, clocks, strict=True)
         for channels, triad, _ in _parts(u)
     ]
+
+
+def _common_stamps(
+    given: list[UnitChannels], clocks: list[UnitClock], rate: float, sampling: str
+) -> Array:
+    spans = _spans(given, clocks, rate, sampling)
     latest = max(spans, key=lambda s: s[1])
     earliest = min(spans, key=lambda s: s[2])
     first = math.ceil(latest[1] * rate - 1e-6)
@@ -283,27 +293,10 @@ def _common_stamps(
     return np.arange(first, last + 1) / rate
 
 
-def _ends(units: tuple[SynchronisedUnit, ...], time: Array) -> list[Finding]:
-    found = []
-    for u in units:
-        own = (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
-        for t in own:
-            if t.whole.all():
-                continue
-            inner = np.flatnonzero(t.whole)
-            kept = (
-                f"whole from {time[inner[0]]:.4g} to {time[inner[-1]]:.4g} s"
-                if inner.size
-                else "nowhere whole"
-            )
-            found.append(
-                Finding(
-                    f"the low-pass is {kept}: outside, the record's ends were continued by their "
-                    "point mirror, and samples scatter up to "
-                    f"{float(t.noise_factor.max() / np.median(t.noise_factor)):.2g} times as much",
-                    file=f"{u.unit.name}, {t.triad.name}",
-                    quantity="time",
-                    remedy="record longer before and after, or use means (sampling='mean')",
-                )
-            )
-    return found
+def _own(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
+    return (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
+
+
+def _last(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
+    """The parts behind which there is no wider range."""
+    return (*u.accelerometers[-1:], *(() if u.gyro is None or u.lender else (u.gyro,)))

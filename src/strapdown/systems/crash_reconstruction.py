@@ -15,15 +15,17 @@ from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.path import WINDOW
 from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.prepare_options import checked_options
 from strapdown.crash.unit_reconstruction import (
     PEAK_WINDOW,
     UnitReconstruction,
     reconstruct_unit,
 )
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.exceptions import ConfigError, Finding
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
+from strapdown.systems.crash_options import check_crash_options
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,16 +138,13 @@ def reconstruct_crash(
     DivergenceError
         A path left what a vehicle can do.
     """
-    if not units:
-        raise DataError(
-            "there is none", quantity="units", remedy="give the record of at least one unit"
-        )
+    check_crash_options(units, entry, point, window, preparation, rule, gravity, mechanization)
     together = synchronise(units, method=clock, rate=rate)
     findings = list(together.findings)
     options = {"gravity": gravity, **(preparation or {})}
     there: list[AtPoint] = []
     for unit in together.units:
-        prepared = prepare_unit(unit.unit, **options)
+        prepared = prepare_unit(unit.unit, **checked_options(options))
         findings += prepared.findings
         there.append(at_point(prepared, point, time_sd=unit.time_sd))
 
