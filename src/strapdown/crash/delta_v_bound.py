@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.coverage import TWO_SIDED_95
 from strapdown.crash.leg import ATTITUDE, VELOCITY
 from strapdown.crash.path import CrashPath
 from strapdown.crash.sample_effects import SampleEffects
@@ -18,8 +19,6 @@ from strapdown.exceptions import DataError
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
-# 95 % of a normal distribution lie within so many standard deviations.
-TWO_SIDED_95 = 1.959963984540054
 NOISE = "sensor noise"
 
 

@@ -16,6 +16,7 @@ from strapdown._kernels.ned import ALT, LAT, LON, Q, V
 from strapdown.crash.angle_rates import angle_rates
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
+from strapdown.crash.reconstruction_summary import path_line
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
@@ -70,6 +71,9 @@ class CrashPath:
     noise_covariance: Array = field(repr=False)
     start: Array = field(repr=False)
     legs: tuple[Leg, Leg] = field(repr=False)
+
+    def __repr__(self) -> str:
+        return f"<CrashPath, {path_line(self)}>"
 
     @cached_property
     def covariance(self) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.crash.delta_v_bound import TWO_SIDED_95
+from strapdown.crash.coverage import TWO_SIDED_95
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
 from strapdown.exceptions import DataError

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
@@ -20,6 +21,7 @@ from strapdown.crash.entry_plausible import check_standing, entry_findings
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.events import CrashEvents, detect_events
 from strapdown.crash.path import WINDOW, CrashPath, reconstruct_path
+from strapdown.crash.reconstruction_summary import summary_table, unit_line
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
 from strapdown.exceptions import Finding
@@ -63,6 +65,13 @@ class UnitReconstruction:
     ned: tuple[EventChanges | None, ...]
     types: tuple[CrashType, ...]
     findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<UnitReconstruction\n{unit_line(self)}>"
+
+    def summary(self) -> pd.DataFrame:
+        """Answers with their bounds of 95 %: `summary_table` of this unit."""
+        return summary_table([self])
 
 
 def reconstruct_unit(

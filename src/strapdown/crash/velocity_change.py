@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from strapdown.crash.coverage import TWO_SIDED_95
 from strapdown.crash.delta_v import DeltaV
-from strapdown.crash.delta_v_bound import TWO_SIDED_95, DeltaVBound
+from strapdown.crash.delta_v_bound import DeltaVBound
 from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
 from strapdown.crash.pdof_interval import PdofInterval, pdof_interval
+from strapdown.crash.reconstruction_summary import change_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +34,9 @@ class VelocityChange:
     bound: DeltaVBound = field(repr=False)
     pdof: Pdof | NedPdof
     interval: PdofInterval
+
+    def __repr__(self) -> str:
+        return f"<VelocityChange, {change_line(self)}>"
 
     @property
     def resultant(self) -> float:

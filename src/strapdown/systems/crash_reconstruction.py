@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
+
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.at_point import AtPoint, at_point
 from strapdown.crash.combine_units import combine_units
@@ -16,6 +18,7 @@ from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.path import WINDOW
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.prepare_options import checked_options
+from strapdown.crash.reconstruction_summary import summary_table, unit_line
 from strapdown.crash.unit_reconstruction import (
     PEAK_WINDOW,
     UnitReconstruction,
@@ -53,6 +56,28 @@ class CrashReconstruction:
     comparison: UnitComparison | None
     combined: UnitReconstruction | None
     findings: tuple[Finding, ...]
+
+    def __repr__(self) -> str:
+        lines = [unit_line(u) for u in self.answers]
+        said = f"{len(self.findings)} finding{'s' * (len(self.findings) != 1)}"
+        return "\n".join([f"<CrashReconstruction at {self.point} m", *lines, f"{said}>"])
+
+    @property
+    def answers(self) -> tuple[UnitReconstruction, ...]:
+        """Every unit, and the mean of them where there is one."""
+        return (*self.units, *(() if self.combined is None else (self.combined,)))
+
+    def summary(self) -> pd.DataFrame:
+        """Changes of velocity, directions of force and ends of the path, with their bounds.
+
+        Returns
+        -------
+        DataFrame
+            Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
+            ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names. The
+            bounds hold 95 %.
+        """
+        return summary_table(self.answers)
 
     @property
     def main(self) -> UnitReconstruction:
