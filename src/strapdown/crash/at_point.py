@@ -114,7 +114,7 @@ def at_point(
     -------
     AtPoint
     """
-    moved = move_unit(prepared, np.asarray(point, dtype=np.float64), window=window)
+    moved = move_unit(prepared, point, window=window)
     sd = prepared.unit.trigger_sd if time_sd is None else time_sd
     return AtPoint(
         prepared.unit.name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -192,9 +193,11 @@ def _bound(
 
 def _direction(given: ArrayLike) -> Array:
     d = np.asarray(given, dtype=np.float64)
-    size = float(np.sqrt(d @ d))
-    if not size > 0.0:
+    size = float(np.sqrt(d @ d)) if d.shape == (3,) else 0.0
+    if not (math.isfinite(size) and size > 0.0):
         raise DataError(
-            "it has no length", quantity="direction", remedy="give a vector that is not zero"
+            f"{d.tolist()} has no length, or not three components",
+            quantity="direction",
+            remedy="give three finite components that are not all zero",
         )
     return np.asarray(d / size)

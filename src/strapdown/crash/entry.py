@@ -10,10 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.sensors.triad_numbers import finite, triple
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
+NUMBERS = (
+    ("time", "s"),
+    ("heading_deg", "deg"),
+    ("lat_deg", "deg"),
+    ("lon_deg", "deg"),
+    ("alt", "m"),
+)
+OTHERS = ("attitude_deg", "lat_deg", "lon_deg", "alt", "source")
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +50,11 @@ class Entry:
         Of the origin; they matter to gravity alone.
     source : str
         Where the velocity is from, for a report.
+
+    Raises
+    ------
+    ConfigError
+        The velocity is not three finite numbers, or another number is not finite.
     """
 
     time: float
@@ -52,6 +66,17 @@ class Entry:
     lon_deg: float = 0.0
     alt: float = 0.0
     source: str = "stated"
+
+    def __post_init__(self) -> None:
+        how = "give north, east, down in m/s, or use Entry.from_speed"
+        object.__setattr__(self, "velocity", triple(self.velocity, "velocity", how))
+        for name, unit in NUMBERS:
+            if not finite(getattr(self, name)):
+                raise ConfigError(
+                    f"{getattr(self, name)!r} is no number",
+                    quantity=f"entry, {name}",
+                    remedy=f"give one finite number in {unit}",
+                )
 
     @classmethod
     def from_speed(
@@ -100,18 +125,23 @@ class Entry:
             "climb_sd": climb_sd,
         }
         for name, value in numbers.items():
-            if not math.isfinite(value) or (value < 0.0 and name.split("_deg")[0].endswith("sd")):
+            if not finite(value) or (value < 0.0 and name.split("_deg")[0].endswith("sd")):
                 raise ConfigError(
-                    f"{value} is not possible",
-                    quantity=name,
+                    f"{value!r} is not possible",
+                    quantity=f"entry, {name}",
                     remedy="give a finite number, and a standard deviation of zero or more",
                 )
         if abs(speed) > 150.0:
             raise ConfigError(
                 f"{speed:g} m/s is no speed of a road vehicle",
-                quantity="speed",
+                quantity="entry, speed",
                 remedy="give it in m/s: km/h divided by 3.6",
             )
+        for name in others:
+            if name not in OTHERS:
+                raise ConfigError(
+                    f"an entry has no '{name}'", quantity="entry", remedy=nearest(name, OTHERS)
+                )
         course = math.radians(heading_deg + slip_deg)
         along = (math.cos(course), math.sin(course), 0.0)
         across = (-math.sin(course), math.cos(course), 0.0)
@@ -174,8 +204,8 @@ class Entry:
                 remedy="give a covariance: no direction can be known better than exactly",
             )
         columns = vectors * np.sqrt(np.maximum(values, 0.0))
-        roll, pitch, heading = (float(x) for x in roll_pitch_heading)
-        north, east, down = (float(x) for x in velocity)
+        roll, pitch, heading = triple(roll_pitch_heading, "roll_pitch_heading", "give deg")
+        north, east, down = triple(velocity, "velocity", "give north, east, down in m/s")
         return cls(
             time=time,
             velocity=(north, east, down),

@@ -215,6 +215,7 @@ def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
         what += f"; the record is only {length * 1e3:.4g} ms long"
         remedy = "use a longer record; otherwise " + remedy
     elif detector.woken:
+        often = "once" if detector.woken == 1 else f"{detector.woken} times"
         what += f"; it changed by more than {rule.wake / KMH:g} km/h in "
-        what += f"{rule.wake_window * 1e3:g} ms {detector.woken} times, and not for long"
+        what += f"{rule.wake_window * 1e3:g} ms {often}, and not for long"
     return Finding(what, file=acceleration.source, quantity="delta-V", remedy=remedy)

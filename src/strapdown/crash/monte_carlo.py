@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -78,14 +79,9 @@ def sample_paths(
     Raises
     ------
     ConfigError
-        `runs` is less than 2, or too many for the memory.
+        `runs` is less than 2, or too many for the memory; a seed or a number of workers is none.
     """
-    if not 2 <= runs <= MOST_RUNS:
-        raise ConfigError(
-            f"{runs} runs",
-            quantity="runs",
-            remedy=f"use 2 to {MOST_RUNS}; 10 000 know a standard deviation to 0.7 %",
-        )
+    _check(path, runs, seed, workers)
     unknowns = len(path.names)
     draws = np.empty((runs, unknowns))
     errors = np.empty((runs, len(path.time), 9))
@@ -141,3 +137,29 @@ def sample_paths(
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
         list(pool.map(chunk, chunks))
     return PathSamples(path.time, errors, draws)
+
+
+def _check(path: object, runs: object, seed: object, workers: object) -> None:
+    if not isinstance(path, CrashPath):
+        raise ConfigError(
+            f"this is of kind {type(path).__name__}",
+            quantity="path",
+            remedy="give the path of a unit: crash.main.path of what reconstruct_crash returned",
+        )
+    if not _is_whole(runs, 2, MOST_RUNS):
+        raise ConfigError(
+            f"{runs!r} runs",
+            quantity="runs",
+            remedy=f"use 2 to {MOST_RUNS}; 10 000 know a standard deviation to 0.7 %",
+        )
+    for name, given, least in (("seed", seed, 0), ("workers", workers, 1)):
+        if not (_is_whole(given, least) or (name == "workers" and given is None)):
+            raise ConfigError(
+                f"{given!r} is none",
+                quantity=name,
+                remedy=f"give a whole number of {least} or more",
+            )
+
+
+def _is_whole(given: object, least: int, most: float = math.inf) -> bool:
+    return isinstance(given, int | np.integer) and least <= int(given) <= most

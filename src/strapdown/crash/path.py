@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,8 +16,9 @@ from strapdown._kernels.ned import ALT, LAT, LON, Q, V
 from strapdown.crash.angle_rates import angle_rates
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
+from strapdown.crash.reconstruction_summary import path_line
 from strapdown.crash.sample_effects import SampleEffects
-from strapdown.exceptions import DataError
+from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.sensors.prepared_unit import Levelling
@@ -72,6 +74,9 @@ class CrashPath:
     start: Array = field(repr=False)
     legs: tuple[Leg, Leg] = field(repr=False)
 
+    def __repr__(self) -> str:
+        return f"<CrashPath, {path_line(self)}>"
+
     @cached_property
     def covariance(self) -> Array:
         """Covariance of attitude (rad), velocity (m/s) and place (m), (n, 9, 9)."""
@@ -103,7 +108,18 @@ class CrashPath:
         DataFrame
             Indexed by contributor, columns as `ERROR`: rad², (m/s)², m². Its sums are the
             diagonal of `covariance`.
+
+        Raises
+        ------
+        ConfigError
+            There is no such sample.
         """
+        if not -len(self.time) <= row < len(self.time):
+            raise ConfigError(
+                f"there is no sample {row}",
+                quantity="row",
+                remedy=f"the path has {len(self.time)} samples, counted from 0, or back from -1",
+            )
         squares = pd.DataFrame(self.errors[:, row] ** 2, columns=ERROR)
         table = squares.groupby(list(self.contributors), sort=False).sum()
         table.loc["sensor noise"] = table.reindex(["sensor noise"]).fillna(0.0).iloc[
@@ -307,7 +323,8 @@ def _rows(
             f"{time[0]:.6g} s to {time[-1]:.6g} s",
             file=imu.attrs.get("source"),
             quantity="window",
-            remedy="choose a window within the record, its start before its end",
+            remedy="choose a window within it, its start before its end, in s from the trigger"
+            + _overlap(begin, end, time),
         )
     if not time[0] - slack <= at <= time[-1] + slack:
         raise DataError(
@@ -321,6 +338,12 @@ def _rows(
     first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
     last = max(int(np.searchsorted(time, end + 1e-9, side="right")) - 1, anchor)
     return first, anchor, last
+
+
+def _overlap(begin: float, end: float, time: Array) -> str:
+    low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
+    high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
+    return f": window=({low:g}, {high:g})" if low < high else ""
 
 
 def _padded(

@@ -15,8 +15,9 @@ from strapdown.crash.prepare_findings import (
     saturation_findings,
     step_findings,
 )
+from strapdown.crash.prepare_options import check_options
 from strapdown.crash.rest_attitude import from_stated_attitude, gravity_correction, level_at_rest
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.exceptions import Finding
 from strapdown.results import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.high_g_bias import bias_from_lower_range
@@ -95,7 +96,18 @@ def prepare_unit(
     ConfigError
         An option is out of range.
     """
-    _check_options(unit, gravity, rest, levelling, steady_acceleration, steady_rate)
+    check_options(
+        unit.name,
+        gravity=gravity,
+        rest=rest,
+        levelling=levelling,
+        impact=impact,
+        steady_acceleration=steady_acceleration,
+        steady_rate=steady_rate,
+        margin=margin,
+        hysteresis=hysteresis,
+        fade=fade,
+    )
     data = check_unit(unit)
     assert unit.gyro is not None
     triads, gyro = unit.accelerometers, unit.gyro.uncertainty
@@ -249,47 +261,3 @@ def _noise(time: Array, uncertainty: TriadUncertainty) -> Array:
 def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:
     """Of the bias of the lowest range, in vehicle axes."""
     return np.asarray(np.sqrt(C**2 @ np.asarray(uncertainty.axis("bias")) ** 2))
-
-
-def _check_options(
-    unit: CrashUnit,
-    gravity: float,
-    rest: str | tuple[float, float],
-    levelling: tuple[float, float, float] | None,
-    steady_acceleration: float,
-    steady_rate: float,
-) -> None:
-    if not 9.7 < gravity < 9.9:
-        raise ConfigError(
-            f"{gravity:g} m/s² is gravity nowhere on the ground",
-            file=unit.name,
-            quantity="gravity",
-            remedy="give it in m/s², or leave it out",
-        )
-    if isinstance(rest, str) and rest != "auto":
-        raise ConfigError(
-            f"{rest!r} is no stretch",
-            file=unit.name,
-            quantity="rest",
-            remedy="say 'auto', or give its start and end in s from the trigger",
-        )
-    if levelling is not None and not (
-        len(levelling) == 3
-        and all(math.isfinite(x) for x in levelling)
-        and abs(levelling[1]) <= 90.0
-        and levelling[2] >= 0.0
-    ):
-        raise ConfigError(
-            f"{levelling!r} is no attitude with its standard deviation",
-            file=unit.name,
-            quantity="levelling",
-            remedy="give roll, pitch and their standard deviation in deg, as in (0, 0, 1)",
-        )
-    for name, value in (("steady_acceleration", steady_acceleration), ("steady_rate", steady_rate)):
-        if not (math.isfinite(value) and value >= 0.0):
-            raise ConfigError(
-                f"{value:g} is no standard deviation",
-                file=unit.name,
-                quantity=name,
-                remedy="give zero or more",
-            )

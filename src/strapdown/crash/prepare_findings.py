@@ -55,9 +55,9 @@ def rest_findings(
                 what,
                 file=unit.name,
                 quantity="rest",
-                remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road; "
-                "the biases stay at their stated standard deviations. Or name the stretch: "
-                "rest=(start, end) in s",
+                remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road, "
+                "and the biases stay at their stated standard deviations; or name the stretch, "
+                "rest=(start, end) in s. Of reconstruct_crash both belong into preparation={...}",
             )
         return [
             Finding(

@@ -10,6 +10,7 @@ from strapdown.crash.at_point import AtPoint, at_point
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
+from strapdown.crash.prepare_options import checked_options
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
 
 # Over which the attitude that is lent is read, in samples.
@@ -56,7 +57,7 @@ def prepare_together(
             lent = _attitude_at_start(unit, done[unit.lender])
             if lent is not None:
                 own["levelling"] = lent
-        prepared = prepare_unit(unit.unit, **own)
+        prepared = prepare_unit(unit.unit, **checked_options(own))
         done[unit.unit.name] = at_point(prepared, point, time_sd=unit.time_sd)
     return [done[u.unit.name] for u in together.units]
 

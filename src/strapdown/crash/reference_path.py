@@ -79,8 +79,13 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         A column is missing, a value is not finite, or the two do not share the entry and at
         least one instant after it.
     """
-    time = reference.index.to_numpy(dtype=np.float64)
-    values, sd = _columns(reference, time)
+    if not isinstance(reference, pd.DataFrame):
+        raise DataError(
+            f"this is of kind {type(reference).__name__}",
+            quantity="reference path",
+            remedy="give a DataFrame with north, east and down in m, indexed by time in s",
+        )
+    time, values, sd = _columns(reference)
     from scipy.interpolate import CubicHermiteSpline
 
     own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
@@ -124,27 +129,49 @@ def _covariance(path: CrashPath, time: Array) -> Array:
     return np.asarray(rows.reshape(-1, 3, 3))
 
 
-def _columns(reference: pd.DataFrame, time: Array) -> tuple[Array, Array]:
-    missing = [c for c in NED if c not in reference.columns]
+def _columns(reference: pd.DataFrame) -> tuple[Array, Array, Array]:
+    some = any(c in reference.columns for c in POSITION_SD)
+    wanted = [*NED, *(POSITION_SD if some else ())]
+    missing = [c for c in wanted if c not in reference.columns]
     if missing:
         raise DataError(
             f"there is no column {', '.join(missing)}",
             file=reference.attrs.get("source"),
             quantity="reference path",
-            remedy="give north, east and down in m",
+            remedy="give north, east and down in m, and the standard deviation of all three or "
+            "of none",
         )
-    values = reference[NED].to_numpy(dtype=np.float64)
-    has_sd = set(POSITION_SD) <= set(reference.columns)
-    sd = reference[POSITION_SD].to_numpy(dtype=np.float64) if has_sd else np.zeros_like(values)
-    bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
-    if bad.any() or (sd < 0.0).any() or (np.diff(time) <= 0.0).any() or not len(time):
-        row = int(np.flatnonzero(bad)[0]) if bad.any() else 0
+    try:
+        time = reference.index.to_numpy(dtype=np.float64)
+        both = reference[wanted].to_numpy(dtype=np.float64)
+    except (TypeError, ValueError) as error:
         raise DataError(
-            "it is empty, has a value that is not finite or a negative standard deviation, or "
-            "its time does not advance",
+            f"not all of it are numbers: {error}",
             file=reference.attrs.get("source"),
-            row=row + 1,
             quantity="reference path",
-            remedy="drop such rows, and sort by time",
+            remedy="give numbers: metres, and the time in s as the index",
+        ) from None
+    values, sd = both[:, :3], both[:, 3:] if some else np.zeros((len(both), 3))
+    bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
+    stuck = np.r_[False, np.diff(time) <= 0.0]
+    for what, rows, remedy in (
+        ("a value is not finite", bad, "drop such rows"),
+        ("a standard deviation is negative", (sd < 0.0).any(axis=1), "give zero or more, in m"),
+        ("time does not advance", stuck, "sort by time and drop repeated stamps"),
+    ):
+        if rows.any():
+            raise DataError(
+                what,
+                file=reference.attrs.get("source"),
+                row=int(np.argmax(rows)) + 1,
+                quantity="reference path",
+                remedy=remedy,
+            )
+    if not len(time):
+        raise DataError(
+            "it has no rows",
+            file=reference.attrs.get("source"),
+            quantity="reference path",
+            remedy="give the place at the entry and at least one instant after it",
         )
-    return values, sd
+    return time, values, sd

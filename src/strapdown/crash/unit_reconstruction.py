@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
@@ -16,9 +17,11 @@ from strapdown.crash.crash_type import CrashType, classify_crashes
 from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
 from strapdown.crash.entry import Entry
+from strapdown.crash.entry_plausible import check_standing, entry_findings
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.events import CrashEvents, detect_events
 from strapdown.crash.path import CrashPath, reconstruct_path
+from strapdown.crash.reconstruction_summary import summary_table, unit_line
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
 from strapdown.exceptions import Finding
@@ -63,6 +66,13 @@ class UnitReconstruction:
     types: tuple[CrashType, ...]
     findings: tuple[Finding, ...] = ()
 
+    def __repr__(self) -> str:
+        return f"<UnitReconstruction\n{unit_line(self)}>"
+
+    def summary(self) -> pd.DataFrame:
+        """Answers with their bounds of 95 %: `summary_table` of this unit."""
+        return summary_table([self])
+
 
 def reconstruct_unit(
     at_point: AtPoint,
@@ -99,6 +109,7 @@ def reconstruct_unit(
     DataError, DivergenceError
         As `reconstruct_path`.
     """
+    check_standing(at_point, entry)
     at_rest, rest_sd = at_point.resting_force(gravity)
     acceleration = body_acceleration(at_point.imu, at_rest.tolist())
     effects = at_point.effects
@@ -123,7 +134,10 @@ def reconstruct_unit(
     resolved = resolved_acceleration(part, path.q_nb, gravity)
     body: list[EventChanges] = []
     ned: list[EventChanges | None] = []
-    findings = list(events.findings)
+    findings = [
+        *events.findings,
+        *entry_findings(at_point, entry, path, events, mechanization),
+    ]
     for event in events.events:
         ends = event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
         start, end = event.time_zero, min(event.end, acceleration.end)

@@ -9,6 +9,7 @@ from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.delta_v_bound import DeltaVBound
 from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
 from strapdown.crash.pdof_interval import PdofInterval, pdof_interval
+from strapdown.crash.reconstruction_summary import change_line
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,9 @@ class VelocityChange:
     bound: DeltaVBound = field(repr=False)
     pdof: Pdof | NedPdof
     interval: PdofInterval
+
+    def __repr__(self) -> str:
+        return f"<VelocityChange, {change_line(self)}>"
 
     @property
     def resultant(self) -> float:

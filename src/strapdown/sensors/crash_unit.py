@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.triad_errors import ZERO, Triad
+from strapdown.sensors.triad_numbers import FARTHEST, check_sd, triple
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.tables.checks import is_number
 
 Array = NDArray[np.float64]
 
@@ -32,6 +34,12 @@ class Mounting:
         Standard deviation of each coordinate.
     angles_sd_deg : float, deg
         Standard deviation of a small turn about each of the vehicle's axes.
+
+    Raises
+    ------
+    ConfigError
+        A number is none, a standard deviation is negative, or the position is farther from the
+        origin than any vehicle is long.
     """
 
     position: Triad = ZERO
@@ -40,22 +48,19 @@ class Mounting:
     angles_sd_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("position", "angles_deg"):
-            value = tuple(float(x) for x in getattr(self, name))
-            if len(value) != 3 or not all(math.isfinite(x) for x in value):
-                raise ConfigError(
-                    f"{getattr(self, name)!r} are not three finite numbers",
-                    quantity=name,
-                    remedy="give forward, right, down in m, and roll, pitch, heading in deg",
-                )
-            object.__setattr__(self, name, value)
-        for name in ("position_sd", "angles_sd_deg"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ConfigError(
-                    f"{getattr(self, name):g} is no standard deviation",
-                    quantity=name,
-                    remedy="give zero or more",
-                )
+        for name, how in (
+            ("position", "give forward, right, down in m"),
+            ("angles_deg", "give roll, pitch, heading in deg"),
+        ):
+            object.__setattr__(self, name, triple(getattr(self, name), name, how))
+        if math.hypot(*self.position) > FARTHEST:
+            raise ConfigError(
+                f"{self.position} is {math.hypot(*self.position):.4g} m from the vehicle's origin",
+                quantity="position",
+                remedy="give it in m: mm divided by 1000",
+            )
+        check_sd(self.position_sd, "position_sd", "m")
+        check_sd(self.angles_sd_deg, "angles_sd_deg", "deg")
 
     @property
     def C_vs(self) -> Array:  # noqa: N802
@@ -75,11 +80,28 @@ class RecordedTriad:
     uncertainty : TriadUncertainty
     name : str
         Of the part, for messages.
+
+    Raises
+    ------
+    ConfigError
+        The table or the uncertainty is of another kind.
     """
 
     table: pd.DataFrame
     uncertainty: TriadUncertainty
     name: str
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.table, pd.DataFrame):
+            raise _kind(
+                self.table,
+                self.name,
+                "table",
+                "give a DataFrame, indexed by time in s, with the columns accel_x accel_y accel_z "
+                "in m/s², or gyro_x gyro_y gyro_z in rad/s",
+            )
+        if not isinstance(self.uncertainty, TriadUncertainty):
+            raise _kind(self.uncertainty, self.name, "uncertainty", "give a TriadUncertainty")
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +124,11 @@ class CrashUnit:
         How well that instant is known.
     lender : CrashUnit, optional
         The unit of that name, once its gyro stands in `gyro`, turned into these sensor axes.
+
+    Raises
+    ------
+    ConfigError
+        A part is of another kind, or the trigger is no number.
     """
 
     name: str
@@ -112,3 +139,33 @@ class CrashUnit:
     trigger: float | None = None
     trigger_sd: float = 0.0
     lender: CrashUnit | None = None
+
+    def __post_init__(self) -> None:
+        given: object = self.accelerometers
+        if not isinstance(given, tuple | list) or not all(
+            isinstance(t, RecordedTriad) for t in given
+        ):
+            raise _kind(
+                given,
+                self.name,
+                "accelerometers",
+                "give a tuple of RecordedTriad, the lowest range first, as (low,)",
+            )
+        object.__setattr__(self, "accelerometers", tuple(given))
+        if not (self.gyro is None or isinstance(self.gyro, RecordedTriad)):
+            raise _kind(self.gyro, self.name, "gyro", "give a RecordedTriad, or None")
+        if not isinstance(self.mounting, Mounting):
+            raise _kind(self.mounting, self.name, "mounting", "give a Mounting")
+        if not (self.trigger is None or is_number(self.trigger)):
+            raise _kind(
+                self.trigger, self.name, "trigger", "give its instant on this unit's clock, in s"
+            )
+
+
+def _kind(given: object, name: object, quantity: str, remedy: str) -> ConfigError:
+    return ConfigError(
+        f"this is of kind {type(given).__name__}",
+        file=str(name),
+        quantity=quantity,
+        remedy=remedy,
+    )

@@ -14,6 +14,7 @@ from strapdown.dsp.local_slope import LocalSlope, local_slope
 from strapdown.exceptions import ConfigError
 from strapdown.rotation import cross_matrix
 from strapdown.sensors.prepared_unit import PreparedUnit
+from strapdown.sensors.triad_numbers import triple
 from strapdown.tables import ACCEL, GYRO, check_imu, imu_table
 from strapdown.tables.checks import check_columns
 
@@ -194,7 +195,8 @@ def move_unit(
         In vehicle axes.
     """
     noise = prepared.gyro_noise_covariance
-    arm = np.asarray(point, dtype=np.float64) - np.asarray(prepared.unit.mounting.position)
+    place = triple(point, "point", "give forward, right, down in m from the vehicle's origin")
+    arm = np.asarray(place) - np.asarray(prepared.unit.mounting.position)
     return move_imu(prepared.imu, arm, gyro_noise=noise, window=window, gyro_delay=gyro_delay)
 
 

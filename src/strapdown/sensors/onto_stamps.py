@@ -13,7 +13,8 @@ from strapdown.dsp.interpolation import interpolate, interpolated_means
 from strapdown.dsp.samples import even_step
 from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.crash_unit import RecordedTriad
-from strapdown.sensors.triad_channels import AxisGroup, TriadChannels
+from strapdown.sensors.saturation import RangeLimits, find_limits
+from strapdown.sensors.triad_channels import OVER_RANGE, AxisGroup, TriadChannels
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -126,15 +127,20 @@ def onto_stamps(
     values, factor, noise = (np.empty((n, 3)) for _ in range(3))
     clipped, whole = np.zeros((n, 3), dtype=bool), np.ones(n, dtype=bool)
     limits = np.array(triad.uncertainty.axis("full_scale"))
+    steps = np.array(triad.uncertainty.axis("quantization"))
     density = np.array(triad.uncertainty.axis("noise_density"))
     methods, findings = [], []
     for g in channels.groups:
         axes = list(g.axes)
-        held = np.abs(g.values) >= AT_END * limits[axes]
+        # What reads more than it is said to be able to has another end, and is not cut there.
+        over = np.abs(g.values).max(axis=0) > OVER_RANGE * limits[axes]
+        stated = np.where(over, np.inf, limits[axes])
+        ends = find_limits(g.time, g.values, stated, steps[axes])
+        held = ends.clipped | (np.abs(g.values) >= AT_END * stated)
         at, method = _resample(channels, g, held, offset, stamps, rate, sampling, attenuation)
         values[:, axes], factor[:, axes] = at.values, at.noise_factor[:, None]
         if method == "interpolated":
-            values[:, axes] = _held(g, held, at.values, stamps + offset, limits[axes])
+            values[:, axes] = _held(g, held, at.values, stamps + offset, ends)
         noise[:, axes] = at.noise_factor[:, None] * density[axes] / np.sqrt(g.step)
         clipped[:, axes] = at.touched
         whole &= at.whole
@@ -180,14 +186,15 @@ def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
     )
 
 
-def _held(g: AxisGroup, held: Flags, values: Array, at: Array, limits: Array) -> Array:
+def _held(g: AxisGroup, held: Flags, values: Array, at: Array, ends: RangeLimits) -> Array:
     """Values between samples, at the end of the range where the nearest sample was held there.
 
     A polynomial through a held stretch swings about it: the end would no longer be seen for one.
     """
     nearest = np.clip(np.rint((at - g.time[0]) / g.step).astype(np.int64), 0, len(g.time) - 1)
-    inside = np.clip(values, -limits, limits)
-    return np.where(held[nearest], np.copysign(limits, g.values[nearest]), inside)
+    inside = np.clip(values, ends.lower, ends.upper)
+    end = np.where(g.values[nearest] > 0.0, ends.upper, ends.lower)
+    return np.where(held[nearest], end, inside)
 
 
 def _is_faster(g: AxisGroup, rate: float) -> bool:

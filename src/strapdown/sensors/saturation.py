@@ -17,6 +17,8 @@ LONGEST_FLAT = 0.5  # s
 LEAST_FLAT = 3  # samples
 # The top of a smooth pulse in coarse steps is flat, too, but is left by one step.
 LEAST_JUMP = 3.0  # steps
+# So many cannot be where a fast rise meets a slow fall, unless there is no noise at all.
+SURE_FLAT = 10
 # A flat extreme below this part of the stated range is no end of anything.
 LEAST_PART = 0.1
 # Of a full scale: what is nearer to it than this, or than a step, is at it.
@@ -52,8 +54,8 @@ def find_limits(time: Array, values: Array, full_scale: Array, quantization: Arr
     Parameters
     ----------
     time : ndarray, (n,), s
-    values : ndarray, (n, 3)
-        As recorded: saturation happens before any bias is taken off.
+    values : ndarray, (n, k)
+        Any axes, usually three, as recorded: saturation happens before any bias is taken off.
     full_scale : ndarray, (3,)
         As stated; may be infinite.
     quantization : ndarray, (3,)
@@ -67,13 +69,14 @@ def find_limits(time: Array, values: Array, full_scale: Array, quantization: Arr
     -----
     A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
     an end where it stays on the very same extreme value of the record for three samples or
-    more, up to 0.5 s, and jumps there by three steps or more: noise repeats no number, and the
-    top of a smooth pulse is left by one step.
+    more, up to 0.5 s, and jumps by three steps or more on both sides (ten samples or more: on one
+    side): noise repeats no number, and the top of a smooth pulse is left by fewer steps.
     """
     lower, upper = -np.asarray(full_scale, dtype=np.float64), np.array(full_scale, dtype=np.float64)
-    found, beyond = np.zeros(3, dtype=bool), np.zeros(3, dtype=bool)
+    axes = values.shape[1]
+    found, beyond = np.zeros(axes, dtype=bool), np.zeros(axes, dtype=bool)
     clipped = np.zeros(values.shape, dtype=bool)
-    for k in range(3):
+    for k in range(axes):
         y, full = values[:, k], float(full_scale[k])
         slack = max(float(quantization[k]), ROUNDING * full) if np.isfinite(full) else 0.0
         beyond[k] = bool(np.abs(y).max(initial=0.0) > full + slack)
@@ -107,9 +110,13 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
     step = _least_step(y)
     for a, b in zip(starts.tolist(), ends.tolist(), strict=True):
         sides = [float(y[i]) for i in (a - 1, b) if 0 <= i < y.size]
-        jump = max((top - side for side in sides), default=0.0)
+        jumps = [top - side for side in sides] or [0.0]
         short = time[b - 1] - time[a] <= LONGEST_FLAT
-        if b - a >= LEAST_FLAT and short and jump >= (LEAST_JUMP - 0.5) * step:
+        # The top of a parabola that stays within a step for n samples is left by ((n + 2)/n)².
+        n = b - a
+        least = max(LEAST_JUMP - 0.5, (1.0 + 2.0 / n) ** 2 + 0.5) * step
+        jump = max(jumps) if n >= SURE_FLAT else min(jumps)
+        if n >= LEAST_FLAT and short and jump >= least:
             return np.asarray(at, dtype=np.bool_)
     return None
 

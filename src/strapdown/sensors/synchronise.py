@@ -14,6 +14,7 @@ from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.onto_stamps import TriadAtStamps, allowed_stamps, at_rows, onto_stamps
+from strapdown.sensors.synchronise_findings import clipped_findings, cut_findings, end_findings
 from strapdown.sensors.triad_channels import TriadChannels, triad_channels
 from strapdown.sensors.unit_clocks import (
     UnitChannels,
@@ -202,7 +203,10 @@ def synchronise(
             gyro_sd = math.hypot(clock.sd, lent.time_sd)
         done[u.unit.name] = _made(u.unit, clock, tuple(triads), gyro, lender, gyro_sd)
     ordered = tuple(done[u.name] for u in units)
-    findings += _ends(ordered)
+    findings += end_findings([(u.unit.name, _own(u)) for u in ordered])
+    findings += clipped_findings([(u.unit.name, _last(u)) for u in ordered])
+    if cut:
+        findings += cut_findings([s for own in spans.values() for s in own], time)
     return SynchronisedUnits(ordered, time, rate, reference, zero_sd, tuple(findings))
 
 
@@ -307,27 +311,10 @@ def _stamps(spans: list[tuple[str, float, float]], rate: float) -> Array:
     return np.arange(first, last + 1) / rate
 
 
-def _ends(units: tuple[SynchronisedUnit, ...]) -> list[Finding]:
-    found = []
-    for u in units:
-        own = (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
-        for t in own:
-            if t.whole.all():
-                continue
-            inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
-            kept = (
-                f"whole from {time[inner[0]]:.4g} to {time[inner[-1]]:.4g} s"
-                if inner.size
-                else "nowhere whole"
-            )
-            found.append(
-                Finding(
-                    f"the low-pass is {kept}: outside, the record's ends were continued by their "
-                    "point mirror, and samples scatter up to "
-                    f"{float(t.noise_factor.max() / np.median(t.noise_factor)):.2g} times as much",
-                    file=f"{u.unit.name}, {t.triad.name}",
-                    quantity="time",
-                    remedy="record longer before and after, or use means (sampling='mean')",
-                )
-            )
-    return found
+def _own(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
+    return (*u.accelerometers, *(() if u.gyro is None or u.lender else (u.gyro,)))
+
+
+def _last(u: SynchronisedUnit) -> tuple[TriadAtStamps, ...]:
+    """The parts behind which there is no wider range."""
+    return (*u.accelerometers[-1:], *(() if u.gyro is None or u.lender else (u.gyro,)))

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
@@ -26,6 +27,8 @@ BIAS_SPEAKS = 1.0  # m/s²
 # No vehicle turns so fast; 100 deg/s is what a hard crash does.
 FASTEST_TURN = 50.0  # rad/s
 OVER_RANGE = 1.05
+# A sample each 100 ms sees no crash.
+SLOWEST_STEP = 0.1  # s
 DEGREES = 180.0 / math.pi
 
 
@@ -114,14 +117,14 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     sampling = table.attrs.get("sampling")
     if sampling not in SAMPLINGS:
         raise DataError(
-            f"attrs['sampling'] is {sampling!r}",
+            f"the table's attrs['sampling'] is {sampling!r}",
             file=source,
             quantity="sampling",
-            remedy=f"say {' or '.join(SAMPLINGS)}",
+            remedy=f"say table.attrs['sampling'] = {' or '.join(map(repr, SAMPLINGS))}",
         )
-    stamps = np.asarray(table.index.to_numpy(), dtype=np.float64)
+    stamps = _stamps(table, source)
     check_time(stamps, source)
-    values = table[columns].to_numpy(dtype=np.float64)
+    values = np.column_stack([_numbers(table[c], c, source) for c in columns])
     check_rows(np.where(np.isnan(values), 0.0, values), columns, source)
     groups, findings = _groups(source, stamps, values, columns)
     judge = _judge_force if columns == ACCEL else _judge_rate
@@ -188,6 +191,16 @@ def _group(
             quantity=names[0],
             remedy="give a record of the crash, or leave this part out",
         )
+    step = float(np.median(np.diff(time)))
+    if step > SLOWEST_STEP:
+        raise DataError(
+            f"its samples are {step:.4g} s apart, too far for a crash",
+            file=source,
+            row=int(rows[1]) + 1,
+            quantity="time",
+            remedy="the index must be time in s: divide stamps in ms by 1000, and set the index "
+            "where time is a column: table.set_index('time')",
+        )
     gaps = find_gaps(time)
     if gaps:
         worst = max(gaps, key=lambda g: g.length)
@@ -199,7 +212,33 @@ def _group(
             quantity="time",
             remedy="cut the record before or after it, or fill it with what is known",
         )
-    return AxisGroup(axes, time, block, float(np.median(np.diff(time))))
+    return AxisGroup(axes, time, block, step)
+
+
+def _stamps(table: pd.DataFrame, source: str) -> Array:
+    if table.index.dtype.kind not in "fiu":
+        raise DataError(
+            f"the table's index holds {table.index.dtype}, and not seconds",
+            file=source,
+            quantity="time",
+            remedy="set the index to numbers, the time in s on the unit's clock",
+        )
+    return np.asarray(table.index.to_numpy(), dtype=np.float64)
+
+
+def _numbers(column: pd.Series, name: str, source: str) -> Array:
+    try:
+        return np.asarray(column.to_numpy(dtype=np.float64))
+    except (TypeError, ValueError):
+        bad = pd.to_numeric(column, errors="coerce").isna().to_numpy() & column.notna().to_numpy()
+        row = int(np.argmax(bad))
+        raise DataError(
+            f"{column.iloc[row]!r} is no number",
+            file=source,
+            row=row + 1,
+            quantity=name,
+            remedy="write NaN where an axis has no sample, and a number elsewhere",
+        ) from None
 
 
 def _quiet_mean(unit: CrashUnit, groups: tuple[AxisGroup, ...]) -> Array:

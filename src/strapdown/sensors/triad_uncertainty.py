@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import Any
 
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.triad_errors import Triad, TriadLike
+from strapdown.tables.checks import is_number
 
 # Facts about the range, which are not standard deviations, and may be infinite.
 FACTS = ("full_scale", "quantization", "bandwidth")
+WHERE_ZERO_IS_NOTHING = ("full_scale", "bandwidth")
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,7 @@ class TriadUncertainty:
     Raises
     ------
     ConfigError
-        A number is negative or not finite.
+        A number is negative or not finite, or a full scale or a bandwidth is zero.
     """
 
     noise_density: TriadLike = 0.0
@@ -64,7 +67,7 @@ class TriadUncertainty:
     def __post_init__(self) -> None:
         for f in fields(self):
             given = getattr(self, f.name)
-            numbers = (given,) if isinstance(given, int | float) else tuple(given)
+            numbers = _numbers(given, f.name)
             if f.name != "bandwidth":
                 numbers = numbers * 3 if len(numbers) == 1 else numbers
             if len(numbers) != (1 if f.name == "bandwidth" else 3):
@@ -80,6 +83,12 @@ class TriadUncertainty:
                     f"{given!r} is no standard deviation or range",
                     quantity=f.name,
                     remedy="give zero or more, finite",
+                )
+            if f.name in WHERE_ZERO_IS_NOTHING and 0.0 in numbers:
+                raise ConfigError(
+                    f"{given!r} leaves nothing to measure with",
+                    quantity=f.name,
+                    remedy="give more than zero, or leave it out where it is not known",
                 )
             value = tuple(float(x) for x in numbers)
             object.__setattr__(self, f.name, value[0] if f.name == "bandwidth" else value)
@@ -97,3 +106,15 @@ class TriadUncertainty:
         """Return a per-axis attribute as three numbers."""
         value: Triad = getattr(self, name)
         return value
+
+
+def _numbers(given: Any, name: str) -> tuple[float, ...]:
+    try:
+        numbers = (given,) if is_number(given) else tuple(given)
+        if isinstance(given, str) or not all(is_number(x) for x in numbers):
+            raise TypeError
+        return tuple(float(x) for x in numbers)
+    except TypeError:
+        raise ConfigError(
+            f"{given!r} is no number", quantity=name, remedy="give one number, or three: x, y, z"
+        ) from None

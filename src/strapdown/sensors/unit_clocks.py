@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.triad_channels import TriadChannels
+from strapdown.sensors.triad_numbers import check_sd
 
 Array = NDArray[np.float64]
 
@@ -21,6 +22,8 @@ __all__ = ["UnitClock", "clocks_by_correlation", "clocks_by_trigger"]
 
 # Triggers and correlation that differ by more standard deviations contradict each other.
 CONTRADICTION = 4.0
+# A trigger that is farther outside of its record is one of another clock.
+OUTSIDE = 1.0  # s
 FORCE, RATES = "specific force", "rates"
 
 
@@ -59,7 +62,7 @@ def clocks_by_trigger(units: Sequence[UnitChannels]) -> list[UnitClock]:
     DataError
         A unit has none.
     """
-    return [UnitClock(_trigger(u.unit), u.unit.trigger_sd, "trigger") for u in units]
+    return [UnitClock(_trigger_within(u), u.unit.trigger_sd, "trigger") for u in units]
 
 
 def clocks_by_correlation(
@@ -120,19 +123,29 @@ def clocks_by_correlation(
 def _trigger(unit: CrashUnit) -> float:
     if unit.trigger is None or not math.isfinite(unit.trigger):
         raise DataError(
-            f"its trigger is {unit.trigger}",
+            "it has no trigger" if unit.trigger is None else f"its trigger is {unit.trigger}",
             file=unit.name,
             quantity="trigger",
             remedy="give the instant of the common trigger on this unit's clock, in s, or "
             "synchronise by correlation with a reference unit that has one",
         )
-    if not (math.isfinite(unit.trigger_sd) and unit.trigger_sd >= 0.0):
-        raise ConfigError(
-            f"{unit.trigger_sd!r} s is no standard deviation",
-            quantity=f"trigger_sd of {unit.name}",
-            remedy="give zero or more",
-        )
+    check_sd(unit.trigger_sd, "trigger_sd", "s", unit.name)
     return unit.trigger
+
+
+def _trigger_within(u: UnitChannels) -> float:
+    trigger = _trigger(u.unit)
+    parts = (*u.accelerometers, *(() if u.gyro is None else (u.gyro,)))
+    start, end = min(c.start for c in parts), max(c.end for c in parts)
+    if not start - OUTSIDE <= trigger <= end + OUTSIDE:
+        raise DataError(
+            f"its trigger at {trigger:.6g} s is not within its record, which has {start:.6g} s to "
+            f"{end:.6g} s",
+            file=u.unit.name,
+            quantity="trigger",
+            remedy="give the instant on this unit's own clock, in s",
+        )
+    return trigger
 
 
 def _lag(u: UnitChannels, what: str) -> float:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.triad_channels import TriadChannels
+from strapdown.sensors.triad_numbers import finite
 from strapdown.tables import SAMPLINGS
 
 __all__ = ["METHODS", "check_options", "compare_sizes"]
@@ -51,7 +52,7 @@ def check_options(
             quantity="sampling",
             remedy=nearest(str(sampling), SAMPLINGS),
         )
-    if not (math.isfinite(rate) and rate > 0.0):
+    if not (finite(rate) and rate > 0.0):
         raise ConfigError(
             f"{rate!r} Hz is no rate", quantity="rate", remedy="give samples per second, as 200"
         )

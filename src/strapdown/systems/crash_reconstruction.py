@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import pandas as pd
+
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.combine_units import combine_units
@@ -14,16 +16,18 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.prepare_together import prepare_together
+from strapdown.crash.reconstruction_summary import summary_table, unit_line
 from strapdown.crash.unit_comparison import UnitComparison
 from strapdown.crash.unit_reconstruction import (
     PEAK_WINDOW,
     UnitReconstruction,
     reconstruct_unit,
 )
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.exceptions import ConfigError, Finding
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
+from strapdown.systems.crash_options import check_crash_options
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +55,28 @@ class CrashReconstruction:
     comparison: UnitComparison | None
     combined: UnitReconstruction | None
     findings: tuple[Finding, ...]
+
+    def __repr__(self) -> str:
+        lines = [unit_line(u) for u in self.answers]
+        said = f"{len(self.findings)} finding{'s' * (len(self.findings) != 1)}"
+        return "\n".join([f"<CrashReconstruction at {self.point} m", *lines, f"{said}>"])
+
+    @property
+    def answers(self) -> tuple[UnitReconstruction, ...]:
+        """Every unit, and the mean of them where there is one."""
+        return (*self.units, *(() if self.combined is None else (self.combined,)))
+
+    def summary(self) -> pd.DataFrame:
+        """Changes of velocity, directions of force and ends of the path, with their bounds.
+
+        Returns
+        -------
+        DataFrame
+            Indexed by ``unit``, ``part`` (number and type of the event, or ``path``) and
+            ``quantity``; ``value``, ``low`` and ``high`` in the unit that the quantity names. The
+            bounds hold 95 %.
+        """
+        return summary_table(self.answers)
 
     @property
     def main(self) -> UnitReconstruction:
@@ -142,10 +168,7 @@ def reconstruct_crash(
     DivergenceError
         A path left what a vehicle can do.
     """
-    if not units:
-        raise DataError(
-            "there is none", quantity="units", remedy="give the record of at least one unit"
-        )
+    check_crash_options(units, entry, point, window, preparation, rule, gravity, mechanization)
     together = synchronise(units, method=clock, rate=rate, sampling=sampling, cut=False)
     findings = list(together.findings)
     there = prepare_together(together, point, gravity, preparation or {})

@@ -94,6 +94,12 @@ def with_table(unit, change, *, gyro=False):
     return replace(unit, gyro=part) if gyro else replace(unit, accelerometers=(part,))
 
 
+def with_text(table):
+    table = table.astype(object)
+    table.iloc[200, 1] = "n/a"
+    return table
+
+
 def with_inf(table):
     table.iloc[200, 1] = np.inf
     return table
@@ -324,17 +330,58 @@ def test_clipping_is_seen_through_the_low_pass():
     assert not clipped[np.abs(both.time - 0.05) > 0.2].any()
 
 
+def test_a_range_that_ends_before_it_is_said_to_is_seen_between_stamps_and_through_the_low_pass():
+    # Samples that are held at an end are equal to the last bit; interpolated ones are not.
+    for unit, name in ((imu(), "IMU1"), (lab(), "LAB1")):
+        held = with_table(unit, lambda table: table.clip(-60.0, 60.0))
+        part = replace(held.accelerometers[0], uncertainty=TriadUncertainty(full_scale=490.0))
+        both = synchronise([imu(), replace(held, name="HELD", accelerometers=(part,))])
+        clipped = both.unit("HELD").accelerometers[0].clipped
+        C = LAB_MOUNT.C_vs if name == "LAB1" else IMU_MOUNT.C_vs
+        raw = np.abs(force(both.time) @ C) >= 70.0
+        assert raw.any() and clipped[raw].all()
+        assert not clipped[np.abs(both.time - 0.05) > 0.2].any()
+        said = [f for f in both.findings if "end of its range" in f.what]
+        assert bool(said) == (name == "LAB1")
+        assert all(f.file.startswith("HELD") and "delta-V" in f.remedy for f in said)
+
+
+def test_what_a_shorter_record_takes_from_the_others_is_told():
+    short = with_table(imu("IMU2"), lambda t: t[(t.index > t.index[0] + 0.5)])
+    both = synchronise([imu(), short])
+    found = [f for f in both.findings if "begins last" in f.what]
+    assert len(found) == 1 and found[0].file.startswith("IMU2, ")
+    assert not any("begins last" in f.what for f in synchronise([imu()]).findings)
+
+
 @pytest.mark.parametrize(
     ("units", "words"),
     [
-        (lambda: [imu(trigger=None)], ["IMU1", "trigger is None", "by correlation"]),
+        (lambda: [imu(trigger=None)], ["IMU1", "no trigger", "by correlation"]),
         (lambda: [lab(), imu("IMU9")], ["LAB1", "'IMU1'", "did you mean 'IMU9'"]),
         (lambda: [lab(), replace(imu(), gyro=None)], ["LAB1", "none either"]),
         (
             lambda: [with_table(imu(), lambda t: t.drop(columns="accel_y"))],
             ["IMU1, accel, accel_y", "no accel_y"],
         ),
-        (lambda: [imu(), imu("IMU2", trigger=50.0)], ["IMU1", "IMU2", "share no stretch"]),
+        (lambda: [imu(), imu("IMU2", trigger=50.0)], ["IMU2", "50 s is not within its record"]),
+        (lambda: [imu(trigger="5.0")], ["IMU1", "trigger", "kind str"]),
+        (
+            lambda: [imu(trigger=6.8), imu("IMU2", trigger=3.2)],
+            ["IMU1", "IMU2", "share no stretch"],
+        ),
+        (
+            lambda: [with_table(imu(), lambda t: t.set_axis(1000.0 * t.index))],
+            ["IMU1, accel, row 2, time", "5 s apart", "ms by 1000"],
+        ),
+        (
+            lambda: [with_table(imu(), lambda t: t.set_axis([f"{x} s" for x in t.index]))],
+            ["IMU1, accel, time", "not seconds"],
+        ),
+        (
+            lambda: [with_table(imu(), with_text)],
+            ["IMU1, accel, row 201, accel_y", "'n/a' is no number"],
+        ),
         (
             lambda: [with_table(imu(), lambda t: t.iloc[[0, 2, 1, *range(3, 401)]])],
             ["IMU1, accel, row 3, time", "time does not advance"],
@@ -368,7 +415,7 @@ def test_clipping_is_seen_through_the_low_pass():
         ),
         (lambda: [imu(), imu()], ["two units are called 'IMU1'"]),
         (lambda: [CrashUnit("X", (), trigger=0.0)], ["X", "neither accelerometers nor a gyro"]),
-        (lambda: [imu(trigger_sd=-1.0)], ["trigger_sd of IMU1"]),
+        (lambda: [imu(trigger_sd=-1.0)], ["IMU1, trigger_sd"]),
         (list, ["no unit"]),
     ],
 )

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.crash.delta_v_bound import TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.entry import Entry
 from strapdown.sensors.error_draws import child
 from strapdown.simulation import CRASHES, CrashScenario, Ringing

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.at_point import at_point
-from strapdown.crash.delta_v_bound import TWO_SIDED_95
 from strapdown.crash.pdof import ned_pdof, pdof
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit

@@ -1,0 +1,113 @@
+"""Whether what is said of the entry agrees with the record itself."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from strapdown.crash.at_point import AtPoint
+from strapdown.crash.entry import Entry
+from strapdown.crash.events import CrashEvents
+from strapdown.crash.leg import VELOCITY
+from strapdown.crash.path import CrashPath, reconstruct_path
+from strapdown.exceptions import DataError, Finding
+from strapdown.mechanization import NorthEastDown
+
+__all__ = ["check_standing", "entry_findings"]
+
+# Beyond so many standard deviations two numbers contradict each other.
+SIGMAS = 4.0
+# The wake window of 49 CFR 563 is 20 ms: time zero is as well known as half of it.
+LATE = 0.010  # s
+
+
+def check_standing(at_point: AtPoint, entry: Entry | None) -> None:
+    """Refuse to begin at zero speed where the vehicle may have been driving.
+
+    Raises
+    ------
+    DataError
+        No entry is given, and the quiet stretch may be one at speed.
+    """
+    rest = at_point.rest
+    if entry is None and rest is not None and rest.grade == "steady":
+        raise DataError(
+            f"nothing says how fast the vehicle was: it is quiet from {rest.start:.4g} s to "
+            f"{rest.end:.4g} s, and a constant velocity is as quiet as a rest",
+            file=at_point.name,
+            quantity="entry",
+            remedy="give Entry.from_speed(speed, sd) in m/s; or, for a vehicle that stood until "
+            "it was struck, preparation={'moving_at_impact': False}",
+        )
+
+
+def entry_findings(
+    at_point: AtPoint,
+    entry: Entry | None,
+    path: CrashPath,
+    events: CrashEvents,
+    mechanization: NorthEastDown | None,
+) -> list[Finding]:
+    """An entry that lies in the crash, or a speed that the record contradicts.
+
+    Parameters
+    ----------
+    at_point : AtPoint
+    entry : Entry or None
+    path : CrashPath
+        That is tied to it.
+    events : CrashEvents
+    mechanization : NorthEastDown, optional
+    """
+    if entry is None:
+        return []
+    found = []
+    if events.events and events.events[0].time_zero + LATE < entry.time:
+        first = events.events[0].time_zero
+        found.append(
+            Finding(
+                f"it is stated for {entry.time:.4g} s, and the crash began "
+                f"{1e3 * (entry.time - first):.4g} ms before, at {first:.4g} s",
+                file=at_point.name,
+                quantity="entry",
+                remedy=f"if it is the speed before the crash, give it with time={first:.3f}; if "
+                "the trigger is late, correct it",
+            )
+        )
+    rest = at_point.rest
+    if rest is None or rest.grade != "still" or at_point.prepared is None:
+        return found
+    driven = reconstruct_path(
+        at_point.imu,
+        at_point.effects,
+        at_point.levelling,
+        rest.end,
+        None,
+        window=(float(path.time[0]), float(path.time[-1])),
+        mechanization=mechanization,
+    )
+    k, j = path.anchor, int(np.searchsorted(driven.time, path.time[path.anchor] - 1e-9))
+    speed, sd = _speed(path, k)
+    felt, felt_sd = _speed(driven, j)
+    if abs(speed - felt) > SIGMAS * float(np.hypot(sd, felt_sd)):
+        found.append(
+            Finding(
+                f"it is {speed:.4g} ± {1.96 * sd:.2g} m/s at {entry.time:.4g} s, and from the "
+                f"rest until {rest.end:.4g} s the record itself comes to {felt:.4g} ± "
+                f"{1.96 * felt_sd:.2g} m/s",
+                file=at_point.name,
+                quantity="entry speed",
+                remedy="give it in m/s: km/h divided by 3.6, mph times 0.44704; else check the "
+                "rest, the scale factors and the range of the accelerometers",
+            )
+        )
+    return found
+
+
+def _speed(path: CrashPath, row: int) -> tuple[float, float]:
+    """Horizontal speed at a sample, and its standard deviation."""
+    v = path.table[["VN", "VE"]].to_numpy()[row]
+    speed = float(np.hypot(*v))
+    spread = path.covariance[row, VELOCITY, VELOCITY][:2, :2]
+    if speed == 0.0:
+        return 0.0, float(np.sqrt(spread.trace()))
+    return speed, float(np.sqrt(v @ spread @ v)) / speed

@@ -1,0 +1,101 @@
+"""What is asked of `reconstruct_crash`, checked before any work is done."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from strapdown.crash.entry import Entry
+from strapdown.crash.event_rule import EventRule
+from strapdown.crash.gnss_start import GnssEntry
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.mechanization import NorthEastDown
+from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.triad_numbers import FARTHEST, triple
+
+__all__ = ["check_crash_options"]
+
+
+def check_crash_options(
+    units: object,
+    entry: object,
+    point: object,
+    window: object,
+    preparation: object,
+    rule: object,
+    gravity: object,
+    mechanization: object,
+) -> None:
+    """Check the arguments whose kind or size no later stage would name.
+
+    Raises
+    ------
+    DataError
+        There is no unit.
+    ConfigError
+        An argument is of another kind, or out of range.
+    """
+    _check_units(units)
+    if not (entry is None or isinstance(entry, Entry | GnssEntry)):
+        raise _kind(
+            entry,
+            "entry",
+            "give Entry.from_speed(speed in m/s, its standard deviation), a GnssEntry, or None "
+            "for a vehicle that stood still when the record began",
+        )
+    place = triple(point, "point", "give forward, right, down in m from the vehicle's origin")
+    if math.hypot(*place) > FARTHEST:
+        raise ConfigError(
+            f"{place} is {math.hypot(*place):.4g} m from the vehicle's origin",
+            quantity="point",
+            remedy="give it in m (mm divided by 1000), from the origin that the positions of the "
+            "units count from",
+        )
+    _check_window(window)
+    if not (preparation is None or isinstance(preparation, Mapping)):
+        raise _kind(
+            preparation, "preparation", "give options of prepare_unit, as {'levelling': (0, 0, 1)}"
+        )
+    if not isinstance(rule, EventRule):
+        raise _kind(rule, "rule", "give an EventRule, or leave it out for 49 CFR 563")
+    if not isinstance(gravity, int | float):
+        raise _kind(gravity, "gravity", "give m/s², or leave it out")
+    if not (mechanization is None or isinstance(mechanization, NorthEastDown)):
+        raise _kind(mechanization, "mechanization", "give NorthEastDown(), or leave it out")
+
+
+def _check_units(units: object) -> None:
+    if isinstance(units, CrashUnit):
+        raise ConfigError(
+            "it is one unit, and a list is needed",
+            file=units.name,
+            quantity="units",
+            remedy="give [unit]",
+        )
+    if units is None or (isinstance(units, Sequence) and not units):
+        raise DataError(
+            "there is none", quantity="units", remedy="give the record of at least one unit"
+        )
+    if not isinstance(units, Sequence) or isinstance(units, str):
+        raise _kind(units, "units", "give a list of CrashUnit")
+    for unit in units:
+        if not isinstance(unit, CrashUnit):
+            raise _kind(unit, "units", "give a list of CrashUnit")
+
+
+def _check_window(window: Any) -> None:
+    try:
+        begin, end = (float(x) for x in window)
+    except (TypeError, ValueError):
+        begin = end = math.nan
+    if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
+        raise ConfigError(
+            f"{window!r} is no window",
+            quantity="window",
+            remedy="give its start and its end in s from the trigger, as (-0.1, 0.75)",
+        )
+
+
+def _kind(given: object, quantity: str, remedy: str) -> ConfigError:
+    return ConfigError(f"this is of kind {type(given).__name__}", quantity=quantity, remedy=remedy)

@@ -1,0 +1,242 @@
+"""A crash from the record of a unit: its summary, what is asked of it, what contradicts itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from strapdown import CrashUnit, Entry, Mounting, TriadUncertainty, reconstruct_crash, sample_paths
+from strapdown.crash.reference_path import compare_with_reference
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.simulation.crash_recording import record_crash
+from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.mounted_motion import MountedMotion
+from strapdown.simulation.paper_recorders import paper_units
+from strapdown.tables import NED
+
+DESIGNS = {d.name: d for d in paper_units()}
+ENTRY = Entry.from_speed(7.1, 0.1)
+
+
+def record(name, seed=1):
+    crash = CRASHES[name]
+    return record_crash(crash.motion, DESIGNS["IMU1"], impact=crash.start, seed=seed)[0]
+
+
+@pytest.fixture(scope="module")
+def unit():
+    return record("pole")
+
+
+@pytest.fixture(scope="module")
+def crash(unit):
+    return reconstruct_crash([unit], ENTRY)
+
+
+class TestSummary:
+    def test_has_what_the_objects_have(self, crash):
+        table = crash.summary()
+        event = table.loc[("IMU1", "1 front")]
+        (whole,) = (changes.event for changes in crash.main.body)
+        assert event.loc["delta-V forward m/s", "value"] == whole.delta_v.vector[0]
+        half = event["high"] - event["value"]
+        assert half["delta-V right m/s"] == pytest.approx(whole.bound.half_width[1])
+        assert half["delta-V resultant m/s"] == pytest.approx(whole.resultant_bound)
+        assert event.loc["PDOF deg", "low"] == whole.interval.horizontal.low_deg
+        end = table.loc[("IMU1", "path", "end east m")]
+        assert end["value"] == crash.main.path.table["east"].iloc[-1]
+        assert end["high"] - end["low"] == pytest.approx(
+            2.0 * 1.96 * crash.main.path.sd["east"].iloc[-1], rel=1e-4
+        )
+        assert crash.main.summary().equals(table)
+
+    def test_holds_the_truth(self, crash):
+        # One seed of one crash: four standard deviations, where a bound of 95 % has 1.96.
+        table = crash.summary()
+        pole = CRASHES["pole"]
+        motion = MountedMotion(pole.motion, Mounting())
+        truth = motion.kinematics_from(np.array([pole.start + 0.75]), epoch=pole.start).position[0]
+        for axis, value in zip(NED, truth, strict=True):
+            row = table.loc[("IMU1", "path", f"end {axis} m")]
+            assert abs(row["value"] - value) < 2.05 * (row["high"] - row["value"])
+        row = table.loc[("IMU1", "1 front", "delta-V forward m/s")]
+        assert abs(row["value"] - pole.delta_v[0][0]) < 2.05 * (row["high"] - row["value"])
+
+    def test_is_told_in_a_few_lines(self, crash):
+        assert len(repr(crash).splitlines()) == 4
+        assert "IMU1, event 1, front: delta-V 7." in repr(crash)
+        assert "ends north, east, down" in repr(crash.main.path)
+        ned = repr(crash.main.ned[0].event)
+        # Azimuth and its bounds on the same turn.
+        assert "azimuth 35" in ned and "(35" in ned
+        assert len(repr(crash.main.body[0])) < 500
+
+    def test_without_an_event_has_the_path_alone(self):
+        found = reconstruct_crash([record("pothole")], Entry.from_speed(14.0, 0.3))
+        assert set(found.summary().index.get_level_values("part")) == {"path"}
+        assert "no event, at most" in repr(found)
+
+
+class TestEntry:
+    def test_a_speed_that_the_record_contradicts_is_told(self, unit):
+        (finding,) = reconstruct_crash([unit], Entry.from_speed(25.6, 0.3)).findings
+        assert finding.quantity == "entry speed"
+        assert "25.6" in finding.what and "km/h divided by 3.6" in finding.remedy
+
+    def test_an_instant_in_the_crash_is_told(self, unit):
+        late = replace(unit, trigger=unit.trigger + 0.05)
+        findings = reconstruct_crash([late], ENTRY, window=(-0.2, 0.5)).findings
+        assert any(f.quantity == "entry" and "50.58 ms before" in f.what for f in findings)
+
+    def test_a_quiet_drive_is_no_rest_to_begin_at(self, unit):
+        def late(triad):
+            table = triad.table.loc[unit.trigger - 0.3 :]
+            table.attrs = dict(triad.table.attrs)
+            return replace(triad, table=table)
+
+        short = replace(
+            unit, accelerometers=tuple(map(late, unit.accelerometers)), gyro=late(unit.gyro)
+        )
+        with pytest.raises(DataError, match="nothing says how fast"):
+            reconstruct_crash([short], None)
+        reconstruct_crash([short], None, preparation={"moving_at_impact": False})
+        reconstruct_crash([short], ENTRY)
+
+    @pytest.mark.parametrize(
+        ("make", "words"),
+        [
+            (lambda: Entry.from_speed("7.1", 0.1), "'7.1' is not possible"),
+            (lambda: Entry.from_speed(7.1, None), "None is not possible"),
+            (lambda: Entry.from_speed(7.1, 0.1, latitude=50.0), "no 'latitude'"),
+            (lambda: Entry(0.0, 7.1, 0.0), "not three finite numbers"),
+            (lambda: Entry(np.nan, (7.1, 0.0, 0.0), 0.0), "nan is no number"),
+            (
+                lambda: Entry.from_covariance(0.0, (7.1, 0.0), (0, 0, 0), np.eye(6)),
+                "not three finite numbers",
+            ),
+        ],
+    )
+    def test_bad_numbers(self, make, words):
+        with pytest.raises(ConfigError, match=words):
+            make()
+
+
+class TestArguments:
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            ({"units": None}, "units: there is none"),
+            ({"units": "IMU1"}, "kind str"),
+            ({"units": ["IMU1"]}, "kind str"),
+            ({"entry": 7.1}, "entry: this is of kind float"),
+            ({"point": (0.0, 0.0)}, "point: .* not three"),
+            ({"point": "cg"}, "point: 'cg'"),
+            ({"point": (1600.0, 0.0, 0.0)}, "1600 m from the vehicle's origin"),
+            ({"window": 0.75}, "0.75 is no window"),
+            ({"window": (0.75, -0.1)}, "is no window"),
+            ({"window": (-0.1, np.nan)}, "is no window"),
+            ({"rate": "200"}, "'200' Hz is no rate"),
+            ({"clock": "triger"}, "did you mean 'trigger'"),
+            ({"preparation": ["rest"]}, "kind list"),
+            ({"preparation": {"leveling": (0, 0, 1)}}, "did you mean 'levelling'"),
+            ({"preparation": {"levelling": 1.5}}, "levelling: 1.5 are not three"),
+            ({"preparation": {"levelling": (0, 0, -1)}}, "IMU1, levelling"),
+            ({"preparation": {"rest": 5}}, "5 is no stretch"),
+            ({"preparation": {"rest": (-3, -5)}}, "is no stretch"),
+            ({"preparation": {"margin": "x"}}, "IMU1, margin: 'x'"),
+            ({"preparation": {"impact": np.nan}}, "IMU1, impact: nan"),
+            ({"rule": None}, "rule: this is of kind NoneType"),
+            ({"gravity": "9.8"}, "gravity: this is of kind str"),
+            ({"gravity": 1.0}, "gravity nowhere on the ground"),
+            ({"mechanization": "ned"}, "mechanization: this is of kind str"),
+        ],
+    )
+    def test_are_named(self, unit, options, words):
+        given = {"units": [unit], "entry": ENTRY, **options}
+        with pytest.raises((ConfigError, DataError), match=words) as error:
+            reconstruct_crash(**given)
+        assert error.value.finding.remedy
+
+    def test_one_unit_is_no_list(self, unit):
+        with pytest.raises(ConfigError, match="give \\[unit\\]"):
+            reconstruct_crash(unit, ENTRY)
+
+    @pytest.mark.parametrize(
+        ("options", "words"),
+        [
+            ({"runs": "10"}, "'10' runs"),
+            ({"runs": 10.5}, "10.5 runs"),
+            ({"runs": 1}, "1 runs"),
+            ({"seed": -1}, "seed: -1"),
+            ({"seed": None}, "seed: None"),
+            ({"workers": 0}, "workers: 0"),
+        ],
+    )
+    def test_of_the_runs(self, crash, options, words):
+        with pytest.raises(ConfigError, match=words):
+            sample_paths(crash.main.path, **{"runs": 10, **options})
+
+    def test_runs_need_a_path(self, crash):
+        with pytest.raises(ConfigError, match=r"crash\.main\.path"):
+            sample_paths(crash, runs=10)
+
+    def test_a_sample_that_there_is_not(self, crash):
+        with pytest.raises(ConfigError, match="no sample 10000"):
+            crash.main.path.variances(10_000)
+
+
+class TestUnits:
+    @pytest.mark.parametrize(
+        ("make", "words"),
+        [
+            (lambda u: replace(u, accelerometers=u.gyro), "kind RecordedTriad"),
+            (lambda u: replace(u, gyro=u.gyro.table), "IMU1, gyro: .* DataFrame"),
+            (lambda u: replace(u, mounting=None), "IMU1, mounting"),
+            (lambda u: replace(u, trigger="10.7"), "IMU1, trigger: .* str"),
+            (lambda u: replace(u.gyro, table=None), "table: this is of kind NoneType"),
+            (lambda u: replace(u.gyro, uncertainty=0.1), "uncertainty: this is of kind float"),
+            (lambda u: Mounting(None), "position: None"),
+            (lambda u: Mounting(("a", 0, 0)), "position: \\('a', 0, 0\\)"),
+            (lambda u: Mounting((600.0, 0.0, 0.0)), "mm divided by 1000"),
+            (lambda u: Mounting(position_sd="1"), "position_sd: '1'"),
+            (lambda u: Mounting(angles_sd_deg=-1.0), "angles_sd_deg: -1.0"),
+            (lambda u: TriadUncertainty(bias="0.1"), "bias: '0.1' is no number"),
+            (lambda u: TriadUncertainty(bias=None), "bias: None is no number"),
+            (lambda u: TriadUncertainty(full_scale=0.0), "full_scale: 0.0 leaves nothing"),
+            (lambda u: TriadUncertainty(bandwidth=0.0), "bandwidth: 0.0 leaves nothing"),
+        ],
+    )
+    def test_parts_of_another_kind_are_named(self, unit, make, words):
+        with pytest.raises(ConfigError, match=words):
+            make(unit)
+
+    def test_a_list_of_triads_is_a_tuple(self, unit):
+        assert CrashUnit("X", list(unit.accelerometers)).accelerometers == unit.accelerometers
+
+    def test_numbers_of_numpy_are_numbers(self):
+        found = TriadUncertainty(bias=np.float32(0.5), scale=np.array([1, 2, 3]))
+        assert (found.bias, found.scale) == ((0.5, 0.5, 0.5), (1.0, 2.0, 3.0))
+
+
+class TestReference:
+    @pytest.mark.parametrize(
+        ("make", "words"),
+        [
+            (lambda t: None, "kind NoneType"),
+            (lambda t: t[["north", "east"]], "no column down"),
+            (lambda t: t.assign(north_sd=1.0), "no column east_sd, down_sd"),
+            (lambda t: t.iloc[:0], "no rows"),
+            (lambda t: t.iloc[::-1], "row 2, .* time does not advance"),
+            (lambda t: t.astype(object).replace(t.iloc[5, 0], "x"), "not all of it are numbers"),
+            (lambda t: t.mask(t.index.to_series() > 0.5), "row 122, .* not finite"),
+            (
+                lambda t: t.assign(north_sd=-1.0, east_sd=1.0, down_sd=1.0),
+                "standard deviation is negative",
+            ),
+        ],
+    )
+    def test_what_it_lacks_is_named(self, crash, make, words):
+        with pytest.raises(DataError, match=words):
+            compare_with_reference(crash.main.path, make(crash.main.path.table[NED]))
