@@ -52,7 +52,8 @@ def check_crash_options(
             remedy="give it in m (mm divided by 1000), from the origin that the positions of the "
             "units count from",
         )
-    _check_window(window)
+    if window is not None:
+        _check_window(window)
     if not (preparation is None or isinstance(preparation, Mapping)):
         raise _kind(
             preparation, "preparation", "give options of prepare_unit, as {'levelling': (0, 0, 1)}"
