@@ -11,7 +11,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.crash.acceleration import force_at_rest
-from strapdown.crash.sample_effects import SampleEffects, unit_effects
+from strapdown.crash.sample_effects import SampleEffects
+from strapdown.crash.unit_effects import unit_effects
 from strapdown.results import RestStretch
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.prepared_unit import Levelling, PreparedUnit

@@ -12,7 +12,7 @@ from strapdown.crash.combine_units import combine_units
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
-from strapdown.crash.sample_effects import unit_effects
+from strapdown.crash.unit_effects import unit_effects
 from strapdown.crash.unit_reconstruction import reconstruct_unit
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
@@ -132,6 +132,12 @@ def test_one_unknown_of_two_units_stands_once(four):
     # The laboratory units borrow the gyro of IMU1.
     assert sum("gyro bias" in n for n in names) == 6
     assert "LAB1 gyro bias x" not in names
+    # So that the clock of that gyro, too, is one unknown of three units.
+    lab = next(u for u in found.units if u.name == "LAB1").at_point.effects
+    assert {"LAB1 timing", "IMU1 timing"} <= set(lab.names)
+    k = lab.names.index("IMU1 timing")
+    assert lab.rate[k].any() and lab.force[k].any()
+    assert not lab.rate[lab.names.index("LAB1 timing")].any()
 
 
 def test_errors_of_combined_paths_are_what_they_state():

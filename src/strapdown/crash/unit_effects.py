@@ -1,0 +1,339 @@
+"""The unknowns of one unit, listed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.sample_effects import (
+    GYRO_BIAS,
+    LEVER_ARM,
+    MOUNTING,
+    SampleEffects,
+    level_turned_by,
+)
+from strapdown.crash.triad_curves import AXES, Curve, constant, triad_curves
+from strapdown.exceptions import DataError
+from strapdown.sensors.crash_unit import RecordedTriad
+from strapdown.sensors.lever_arm import MovedImu
+from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+# What is alike for all units of one vehicle.
+VEHICLE = "vehicle"
+ANGLES = ("roll", "pitch", "heading")
+# What is faster than this part of a record is vibration to it.
+VIBRATION = 0.025  # s
+
+
+def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.0) -> SampleEffects:
+    """List the unknowns of a unit and what each does at a point.
+
+    Parameters
+    ----------
+    prepared : PreparedUnit
+    moved : MovedImu
+        The same moved to the point: `move_unit`.
+    time_sd : float, s
+        How well the unit's clock is known against the common one.
+
+    Returns
+    -------
+    SampleEffects
+        Bias, scale factor, misalignment, nonlinearity and vibration rectification of every range
+        that speaks, with what its bias was taken from; the same of the gyro, with its sensitivity
+        to specific force and what it does through the lever arm; mounting; lever arm; timing.
+        An unknown without a standard deviation is left out. Those of a borrowed gyro have the
+        name of its unit, and are along its axes; those of the levelling are of the vehicle.
+
+    Notes
+    -----
+    A higher range whose bias was taken from a lower one at rest has the lower one's error there,
+    and its own only as far as the input has changed since: with ``e_l`` and ``e_h`` the errors of
+    the two curves, ``e_l(f_rest) + e_h(f) - e_h(f_rest)``. A gyro's bias was taken at rest, so
+    that its sensitivity to specific force acts on ``f - f_rest``. Vibration is the variance about
+    a moving mean of 25 ms.
+    """
+    return _UnitEffects(prepared, moved, time_sd).collect()
+
+
+class _UnitEffects:
+    def __init__(self, prepared: PreparedUnit, moved: MovedImu, time_sd: float) -> None:
+        unit = prepared.unit
+        if unit.gyro is None:
+            raise DataError(
+                "there is no gyro, nor one that is borrowed",
+                file=unit.name,
+                quantity="gyro",
+                remedy="name the unit whose gyro this one borrows (gyro_from)",
+            )
+        self.prepared, self.time_sd = prepared, time_sd
+        lender = unit.lender or unit
+        assert lender.gyro is not None
+        self.lender, self.gyro = lender, lender.gyro
+        self.turn, self.gyro_turn = unit.mounting.C_vs, lender.mounting.C_vs
+        self.time = prepared.imu.index.to_numpy(dtype=np.float64)
+        self.force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
+        self.rate = prepared.imu[GYRO].to_numpy(dtype=np.float64)
+        # As the sensors have them.
+        self.felt, self.turned = self.force @ self.turn, self.rate @ self.gyro_turn
+        rest = prepared.rest
+        has_rest = rest is not None and rest.accel_mean is not None
+        self.rest_felt = (
+            np.asarray(rest.accel_mean) @ self.turn if has_rest and rest else np.zeros(3)
+        )
+        self.has_rest = has_rest
+        self.moved = moved
+        self.names: list[str] = []
+        self.contributors: list[str] = []
+        self.forces: list[Array] = []
+        self.rates: list[Array] = []
+        self.rests: list[Array] = []
+        self.tilts: list[Array] = []
+        level = prepared.levelling
+        self.level = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0])
+
+    def collect(self) -> SampleEffects:
+        for number in range(len(self.prepared.unit.accelerometers)):
+            self._range(number)
+        self._gyro()
+        self._mounting()
+        self._timing()
+        self._levelling()
+        count, n = len(self.names), len(self.time)
+        return SampleEffects(
+            tuple(self.names),
+            tuple(self.contributors),
+            np.array(self.forces).reshape(count, n, 3),
+            np.array(self.rates).reshape(count, n, 3),
+            np.array(self.rests).reshape(count, 3),
+            np.array(self.tilts).reshape(count, 3),
+            # What the gyro's noise adds through the arm is told as if each sample had its own:
+            # more than there is, since a slope's noise comes back with the other sign.
+            _sd(self.prepared.noise_covariance + self.moved.added),
+            _sd(self.prepared.gyro_noise_covariance),
+        )
+
+    def _add(
+        self,
+        name: str,
+        contributor: str,
+        force: Array | None,
+        rate: Array | None,
+        rest: Array,
+        owner: str = "",
+        tilt: Array | None = None,
+        through_arm: bool = True,
+    ) -> None:
+        n = len(self.time)
+        added = np.zeros((n, 3)) if force is None else force
+        if rate is not None and through_arm and self.moved.lever_arm.any():
+            added = added + self.moved.of_rate(rate)
+        # The correction that makes the force at rest as long as gravity takes back what an
+        # unknown adds along it.
+        if self.prepared.gravity_matched and self.has_rest and rest.any():
+            along = self.turn @ self.rest_felt
+            along = along / np.sqrt(along @ along)
+            taken = (rest @ along) * along
+            added, rest = added - taken, rest - taken
+        name = f"{owner or self.prepared.unit.name} {name}"
+        # Two parts of one name have unknowns of their own.
+        again = sum(known.split("#")[0] == name for known in self.names)
+        self.names.append(f"{name}#{again + 1}" if again else name)
+        self.contributors.append(contributor)
+        self.forces.append(added)
+        self.rates.append(np.zeros((n, 3)) if rate is None else rate)
+        self.rests.append(rest)
+        self.tilts.append(self._tilted(rest) if tilt is None else tilt)
+
+    def _tilted(self, rest: Array) -> Array:
+        if not self.prepared.levelling.from_rest:
+            return np.zeros(3)
+        return level_turned_by(rest, self.level)
+
+    def _range(self, number: int) -> None:
+        triad = self.prepared.unit.accelerometers[number]
+        spoke = self.prepared.range_spoken == number
+        source = self.prepared.bias_from[number]
+        # Ranges whose bias was taken from this one carry its error at rest.
+        heirs = np.isin(self.prepared.range_spoken, self._heirs(number))
+        if not (spoke.any() or heirs.any()):
+            return
+        sd = triad.uncertainty
+        bias = sd.axis("bias") if source is None else self.prepared.bias_sd[number]
+        for axis in range(3):
+            if bias[axis] > 0.0:
+                what = "bias" if source is None else "bias against the lower range"
+                what, one = f"{what} {AXES[axis]}", constant(bias[axis])
+                self._axis_effect(number, axis, spoke, heirs, one, what, "accelerometer bias", True)
+        for name, contributor, effects in triad_curves(triad):
+            for axis, label, effect in effects:
+                self._axis_effect(
+                    number, axis, spoke, heirs, effect, f"{name}{label}", contributor, False
+                )
+        self._vibration(triad, spoke)
+
+    def _heirs(self, number: int) -> list[int]:
+        found: list[int] = []
+        for other, source in enumerate(self.prepared.bias_from):
+            if source is not None and (source == number or source in found):
+                found.append(other)
+        return found
+
+    def _axis_effect(
+        self,
+        number: int,
+        axis: int,
+        spoke: NDArray[np.bool_],
+        heirs: NDArray[np.bool_],
+        effect: Curve,
+        name: str,
+        contributor: str,
+        constant: bool,
+    ) -> None:
+        at_rest = float(effect(self.rest_felt[None, :])[0]) if self.has_rest or constant else 0.0
+        source = self.prepared.bias_from[number]
+        calibrated = source is not None and source != FROM_GRAVITY
+        one = np.zeros(len(self.time))
+        here = spoke[:, axis]
+        one[here] = effect(self.felt)[here]
+        if calibrated and not constant:
+            one[here] -= at_rest
+        one[heirs[:, axis]] = 0.0 if calibrated and not constant else at_rest
+        direction = self.turn[:, axis]
+        rest = at_rest * direction if not calibrated and self.has_rest else np.zeros(3)
+        triad = self.prepared.unit.accelerometers[number]
+        self._add(f"{triad.name} {name}", contributor, np.outer(one, direction), None, rest)
+
+    def _vibration(self, triad: RecordedTriad, spoke: NDArray[np.bool_]) -> None:
+        sd = triad.uncertainty.axis("vibration_rectification")
+        if not any(sd):
+            return
+        variance = self._vibrating()
+        for axis in range(3):
+            if sd[axis] > 0.0:
+                one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
+                force = np.outer(one, self.turn[:, axis])
+                self._add(
+                    f"{triad.name} rectification {AXES[axis]}",
+                    "vibration rectification",
+                    force,
+                    None,
+                    np.zeros(3),
+                )
+
+    def _vibrating(self) -> Array:
+        from scipy.ndimage import uniform_filter1d
+
+        step = float(np.median(np.diff(self.time)))
+        width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
+        smooth = uniform_filter1d(self.felt, width, axis=0, mode="nearest")
+        return np.asarray(
+            uniform_filter1d((self.felt - smooth) ** 2, width, axis=0, mode="nearest")
+        )
+
+    def _gyro(self) -> None:
+        sd, owner, none = self.gyro.uncertainty, self.lender.name, np.zeros(3)
+        # Prepared in the axes of this unit; a bias at rest is one of the part's axes.
+        square = (self.gyro_turn.T @ self.turn) ** 2
+        biases = np.sqrt(square @ np.square(self.prepared.gyro_bias_sd))
+        felt = (self.force - self.turn @ self.rest_felt) @ self.gyro_turn
+        for axis in range(3):
+            direction = self.gyro_turn[:, axis]
+            bias = biases[axis]
+            if bias > 0.0:
+                rate = np.tile(bias * direction, (len(self.time), 1))
+                self._add(f"gyro bias {AXES[axis]}", GYRO_BIAS, None, rate, none, owner)
+            for name, contributor, one in self._gyro_curves(axis):
+                self._add(name, contributor, None, np.outer(one, direction), none, owner)
+            slope = sd.axis("g_sensitivity")[axis]
+            if slope > 0.0:
+                for j in range(3):
+                    one = slope * felt[:, j]
+                    self._add(
+                        f"g-sensitivity {AXES[axis]} of {AXES[j]}",
+                        "gyro g-sensitivity",
+                        None,
+                        np.outer(one, direction),
+                        none,
+                        owner,
+                    )
+
+    def _gyro_curves(self, axis: int) -> Iterator[tuple[str, str, Array]]:
+        for name, contributor, effects in triad_curves(self.gyro):
+            for a, label, effect in effects:
+                if a == axis:
+                    yield f"gyro {name}{label}", f"gyro {contributor}", effect(self.turned)
+
+    def _mounting(self) -> None:
+        mounting = self.prepared.unit.mounting
+        angle = np.radians(mounting.angles_sd_deg)
+        rest = self.turn @ self.rest_felt if self.has_rest else np.zeros(3)
+        lent = self.lender is not self.prepared.unit
+        for axis in range(3):
+            unit, name = np.eye(3)[axis], f"mounting {ANGLES[axis]}"
+            if angle > 0.0:
+                felt, left = self.force, rest
+                if self.prepared.bias_from[0] == FROM_GRAVITY:
+                    felt, left = self.force - rest, np.zeros(3)
+                self._add(
+                    name,
+                    MOUNTING,
+                    angle * np.cross(unit, felt),
+                    None if lent else angle * np.cross(unit, self.rate),
+                    angle * np.cross(unit, left),
+                )
+            turned = np.radians(self.lender.mounting.angles_sd_deg)
+            if lent and turned > 0.0:
+                rate = turned * np.cross(unit, self.rate)
+                self._add(name, MOUNTING, None, rate, np.zeros(3), self.lender.name)
+            if mounting.position_sd > 0.0:
+                # The sensor sits further along the axis, so that the arm is shorter there.
+                force = self.moved.lever @ (-mounting.position_sd * unit)
+                self._add(f"lever arm {AXES[axis]}", LEVER_ARM, force, None, np.zeros(3))
+
+    def _levelling(self) -> None:
+        sd = np.radians(self.prepared.levelling.sd_deg)
+        n = len(self.time)
+        for axis, name in enumerate(("north", "east")):
+            tilt = sd * np.eye(3)[axis]
+            # Where a bias was taken from gravity in a stated attitude, it is wrong with it.
+            shift = np.zeros(3)
+            if self.prepared.bias_from[0] == FROM_GRAVITY:
+                shift = -self.level.T @ np.cross(tilt, [0.0, 0.0, -GRAVITY])
+            if sd > 0.0:
+                force = np.tile(shift, (n, 1))
+                self._add(f"levelling {name}", "levelling", force, None, shift, VEHICLE, tilt)
+        steady = self.prepared.rest_accel_sd
+        if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
+            for axis in range(3):
+                force = np.tile(steady * np.eye(3)[axis], (n, 1))
+                name = f"steady acceleration {AXES[axis]}"
+                self._add(name, "accelerometer bias", force, None, np.zeros(3), VEHICLE)
+
+    def _timing(self) -> None:
+        none = np.zeros(3)
+        slope = np.gradient(self.rate, self.time, axis=0)
+        if self.lender is not self.prepared.unit:
+            # The clock of a borrowed gyro is its owner's.
+            if self.time_sd > 0.0:
+                force = self.time_sd * np.gradient(self.force, self.time, axis=0)
+                self._add("timing", "timing", force, None, none)
+            late = self.lender.trigger_sd
+            if late > 0.0:
+                self._add("timing", "timing", None, late * slope, none, self.lender.name)
+        elif self.time_sd > 0.0:
+            # Force and rate are late together, and with them what the arm makes of the rate.
+            at_point = self.moved.imu[ACCEL].to_numpy(dtype=np.float64)
+            force = self.time_sd * np.gradient(at_point, self.time, axis=0)
+            self._add("timing", "timing", force, self.time_sd * slope, none, through_arm=False)
+
+
+def _sd(covariances: Array) -> Array:
+    return np.asarray(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)))
