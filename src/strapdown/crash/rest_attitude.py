@@ -51,8 +51,8 @@ def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str
             f"{error.finding.what} ({rest.start:.6g} to {rest.end:.6g} s)",
             file=source,
             quantity="levelling",
-            remedy="name another stretch with rest=(start, end), check that the accelerometer is in "
-            "m/s², or give levelling=(roll, pitch, sd): then the bias of the lowest range is "
+            remedy="name another stretch with rest=(start, end), check that the accelerometer is "
+            "in m/s², or give levelling=(roll, pitch, sd): then the bias of the lowest range is "
             "taken from gravity in that attitude",
         ) from None
     across = math.hypot(max(rest.accel_mean_sd), unknown) / gravity
