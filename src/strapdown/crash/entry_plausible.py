@@ -73,6 +73,8 @@ def entry_findings(
                 "the trigger is late, correct it",
             )
         )
+        # Its speed need not be that at the beginning.
+        return found
     rest = at_point.rest
     if rest is None or rest.grade != "still" or at_point.prepared is None:
         return found

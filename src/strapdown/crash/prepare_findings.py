@@ -57,7 +57,7 @@ def rest_findings(
                 quantity="rest",
                 remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road, "
                 "and the biases stay at their stated standard deviations; or name the stretch, "
-                "rest=(start, end) in s. Of reconstruct_crash both belong into preparation={...}",
+                "rest=(start, end) in s (of reconstruct_crash: in preparation={...})",
             )
         return [
             Finding(
@@ -77,7 +77,8 @@ def rest_findings(
                 file=unit.name,
                 quantity="rest",
                 remedy="if the vehicle stood still until it was struck, say "
-                "moving_at_impact=False; if its velocity was constant, say steady_acceleration=0",
+                "moving_at_impact=False; if its velocity was constant, steady_acceleration=0 (of "
+                "reconstruct_crash: in preparation={...})",
             )
         ]
     return []
@@ -205,10 +206,9 @@ def _clipped(
         if rows.size:
             found.append(
                 Finding(
-                    f"{rows.size} samples are at the end of the range, the first at "
-                    f"{time[rows[0]]:.5g} s, the last at {time[rows[-1]]:.5g} s",
+                    f"{rows.size} samples are at the end of the range, the first "
+                    f"{time[rows[0]]:.5g} s from the trigger, the last {time[rows[-1]]:.5g} s",
                     file=f"{unit.name}, {triad.name}",
-                    row=int(rows[0]) + 1,
                     quantity=f"{quantity}_{axis}",
                     remedy=remedy,
                 )

@@ -51,8 +51,9 @@ def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str
             f"{error.finding.what} ({rest.start:.6g} to {rest.end:.6g} s)",
             file=source,
             quantity="levelling",
-            remedy="state the unit of the accelerometer, or give levelling=(roll, pitch, sd): then "
-            "the bias of the lowest range is taken from gravity in that attitude",
+            remedy="name another stretch with rest=(start, end), check that the accelerometer is "
+            "in m/s², or give levelling=(roll, pitch, sd): then the bias of the lowest range is "
+            "taken from gravity in that attitude",
         ) from None
     across = math.hypot(max(rest.accel_mean_sd), unknown) / gravity
     sd = math.degrees(across / max(math.cos(math.radians(pitch)), 1e-3))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.saturation import RangeLimits
@@ -21,6 +22,8 @@ MOST_SD = 0.1
 # An element this far from the unit matrix is another axis or another sign, no scale factor.
 OTHER_AXIS = 0.5
 LEAST_SAMPLES = 20
+# Scale factors make less of a difference than this.
+NEAR_G = 0.15
 
 
 def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:
@@ -121,12 +124,22 @@ def agreement_findings(
                 else f"it does not follow {axis} of {low.name} ({matrix[row, row]:+.2f} ± "
                 f"{sd[row, row]:.2f})"
             )
+            remedy = "swap or invert the axes of the one that was wired or named otherwise"
+            if _in_g(abs(float(matrix[row, row]))):
+                what = f"it reads {matrix[row, row]:+.3f} times {axis} of {low.name}"
+                remedy = "one of the two is in g: multiply it by 9.80665"
             found.append(
                 Finding(
                     what + ", where both are within their range",
                     file=source,
                     quantity=f"accel_{axis}",
-                    remedy="swap or invert the axes of the one that was wired or named otherwise",
+                    remedy=remedy,
                 )
             )
     return found
+
+
+def _in_g(ratio: float) -> bool:
+    """Whether a ratio of two accelerations is that of their units."""
+    size = max(ratio, 1.0 / ratio) if ratio > 0.0 else 1.0
+    return abs(size / STANDARD_GRAVITY - 1.0) < NEAR_G

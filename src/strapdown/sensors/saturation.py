@@ -19,7 +19,7 @@ LEAST_FLAT = 3  # samples
 LEAST_JUMP = 3.0  # steps
 # So many cannot be where a fast rise meets a slow fall, unless there is no noise at all.
 SURE_FLAT = 10
-# A flat extreme below this part of the stated range is no end of anything.
+# A flat extreme below this part of the stated range, or of the largest reading, is no end.
 LEAST_PART = 0.1
 # Of a full scale: what is nearer to it than this, or than a step, is at it.
 ROUNDING = 1e-9
@@ -101,7 +101,7 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
     if y.size < LEAST_FLAT:
         return None
     top = float(y.max())
-    floor = LEAST_PART * full if np.isfinite(full) else 0.0
+    floor = LEAST_PART * max(full if np.isfinite(full) else 0.0, float(np.abs(y).max()))
     if top <= max(floor, 0.0) or top == float(np.median(y)):
         return None
     at = y == top

@@ -182,7 +182,7 @@ def _group(
                 file=source,
                 row=row + 1,
                 quantity=names[0],
-                remedy="fill it with what is known, or cut the record before it",
+                remedy="fill it with what is known, or use the record before it or after it alone",
             )
     if len(time) < LEAST_SAMPLES:
         raise DataError(
@@ -210,7 +210,7 @@ def _group(
             file=source,
             row=worst.sample + 1,
             quantity="time",
-            remedy="cut the record before or after it, or fill it with what is known",
+            remedy="use the record before it or after it alone, or fill it with what is known",
         )
     return AxisGroup(axes, time, block, step)
 

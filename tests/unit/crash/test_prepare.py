@@ -174,9 +174,9 @@ def test_the_last_range_and_the_gyro_at_their_ends():
     assert out.clipped[:, 0].any()
     assert out.gyro_clipped[:, 2].any()
     text = words(out)
-    assert "IMU1, high-G, row" in text
+    assert "IMU1, high-G, accel_x" in text
     assert "lower bound" in text
-    assert "IMU1, gyro, row" in text
+    assert "IMU1, gyro, gyro_z: " in text
 
 
 def test_an_end_that_is_not_where_it_is_stated():

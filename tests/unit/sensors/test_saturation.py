@@ -55,3 +55,31 @@ def test_the_top_of_a_pulse_and_a_rest_are_no_ends(q, sd, seed):
 def test_more_than_the_stated_full_scale_is_seen():
     out = limits(crash(600.0), 500.0)
     assert out.beyond.tolist() == [True, False, False]
+
+
+def test_a_fast_rise_that_meets_a_slow_fall_is_no_end():
+    # A car that is turned by a blow and slowed by its tyres: coarse steps hold the top for a few
+    # samples, of which one side is far below.
+    rate = np.where(TIME < 0.5, 0.0, np.maximum(1.695 - 0.3 * (TIME - 0.5), 0.0))
+    y = np.zeros((TIME.size, 3))
+    y[:, 2] = np.round(rate / 0.0085) * 0.0085
+    assert (y[:, 2] == y[:, 2].max()).sum() >= 3
+    assert not limits(y, full=8.7, q=0.0085).found.any()
+    # Held from above for as long as a clipped pulse is, it is one, whatever the other side does.
+    y[:, 2] = np.minimum(y[:, 2], 1.615)
+    assert limits(y, full=8.7, q=0.0085).found[2]
+
+
+def test_a_small_extreme_beside_a_large_one_is_no_end():
+    # A perfect sensor that rests at a value below zero after a blow above it.
+    y = np.zeros((TIME.size, 3))
+    y[:, 0] = np.where(TIME < 0.6, 2.0 * np.sin(10.0 * TIME) ** 2, 0.0)
+    y[-60:, 0] = -1e-5
+    assert not limits(y, full=np.inf, q=0.0).found.any()
+
+
+def test_any_number_of_axes():
+    y = np.zeros((TIME.size, 1))
+    y[300:320] = 5.0
+    found = find_limits(TIME, y, np.array([50.0]), np.array([0.1]))
+    assert found.found.shape == found.upper.shape == (1,)
