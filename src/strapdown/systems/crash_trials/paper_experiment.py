@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.entry import Entry
+from strapdown.exceptions import StrapdownError
 from strapdown.sensors.error_draws import child
 from strapdown.simulation import CRASHES, CrashScenario, Ringing
 from strapdown.simulation.recorder_design import RecorderDesign
@@ -44,6 +45,9 @@ INTERVAL = 0.005  # s
 @dataclass(frozen=True, eq=False)
 class PaperExperiment:
     """Errors of the path of the paper's crash, over many recorders.
+
+    A recorder that the chain refuses has no path: `answers` says which and why. A gyro drawn with
+    a bias above 20 deg/s, that no data sheet allows, is not found at rest.
 
     Attributes
     ----------
@@ -142,14 +146,15 @@ def paper_experiment(
         ringing=tuple(ringing),
         scenario=scenario or CRASHES["pole"],
     )
-    runs = each_case(one, seeds, workers)
+    all_runs = each_case(one, seeds, workers)
+    runs = [r for r in all_runs if isinstance(r, _Run)]
     parts = pd.concat([r.variances for r in runs])
     return PaperExperiment(
         runs[0].time,
         np.array([r.error for r in runs]),
         np.array([r.sd for r in runs]),
         parts.groupby(level=0, sort=False).sum() / len(runs),
-        gather(r.outcome for r in runs),
+        gather(r.outcome if isinstance(r, _Run) else r for r in all_runs),
     )
 
 
@@ -161,7 +166,7 @@ def _run(
     design: RecorderDesign,
     ringing: tuple[tuple[float, float, float], ...],
     scenario: CrashScenario,
-) -> _Run:
+) -> _Run | TrialOutcome:
     motion = scenario.motion
     truth = ExactAnswers(motion, scenario.start)
     draw = np.random.Generator(np.random.PCG64(child(seed, number, SPEED))).standard_normal()
@@ -169,10 +174,12 @@ def _run(
     entry = pole_entry(scenario, speed_sd, float(draw))
     rings = tuple(Ringing(scenario.start + phase * INTERVAL, *r) for r in ringing)
     root = int(child(seed, number, RECORDER).generate_state(1, np.uint64)[0])
-    case = TrialCase(
-        number, scenario, record_untold(scenario, design, Untold(), root, rings), entry
-    )
-    found = reconstruct_case(case)
+    unit, recorder = record_untold(scenario, design, Untold(), root, rings)
+    case = TrialCase(number, scenario, unit, entry, recorder)
+    try:
+        found = reconstruct_case(case)
+    except StrapdownError as error:
+        return TrialOutcome(number, scenario.name, str(error).splitlines()[0], {})
     path = found.path
     place, _ = truth.course(path.time)
     variances = path.variances()[NED]

@@ -96,7 +96,7 @@ def _away(
 def _error(
     crash: CrashScenario, sampling: str, bandwidth: float, rings: tuple[Ringing, ...]
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    unit, _ = record_crash(
+    unit, recorder = record_crash(
         crash.motion,
         ideal_design(bandwidth=bandwidth),
         impact=crash.start,
@@ -104,7 +104,7 @@ def _error(
         ringing=rings,
         sampling=sampling,
     )
-    case = TrialCase(0, crash, unit, pole_entry(crash, 0.0))
+    case = TrialCase(0, crash, unit, pole_entry(crash, 0.0), recorder)
     path = reconstruct_case(case, sampling=sampling).path
     row = int(np.argmin(np.abs(path.time - END)))
     true, _ = ExactAnswers(crash.motion, crash.start).course([path.time[row]])

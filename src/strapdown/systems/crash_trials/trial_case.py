@@ -14,7 +14,7 @@ from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation import CrashScenario, Ringing
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.paper_recorders import paper_units
-from strapdown.simulation.recorder_design import RecorderDesign
+from strapdown.simulation.recorder_design import RecorderDesign, RecorderTruth
 from strapdown.systems.crash_trials.drawn_scenarios import DRAWN
 
 # Places below the seed of a case.
@@ -110,12 +110,15 @@ class TrialCase:
     unit : CrashUnit
     entry : Entry
         In north-east-down, at the impact.
+    recorder : RecorderTruth
+        What the unit really did.
     """
 
     number: int
     scenario: CrashScenario
     unit: CrashUnit
     entry: Entry
+    recorder: RecorderTruth
 
 
 def draw_case(
@@ -156,10 +159,10 @@ def draw_case(
         x, y, z = (float(v) for v in rng.standard_normal(3))
         ringing.append(Ringing(start, amplitude, frequency, decay, (x, y, z)))
     root = int(child(seed, number, RECORDER).generate_state(1, np.uint64)[0])
-    unit = record_untold(
+    unit, recorder = record_untold(
         scenario, replace(priors.design, mounting=mounting), untold, root, tuple(ringing)
     )
-    return TrialCase(number, scenario, unit, entry)
+    return TrialCase(number, scenario, unit, entry, recorder)
 
 
 def record_untold(
@@ -168,7 +171,7 @@ def record_untold(
     untold: Untold,
     seed: int,
     ringing: tuple[Ringing, ...] = (),
-) -> CrashUnit:
+) -> tuple[CrashUnit, RecorderTruth]:
     """Record a crash by a recorder that is worse than it says.
 
     Parameters
@@ -190,7 +193,7 @@ def record_untold(
             for t in design.accelerometers
         ),
     )
-    unit, _ = record_crash(
+    unit, truth = record_crash(
         scenario.motion,
         really,
         impact=scenario.start,
@@ -201,7 +204,8 @@ def record_untold(
     accelerometers = tuple(
         replace(t, uncertainty=design.told(k)) for k, t in enumerate(unit.accelerometers)
     )
-    return replace(unit, accelerometers=accelerometers, trigger_sd=design.trigger_sd)
+    told = replace(unit, accelerometers=accelerometers, trigger_sd=design.trigger_sd)
+    return told, truth
 
 
 def _bent(uncertainty: TriadUncertainty, more: float) -> TriadUncertainty:
