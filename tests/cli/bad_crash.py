@@ -44,7 +44,7 @@ def record(name, recorder="IMU1", **options):
     return record_crash(crash.motion, DESIGNS[recorder], impact=crash.start, seed=1, **options)[0]
 
 
-UNIT = record("pole")
+UNIT, SECOND = record("pole"), record("pole", "IMU2")
 
 
 def changed(unit, which, change):
@@ -160,6 +160,19 @@ def pothole():
     return reconstruct_crash([record("pothole")], Entry.from_speed(13.9, 0.3))
 
 
+def swapped_axes():
+    def swap(table):
+        return table.rename(columns={"accel_x": "accel_y", "accel_y": "accel_x"})
+
+    second = changed(changed(SECOND, LOW, swap), HIGH, swap)
+    return reconstruct_crash([UNIT, second], ENTRY)
+
+
+def wrong_lever_arm():
+    wrong = replace(SECOND.mounting, position=(0.6, 1.5, 0.2))
+    return reconstruct_crash([UNIT, replace(SECOND, mounting=wrong)], ENTRY)
+
+
 def no_trigger():
     return reconstruct_crash([replace(UNIT, trigger=None)], ENTRY)
 
@@ -250,9 +263,8 @@ def runs_of_the_whole():
 
 
 def beyond_a_model():
-    injury_risk(
-        find_severity_model("wang_2022_front_mais3"), {"delta_v": 30.0, "crash_type": "front"}
-    )
+    model = find_severity_model("wang_2022_front_mais3")
+    injury_risk(model, {"delta_v": 30.0, "crash_type": "front"})
 
 
 def nhtsa(header=HEADER, channel=CHANNEL):
@@ -283,7 +295,8 @@ class CrashCall:
     @property
     def source(self) -> str:
         text = textwrap.dedent(inspect.getsource(self.call).split("\n", 1)[1]).rstrip()
-        return "\n".join(line.removeprefix("return ") for line in text.splitlines())
+        text = "\n".join(line.removeprefix("return ") for line in text.splitlines())
+        return text.replace("\n\n", "\n\n\n") if text.startswith("def ") else text
 
     @property
     def said(self) -> str:
@@ -316,6 +329,8 @@ CRASH_CALLS = (
     CrashCall("A unit with the other signs", upside_down),
     CrashCall("Hard braking", hard_braking),
     CrashCall("A pothole", pothole),
+    CrashCall("Swapped axes of a second unit", swapped_axes),
+    CrashCall("A wrong position of a second unit", wrong_lever_arm),
     CrashCall("No trigger", no_trigger),
     CrashCall("A trigger of another clock", trigger_of_another_clock),
     CrashCall("A late trigger", late_trigger),

@@ -39,10 +39,11 @@ a state at 55° north, 37° east.
 CRASH = """## From Python: a crash
 
 Here `UNIT` is what the recorder IMU1 of Tadic and Vukajlovic (2016) writes of a simulated impact
-on a pole (`record_crash`, `paper_units`), 7 s before it and 1 s after it; LOW, HIGH and GYRO are
-its parts. `record` gives the same of another crash, `changed` applies a function to the table of a
-part or of all, `after` cuts what is before an instant from the trigger, and `ENTRY` is 7.1 ± 0.2
-m/s. Where a record can be used, the notes stand in `findings`.
+on a pole (`record_crash`, `paper_units`), 7 s before it and 1 s after it, `SECOND` what IMU2
+writes; LOW, HIGH and GYRO are the parts. `record` gives the same of another crash, `changed`
+applies a function to the table of a part or of all, `after` cuts what is before an instant from
+the trigger, and `ENTRY` is 7.1 ± 0.2 m/s. Where a record can be used, the notes stand in
+`findings`.
 
 """
 

@@ -166,9 +166,10 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
             if match.ambiguous and who != "its gyro"
             else ""
         )
+        have = "have" if who.endswith("s") else "has"
         found.append(
             Finding(
-                f"{who} has other axes than stated: {', '.join(moved)} "
+                f"{who} {have} other axes than stated: {', '.join(moved)} "
                 f"({math.sqrt(lead):.0f} standard deviations better){doubt}",
                 file=second,
                 quantity="axes",

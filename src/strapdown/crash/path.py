@@ -395,4 +395,3 @@ def _states(leg: Leg) -> Array:
     if leg.backward:
         states[:, V : V + 3] *= -1.0
     return states
-

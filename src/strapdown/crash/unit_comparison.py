@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,18 +45,18 @@ class UnitPair:
 
     first: str
     second: str
-    edges: Array
-    difference: Array
-    sd: Array
-    force_difference: Array
-    force_sd: Array
+    edges: Array = field(repr=False)
+    difference: Array = field(repr=False)
+    sd: Array = field(repr=False)
+    force_difference: Array = field(repr=False)
+    force_sd: Array = field(repr=False)
     chi_square: float
     freedom: int
     probability: float
     agree: bool
-    axes: AxisMatch
-    turned: MountingRotation
-    lever_arm: LeverArmCheck
+    axes: AxisMatch = field(repr=False)
+    turned: MountingRotation = field(repr=False)
+    lever_arm: LeverArmCheck = field(repr=False)
     findings: tuple[Finding, ...]
 
 
@@ -75,8 +75,8 @@ class UnitAgainstAll:
     """
 
     name: str
-    difference: Array
-    sd: Array
+    difference: Array = field(repr=False)
+    sd: Array = field(repr=False)
     chi_square: float
     freedom: int
     probability: float
@@ -100,10 +100,10 @@ class UnitComparison:
     findings : tuple of Finding
     """
 
-    edges: Array
+    edges: Array = field(repr=False)
     pairs: tuple[UnitPair, ...]
-    combined: Array
-    combined_sd: Array
+    combined: Array = field(repr=False)
+    combined_sd: Array = field(repr=False)
     against: tuple[UnitAgainstAll, ...]
     chi_square: float
     freedom: int

@@ -58,6 +58,12 @@ def check_crash_options(
         raise _kind(
             preparation, "preparation", "give options of prepare_unit, as {'levelling': (0, 0, 1)}"
         )
+    for unit in units if isinstance(units, Sequence) else ():
+        own = None if preparation is None else preparation.get(unit.name, {})
+        if not (own is None or isinstance(own, Mapping)):
+            raise _kind(
+                own, f"preparation, {unit.name}", "give options, as {'levelling': (0, 0, 1)}"
+            )
     if not isinstance(rule, EventRule):
         raise _kind(rule, "rule", "give an EventRule, or leave it out for 49 CFR 563")
     if not isinstance(gravity, int | float):

@@ -187,7 +187,7 @@ def test_every_signed_permutation_of_the_accelerometers_is_recognised(index):
         assert match.kind == "accelerometers"
         assert match.accelerometers_sure > 0.99
         assert any(
-            "its accelerometers has other axes" in str(f) or "its accelerometers" in str(f)
+            "its accelerometers have other axes" in str(f) or "its accelerometers" in str(f)
             for f in out.findings
         )
 

@@ -140,6 +140,7 @@ class TestArguments:
             ({"rate": "200"}, "'200' Hz is no rate"),
             ({"clock": "triger"}, "did you mean 'trigger'"),
             ({"preparation": ["rest"]}, "kind list"),
+            ({"preparation": {"IMU1": 5}}, "preparation, IMU1: this is of kind int"),
             ({"preparation": {"leveling": (0, 0, 1)}}, "did you mean 'levelling'"),
             ({"preparation": {"levelling": 1.5}}, "levelling: 1.5 are not three"),
             ({"preparation": {"levelling": (0, 0, -1)}}, "IMU1, levelling"),
