@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 from strapdown.crash.monte_carlo import sample_paths
+from strapdown.exceptions import ConfigError
 from strapdown.simulation import CRASHES, Ringing
 from strapdown.systems.crash_trials.coverage import coverage
 from strapdown.systems.crash_trials.degradation import degradation, degradation_table
@@ -22,6 +23,7 @@ from strapdown.systems.crash_trials.trial_case import TrialPriors, Untold, draw_
 from strapdown.systems.crash_trials.trial_outcome import judge_case, reconstruct_case
 
 POLE = CRASHES["pole"]
+FEW = 40
 
 
 def test_exact_answers_are_those_of_the_pulse():
@@ -54,18 +56,19 @@ def test_a_point_beside_the_origin_feels_the_turning():
 
 @pytest.fixture(scope="module")
 def few():
-    return coverage(60, seed=2, workers=1)
+    return coverage(FEW, seed=2, workers=1)
 
 
 def test_bounds_hold_the_truth_in_few_cases(few):
     assert (few.excluded == "").all()
     table = few.table()
-    # 60 cases: 0.95 +- 3 sqrt(0.95 0.05/60), which leaves 0.866 at the least.
+    # 40 cases: 0.95 +- 3 sqrt(0.95 0.05/40), which leaves 0.847 at the least.
     assert (table["inside"] >= table["low"]).all(), table["inside"]
     # And bounds that are far too wide would hold all: the quadratic mean of error over sd has the
-    # standard error 1/sqrt(2 n), 0.09. Three of them, to the side where a bound is told too wide.
-    assert (table["ratio"] > 1.0 - 3.0 / np.sqrt(2.0 * 60)).all(), table["ratio"]
-    assert (table["ratio"] < 1.0 + 3.5 / np.sqrt(2.0 * 60)).all(), table["ratio"]
+    # standard error 1/sqrt(2 n), 0.11. Three of them; and half a one more upwards, since its
+    # distribution is that of a chi, and there are 26 answers.
+    slack = 1.0 / np.sqrt(2.0 * FEW)
+    assert table["ratio"].between(1.0 - 3.0 * slack, 1.0 + 3.5 * slack).all(), table["ratio"]
 
 
 def test_a_case_hangs_on_its_number_alone(few):
@@ -103,6 +106,21 @@ def test_bounds_are_not_blind():
     assert sum(inside) < 15
 
 
+def test_a_sensor_at_its_end_is_counted_apart():
+    design = TrialPriors().design
+    low, high = design.accelerometers
+    short = replace(high, uncertainty=replace(high.uncertainty, full_scale=60.0))
+    priors = TrialPriors(kinds=("frontal",), design=replace(design, accelerometers=(low, short)))
+    # Frontal crashes here have peaks of 130 m/s² at the least.
+    outcome = judge_case(draw_case(1, 2, priors))
+    assert outcome.excluded == "accelerometer at its end"
+    assert outcome.answers
+    slow = replace(design.gyro, uncertainty=replace(design.gyro.uncertainty, full_scale=0.5))
+    priors = TrialPriors(kinds=("pole",), design=replace(design, gyro=slow))
+    excluded = {judge_case(draw_case(k, 2, priors)).excluded for k in range(3)}
+    assert "gyro at its end" in excluded
+
+
 def test_linear_covariance_and_monte_carlo_agree():
     for number in (0, 3):
         path = reconstruct_case(draw_case(number, 2)).path
@@ -137,8 +155,8 @@ def test_ringing_table_has_what_was_asked():
         assert table.loc[(name, "instants"), "largest"] > 0.03
 
 
-def test_no_case_is_refused():
-    with pytest.raises(Exception, match="at least one"):
+def test_nothing_to_do_is_refused():
+    with pytest.raises(ConfigError, match="0 cases"):
         each_case(abs, 0)
 
 

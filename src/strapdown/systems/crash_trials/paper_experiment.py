@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.entry import Entry
-from strapdown.exceptions import StrapdownError
+from strapdown.exceptions import DataError
 from strapdown.sensors.error_draws import child
 from strapdown.simulation import CRASHES, CrashScenario, Ringing
 from strapdown.simulation.recorder_design import RecorderDesign
@@ -178,7 +178,7 @@ def _run(
     case = TrialCase(number, scenario, unit, entry, recorder)
     try:
         found = reconstruct_case(case)
-    except StrapdownError as error:
+    except DataError as error:
         return TrialOutcome(number, scenario.name, str(error).splitlines()[0], {})
     path = found.path
     place, _ = truth.course(path.time)

@@ -14,7 +14,7 @@ from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit
 from strapdown.crash.velocity_change import EventChanges, VelocityChange
 from strapdown.earth import gravity
-from strapdown.exceptions import StrapdownError
+from strapdown.exceptions import DataError
 from strapdown.sensors.synchronise import synchronise
 from strapdown.systems.crash_trials.exact_answers import ExactAnswers
 from strapdown.systems.crash_trials.trial_case import TrialCase
@@ -107,12 +107,13 @@ def judge_case(case: TrialCase, point: Triple = (0.0, 0.0, 0.0)) -> TrialOutcome
     Returns
     -------
     TrialOutcome
-        Changes of velocity over the windows that were found, against the true ones over the same
-        stretch of time; their directions; the place 750 ms after the impact.
+        Changes of velocity of the strongest event over the windows that were found, against the
+        true ones over the same stretch of time; their directions; place and velocity 750 ms after
+        the impact. Excluded with the message where the chain refuses the record.
     """
     try:
         found = reconstruct_case(case, point)
-    except StrapdownError as error:
+    except DataError as error:
         return TrialOutcome(case.number, case.scenario.name, str(error).splitlines()[0], {})
     return judge(case, found, point)
 
@@ -147,7 +148,7 @@ def _normal(error: float, sd: float) -> Judged:
 
 
 def _changes(
-    changes: EventChanges, axes: Triple | tuple[str, ...], truth: ExactAnswers
+    changes: EventChanges, axes: tuple[str, ...], truth: ExactAnswers
 ) -> dict[str, Judged]:
     out: dict[str, Judged] = {}
     for change in (changes.peak, changes.event):
