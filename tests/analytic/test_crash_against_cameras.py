@@ -51,9 +51,7 @@ def comparisons():
 def test_recorders_and_cameras_agree_within_their_bounds(comparisons):
     # Of each axis at the end, the mean of the square in units of its variance: chi-square of six
     # runs over six, of which 1e-4 lie above 4.7.
-    z = [
-        (c.errors.iloc[-1] / (c.bound.iloc[-1] / 1.96)).to_numpy() ** 2 for _, _, c in comparisons
-    ]
+    z = [(c.errors.iloc[-1] / (c.bound.iloc[-1] / 1.96)).to_numpy() ** 2 for _, _, c in comparisons]
     assert (np.mean(z, axis=0) < 4.7).all()
     assert sum(c.consistent for _, _, c in comparisons) >= SEEDS - 2
 

@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 # Runs that are made together, from one stream of random numbers: their size is part of what a
 # seed means, and the number of cores is not.
 TOGETHER = 64
-MOST_RUNS = 1_000_000
+# A gigabyte of paths.
+MOST_RUNS = 100_000
 
 
 @dataclass(frozen=True, eq=False)
