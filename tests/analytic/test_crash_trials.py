@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from scipy import stats
 
 from strapdown.crash.monte_carlo import sample_paths
 from strapdown.exceptions import ConfigError
@@ -207,10 +206,12 @@ def test_bounds_fail_where_they_were_not_told():
     untold = {
         "nothing": Untold(),
         "ringing": Untold(ringing=(RINGINGS["10 g at 195 Hz"],)),
-        "trigger": Untold(trigger_sd=0.02),
+        "trigger": Untold(trigger_sd=0.01),
     }
     table = degradation_table(degradation(100, seed=3, untold=untold))
     slack = 3.5 * np.sqrt(0.95 * 0.05 / 100)
     assert (table["nothing"] > 0.95 - slack).all()
     assert table.loc["place north", "ringing"] < 0.8
-    assert stats.binom.cdf(round(100 * table.loc["place north", "trigger"]), 100, 0.95) < 0.01
+    # 10 ms of a pulse: the windows are elsewhere, and their directions the same.
+    assert table.loc["body peak resultant", "trigger"] < 0.8
+    assert table.loc["body peak direction", "trigger"] > 0.95 - slack
