@@ -113,6 +113,40 @@ def test_backward_and_forward_meet(case):
     assert np.abs(other.table[NED].to_numpy() - moved).max() < 3.0**2 / 6.3e6
 
 
+@pytest.mark.parametrize("attitude", [False, True])
+@pytest.mark.parametrize("at", [0.0557, 0.0581])
+def test_an_entry_between_samples_is_carried_to_the_nearest(case, at, attitude):
+    motion, imu, unit, effects, _, path = case
+    # In the middle of the pulse half a sample is 0.3 m/s, and 0.1 deg of heading.
+    now = motion.trajectory(np.array([IMPACT + at])).iloc[0]
+    entry = Entry(
+        time=at,
+        velocity=(now["VN"], now["VE"], now["VD"]),
+        heading_deg=now["heading"],
+        attitude_deg=(now["roll"], now["pitch"]) if attitude else None,
+    )
+    other = reconstruct_path(imu, effects, unit.levelling, -0.1, entry, window=WINDOW)
+    moved = other.table[NED].to_numpy() - truth(motion, other.time)
+    moved += truth(motion, np.array([at]))
+    # What chords between samples leave out of a pulse, dt²/12 of its slope, is in the velocity
+    # over the rest of the path, and in the place it is linear in time.
+    slope = np.pi / LENGTH * 2.0 * np.hypot(*CHANGE[:2]) / LENGTH
+    assert np.abs(moved).max() < 1.5 * slope / RATE**2 / 12.0 * (WINDOW[1] + LENGTH)
+    turned = other.table["heading"].to_numpy() - path.table["heading"].to_numpy()
+    assert np.abs(rotation.within_half_turn(turned)).max() < 0.01
+    # A scale factor that is wrong has gained its share of what was felt in between.
+    (scale,) = (k for k, name in enumerate(other.names) if name == "imu1 high-g scale x")
+    row = int(np.searchsorted(imu.index, other.time[other.anchor] - 1e-9))
+    gained = effects.force[scale, row, 0] * (other.time[other.anchor] - at)
+    assert other.start[scale, 3] == pytest.approx(gained, rel=0.1)
+
+
+def test_an_entry_outside_of_the_record_is_named_and_no_window(case):
+    _, imu, unit, effects, *_ = case
+    with pytest.raises(DataError, match="entry: the entry at 9 s is not within"):
+        reconstruct_path(imu, effects, unit.levelling, -0.1, Entry.from_speed(7.1, 0.05, time=9.0))
+
+
 def test_every_unknown_grows_as_navigation_does(case):
     *_, path = case
     small = 1e-3
