@@ -220,8 +220,8 @@ def _made(
 ) -> SynchronisedUnit:
     made = replace(
         unit,
-        accelerometers=tuple(a.triad for a in accelerometers),
-        gyro=None if gyro is None else gyro.triad,
+        accelerometers=tuple(_marked(a) for a in accelerometers),
+        gyro=None if gyro is None else _marked(gyro),
         trigger=0.0,
         trigger_sd=clock.sd,
         lender=lender,
@@ -236,6 +236,11 @@ def _made(
         None if lender is None else lender.name,
         gyro_time_sd,
     )
+
+
+def _marked(at: TriadAtStamps) -> RecordedTriad:
+    """A triad that knows where its record was held, which a low-pass hides from its values."""
+    return at.triad if at.method == "as recorded" else replace(at.triad, held=at.clipped)
 
 
 def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str]]]:
