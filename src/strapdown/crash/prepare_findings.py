@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 # Beyond this many standard deviations a number contradicts what is stated of it.
 SIGMAS = 4.0
+# Of the range: what interpolation and decimation make of two that are cut at other places.
+LEAST_STEP = 1e-3
 # A record that begins less than this before the impact has no stretch before it.
 SHORTEST = 0.05  # s
 # Of a specific force at rest that was read in g.
@@ -273,8 +275,8 @@ def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
             scale = level * np.hypot(
                 low.uncertainty.axis("scale")[k], high.uncertainty.axis("scale")[k]
             )
-            sd = float(np.hypot(merged.step_sd[j, k], scale))
-            if sd > 0.0 and abs(merged.step[j, k]) > SIGMAS * sd:
+            sd = float(np.hypot(merged.step_sd[j, k], max(scale, LEAST_STEP * level)))
+            if abs(merged.step[j, k]) > SIGMAS * sd:
                 found.append(
                     Finding(
                         f"where {low.name} and {high.name} take over from one another they differ "

@@ -18,6 +18,7 @@ from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.prepared_unit import FROM_GRAVITY
 from strapdown.sensors.synchronise import synchronise
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 _spec = importlib.util.spec_from_file_location(
@@ -273,6 +274,30 @@ def test_a_gap_is_told():
     assert "without a sample from 0.2" in words(prepare_unit(made)) or "from 0.195" in words(
         prepare_unit(made)
     )
+
+
+@pytest.mark.parametrize(("offset", "drift"), [(0.0013, 0.0), (0.0, 5e-4)])
+def test_perfect_sensors_off_the_common_stamps_are_not_blamed(offset, drift):
+    # Their standard deviations are zero, and what interpolation leaves is infinitely many.
+    made, *_ = unit(
+        noisy=False,
+        low=TriadUncertainty(full_scale=8 * G),
+        high=TriadUncertainty(full_scale=100 * G),
+        gyro=TriadUncertainty(),
+        high_bias=(0.0, 0.0, 0.0),
+        gyro_bias=(0.0, 0.0, 0.0),
+    )
+
+    def late(table):
+        table.index = table.index * (1.0 + drift) + offset
+        return table
+
+    for part in (0, 1, "gyro"):
+        made = changed(made, part, late)
+    (at,) = synchronise([made]).units
+    out = prepare_unit(at.unit)
+    assert (out.range_spoken[:, 0] > 0).any()
+    assert not out.findings
 
 
 @pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
