@@ -54,7 +54,7 @@ class ToStamp:
 
     def gained(self, q_nb: Array) -> Array:
         """Change of the velocity in local level, (3,), m/s; `q_nb` at the sample."""
-        return self.felt(q_nb) + np.array([0.0, 0.0, GRAVITY * self.length])
+        return np.asarray(self.felt(q_nb) + np.array([0.0, 0.0, GRAVITY * self.length]))
 
     def carried(self, errors: Array, q_nb: Array, *, turned: bool) -> Array:
         """Errors at the sample from those at the entry.

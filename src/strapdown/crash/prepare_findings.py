@@ -266,6 +266,7 @@ def bias_findings(
 def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
     """Ranges that do not meet where one takes over from the other."""
     found = []
+    largest = np.abs(merged.values).max(axis=0)
     for j in range(len(merged.step)):
         low, high = unit.accelerometers[j], unit.accelerometers[j + 1]
         for k, axis in enumerate("xyz"):
@@ -275,7 +276,13 @@ def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
             scale = level * np.hypot(
                 low.uncertainty.axis("scale")[k], high.uncertainty.axis("scale")[k]
             )
-            sd = float(np.hypot(merged.step_sd[j, k], max(scale, LEAST_STEP * level)))
+            # Each feels the other axes by its own two angles.
+            angles = np.hypot(
+                low.uncertainty.axis("misalignment")[k], high.uncertainty.axis("misalignment")[k]
+            )
+            aside = angles * np.hypot(*np.delete(largest, k))
+            own = max(float(np.hypot(scale, aside)), LEAST_STEP * level)
+            sd = float(np.hypot(merged.step_sd[j, k], own))
             if abs(merged.step[j, k]) > SIGMAS * sd:
                 found.append(
                     Finding(

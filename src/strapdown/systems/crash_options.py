@@ -12,7 +12,7 @@ from strapdown.crash.gnss_start import GnssEntry
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
-from strapdown.sensors.triad_numbers import FARTHEST, triple
+from strapdown.sensors.triad_numbers import FARTHEST, finite, triple
 
 __all__ = ["check_crash_options"]
 
@@ -23,6 +23,7 @@ def check_crash_options(
     point: object,
     window: object,
     preparation: object,
+    peak_window: object,
     rule: object,
     gravity: object,
     mechanization: object,
@@ -57,6 +58,19 @@ def check_crash_options(
     if not (preparation is None or isinstance(preparation, Mapping)):
         raise _kind(
             preparation, "preparation", "give options of prepare_unit, as {'levelling': (0, 0, 1)}"
+        )
+    for name, given in (preparation or {}).items():
+        of_unit = isinstance(given, Mapping)
+        if of_unit is not (name in {unit.name for unit in units}):  # type: ignore[attr-defined]
+            raise ConfigError(
+                f"there is no unit {name!r}" if of_unit else f"{given!r} are no options of a unit",
+                quantity="preparation",
+                remedy="give options for all units as {'gravity': 9.81}, and those of one under "
+                "its name, as {'IMU1': {'levelling': (0, 0, 1)}}",
+            )
+    if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
+        raise ConfigError(
+            f"{peak_window!r} is no length", quantity="peak_window", remedy="give s, as 0.030"
         )
     if not isinstance(rule, EventRule):
         raise _kind(rule, "rule", "give an EventRule, or leave it out for 49 CFR 563")
