@@ -11,6 +11,7 @@ from tests.unit.crash.crash_case import RATE, prepared
 from strapdown import rotation
 from strapdown._kernels.perturbed_runs import perturbed_runs
 from strapdown.crash.combined_effects import combine_effects
+from strapdown.crash.delta_v_bound import resolved_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY
 from strapdown.crash.monte_carlo import sample_paths
@@ -256,6 +257,30 @@ def test_noise_alone(case):
     have = np.diagonal(samples.covariance, axis1=1, axis2=2)[-1]
     want = np.diagonal(path.covariance, axis1=1, axis2=2)[-1]
     assert np.abs(have / want - 1.0).max() < 4 * np.sqrt(2 / 4000)
+
+
+@pytest.mark.parametrize("at", [-0.05, 0.05, 0.3])
+def test_noise_of_a_change_before_after_and_about_the_entry(case, at):
+    _, imu, unit, effects, *_ = case
+    silent = replace(
+        effects,
+        names=(),
+        contributors=(),
+        force=effects.force[:0],
+        rate=effects.rate[:0],
+        rest_force=effects.rest_force[:0],
+        tilt=effects.tilt[:0],
+        # So that what the gyros do to the attitude shows beside the noise of the force.
+        rate_noise=np.full_like(effects.rate_noise, 0.02),
+    )
+    stated = Entry.from_covariance(at, (2.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros((6, 6)))
+    path = reconstruct_path(imu, silent, unit.levelling, None, stated, window=WINDOW)
+    runs = sample_paths(path, runs=4000, seed=2).errors[:, :, VELOCITY]
+    first, last = np.searchsorted(path.time, [-1e-9, 0.1 - 1e-9])
+    have = (runs[:, last] - runs[:, first]).std(axis=0)
+    bound = resolved_delta_v_bound(path, float(path.time[first]), float(path.time[last]))
+    # Standard deviations of 4000 runs are known to 1/sqrt(8000) each.
+    assert np.abs(have / bound.sd - 1.0).max() < 4 / np.sqrt(8000)
 
 
 def test_shares_add_up(case):

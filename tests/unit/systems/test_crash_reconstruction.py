@@ -10,8 +10,10 @@ import pytest
 from strapdown import CrashUnit, Entry, Mounting, TriadUncertainty, reconstruct_crash, sample_paths
 from strapdown.crash.reference_path import compare_with_reference
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.mounted_motion import MountedMotion
 from strapdown.simulation.paper_recorders import paper_units
 from strapdown.tables import NED
@@ -103,6 +105,27 @@ class TestEntry:
             reconstruct_crash([short], None)
         reconstruct_crash([short], None, preparation={"moving_at_impact": False})
         reconstruct_crash([short], ENTRY)
+
+    def test_a_level_velocity_on_a_slope_is_told(self):
+        # 10 deg up: 1.2 m/s that the entry leaves out.
+        slope = np.radians(10.0)
+        up = np.array([np.cos(slope), 0.0, -np.sin(slope)])
+        motion = CrashMotion(
+            4.0,
+            Origin(45.0, 20.0, 100.0),
+            tuple(7.1 * up),
+            (HaversinePulse(2.0, 0.113, tuple(-7.2 * up)),),
+            pitch_deg=10.0,
+        )
+        unit, _ = record_crash(motion, DESIGNS["IMU1"], impact=2.0, seed=1)
+        # It coasts, and so is level to what the sensors leave: 2 deg.
+        options = {"preparation": {"steady_acceleration": 0.0}}
+        level = reconstruct_crash([unit], ENTRY, **options).findings
+        (told,) = (f for f in level if f.quantity == "entry")
+        assert "is 0 m/s upward" in told.what
+        assert "deg up from level" in told.what
+        climbing = Entry(0.0, tuple(7.1 * up), 0.0)
+        assert not any(f.quantity == "entry" for f in reconstruct_crash([unit], climbing).findings)
 
     @pytest.mark.parametrize(
         ("make", "words"),
