@@ -101,12 +101,13 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
     # What is left of the biases is as large as the noise of many samples: without it two units
     # of one crash disagree beyond all chance.
     designs = [d for d in paper_units() if d.gyro is not None]
-    fixes = simulate_gnss(CRASH.motion, RECEIVER, seed=1)
+    fixes = simulate_gnss(CRASH.motion, RECEIVER, seed=2)
     fixes.index = fixes.index - IMPACT
-    units = [record_crash(CRASH.motion, d, impact=IMPACT, seed=1)[0] for d in designs]
+    units = [record_crash(CRASH.motion, d, impact=IMPACT, seed=2)[0] for d in designs]
     found = reconstruct_crash(units, GnssEntry(fixes, window=6.0, priors=PRIORS))
     assert len(found.comparison.pairs) == 1
     assert found.comparison.agree
+    # Nor are ranges blamed, whose 13 g ahead come in part on the axis to the side.
     assert {f.quantity for f in found.findings} <= {"rest"}
 
 
