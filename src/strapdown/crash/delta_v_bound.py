@@ -150,11 +150,14 @@ def _noise_between(path: CrashPath, start: float, end: float) -> Array:
     """Covariance of the change of velocity that noise makes between two instants.
 
     Noise on the force is independent from step to step, so that its variances subtract; what
-    noise of the gyros before the window has done to the attitude acts on through it.
+    noise of the gyros before the window has done to the attitude acts on through it. A window
+    before the entry is the same, met backward.
     """
-    noise = path.noise_covariance[None]
+    noise, entry = path.noise_covariance[None], path.time[path.anchor]
+    if end <= entry + 1e-9:
+        start, end = end, start
     here, there = _at(path.time, noise, start)[0], _at(path.time, noise, end)[0]
-    if start >= path.time[path.anchor] - 1e-9:
+    if start >= entry - 1e-9 or end < start:
         tilt = _turn_effect(path, start, end)
         carried = tilt @ here[ATTITUDE, VELOCITY]
         # var(v1 - v0) = P11 + P00 - P10 - P01, with v1 = v0 + tilt phi0 + new noise.

@@ -18,6 +18,8 @@ __all__ = ["check_standing", "entry_findings"]
 SIGMAS = 4.0
 # The wake window of 49 CFR 563 is 20 ms: time zero is as well known as half of it.
 LATE = 0.010  # s
+# A vehicle that is steeper than this when it is struck is on a slope: no braking pitches it so far.
+SLOPE_DEG = 4.0
 
 
 def check_standing(at_point: AtPoint, entry: Entry | None) -> None:
@@ -60,7 +62,7 @@ def entry_findings(
     """
     if entry is None:
         return []
-    found = []
+    found = _slope(at_point, entry, path)
     if events.events and events.events[0].time_zero + LATE < entry.time:
         first = events.events[0].time_zero
         found.append(
@@ -103,6 +105,30 @@ def entry_findings(
             )
         )
     return found
+
+
+def _slope(at_point: AtPoint, entry: Entry, path: CrashPath) -> list[Finding]:
+    """A level velocity of a vehicle that stands on a slope."""
+    now, sd = path.table.iloc[path.anchor], path.sd.iloc[path.anchor]
+    pitch, along = float(now["pitch"]), entry.velocity
+    speed = float(np.hypot(along[0], along[1]))
+    heading = np.radians(float(now["heading"]))
+    ahead = along[0] * np.cos(heading) + along[1] * np.sin(heading)
+    climbs = float(np.tan(np.radians(pitch)) * ahead + along[2])
+    known = np.hypot(speed * np.radians(float(sd["pitch"])), float(sd["VD"]))
+    if abs(pitch) < SLOPE_DEG or abs(climbs) < SIGMAS * known:
+        return []
+    return [
+        Finding(
+            f"its vertical velocity is {0.0 - along[2]:.3g} m/s upward, and the vehicle points "
+            f"{pitch:+.1f} deg up from level at {entry.time:.4g} s: along it, that would be "
+            f"{climbs - along[2]:.3g} m/s",
+            file=at_point.name,
+            quantity="entry",
+            remedy="on a slope, give Entry(time, velocity=(north, east, down), heading_deg) or, "
+            "with Entry.from_speed, climb_sd; else check the levelling",
+        )
+    ]
 
 
 def _speed(path: CrashPath, row: int) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,11 +14,14 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, VELOCITY, EntryState
 from strapdown.crash.gnss_entry import entry_state_from_gnss
-from strapdown.exceptions import DataError
+from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.sensors.triad_numbers import finite, triple
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 CONTRIBUTOR = "entry from GNSS"
 # What the entry state has instead: lines of the error budget.
 BIASES = ("accelerometer bias", "gyro bias", "levelling")
+OTHER_PRIORS = tuple(f.name for f in fields(EntryPriors) if f.name not in ("gyro", "accel"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,11 @@ class GnssEntry:
         Vehicle axes, from the vehicle's origin.
     priors : dict
         Attributes of `EntryPriors` other than the sensors', which are the unit's own.
+
+    Raises
+    ------
+    ConfigError
+        A number is none, or a prior is unknown or out of range.
     """
 
     fixes: pd.DataFrame = field(repr=False)
@@ -48,6 +56,25 @@ class GnssEntry:
     before: float = 0.02
     antenna: Sequence[float] = (0.0, 0.0, 0.0)
     priors: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("impact", "window", "before"):
+            if not finite(getattr(self, name)):
+                raise ConfigError(
+                    f"{getattr(self, name)!r} is no number",
+                    quantity=f"GNSS entry, {name}",
+                    remedy="give one finite number in s, or leave it out",
+                )
+        how = "give forward, right, down in m from the vehicle's origin"
+        triple(self.antenna, "GNSS entry, antenna", how)
+        for name in self.priors:
+            if name not in OTHER_PRIORS:
+                raise ConfigError(
+                    f"there is no prior {name!r}",
+                    quantity="GNSS entry, priors",
+                    remedy=nearest(str(name), OTHER_PRIORS),
+                )
+        EntryPriors(gyro=TriadUncertainty(), accel=TriadUncertainty(), **self.priors)
 
 
 def start_from_gnss(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,22 +13,24 @@ from numpy.typing import NDArray
 from strapdown import frames, rotation
 from strapdown._kernels.ned import ALT, LAT, LON, Q, V
 from strapdown.crash.angle_rates import angle_rates
+from strapdown.crash.between_stamps import ToStamp, to_stamp
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
+from strapdown.crash.path_window import path_rows
 from strapdown.crash.reconstruction_summary import path_line
 from strapdown.crash.sample_effects import SampleEffects
+from strapdown.earth import earth_rate
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.sensors.prepared_unit import Levelling
 from strapdown.sensors.triad_errors import triad_of
-from strapdown.tables import EULER, NED
+from strapdown.tables import EULER, GYRO, NED
 from strapdown.tables import VELOCITY as VELOCITIES
 
 Array = NDArray[np.float64]
 
-#: Where a path is wanted if nothing is said, s from the trigger: Tadic and Vukajlovic (2016).
-WINDOW = (-0.1, 0.75)
 #: What the columns of an error are, in its order.
 ERROR = ["phi_n", "phi_e", "phi_d", *VELOCITIES, *NED]
 
@@ -43,7 +44,7 @@ class CrashPath:
     time : ndarray, (n,), s
         From the common trigger.
     anchor : int
-        The sample that the path is tied to; forward after it, backward before it.
+        The sample nearest to the entry; forward after it, backward before it.
     entry : Entry
     table : DataFrame
         Indexed by time: ``north east down`` m, from the reference point's place at the entry;
@@ -138,6 +139,7 @@ def reconstruct_path(
     *,
     window: Sequence[float] | None = None,
     mechanization: NorthEastDown | None = None,
+    zeroed_at_rest: bool = False,
 ) -> CrashPath:
     """Navigate from the entry forward and backward, and grow what is not known along the way.
 
@@ -156,9 +158,12 @@ def reconstruct_path(
         None: the velocity follows from a vehicle that stood still until `level_time`, the path
         is tied to time zero, and told in axes of the vehicle there.
     window : (float, float), s, optional
-        The path is given over the samples within; -0.1 to 0.75 s, as far as the record has them,
-        if not given.
+        The path is given over the samples within, and those from there to the entry; -0.1 to
+        0.75 s, as far as the record has them, if not given.
     mechanization : NorthEastDown, optional
+    zeroed_at_rest : bool
+        The mean of the rates up to `level_time` was taken off as bias, and with it the Earth's
+        rate, as it was felt there.
 
     Returns
     -------
@@ -182,12 +187,27 @@ def reconstruct_path(
     time = imu.index.to_numpy(dtype=np.float64)
     mechanization = mechanization or NorthEastDown()
     origin = entry or Entry(time=0.0, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
-    wanted = _usual(time, origin.time) if window is None else window
-    first, anchor, last = _rows(imu, time, wanted, origin.time)
+    first, anchor, last = path_rows(imu, origin.time, window)
+    # Without an entry the velocity is that of the sample, whatever instant it is called.
+    there = to_stamp(imu, effects, float(time[anchor]) if entry is None else origin.time, anchor)
     if origin.attitude_deg is not None:
-        begin = _Begin(_state(origin, *origin.attitude_deg, float(time[anchor])), *_NOTHING)
+        stated = _state(origin, *origin.attitude_deg, float(time[anchor]))
+        stated = replace(stated, q_nb=there.attitude_after(stated.q_nb))
+        begin = _Begin(stated, *_NOTHING)
     else:
-        begin = _carried(imu, effects, levelling, level_time, entry, origin, anchor, mechanization)
+        begin = _carried(
+            imu,
+            effects,
+            levelling,
+            level_time,
+            entry,
+            origin,
+            anchor,
+            there,
+            mechanization,
+            zeroed_at_rest and level_time is not None,
+        )
+        imu = _turning(imu, begin.missing)
     names = (*effects.names, *begin.names, *(u[0] for u in origin.unknowns))
     contributors = (
         *effects.contributors,
@@ -198,28 +218,32 @@ def reconstruct_path(
     start[: len(begin.errors)] = begin.errors
     if origin.unknowns:
         start[-len(origin.unknowns) :] = [u[2][:9] for u in origin.unknowns]
+    q_nb = begin.state.q_nb
+    start = there.carried(start, q_nb, turned=origin.attitude_deg is not None)
+    state = replace(begin.state, v_n=begin.state.v_n + there.gained(q_nb))
     padded = _padded(effects, len(begin.names), [u[2][9:] for u in origin.unknowns])
-    back = make_leg(
-        mechanization, begin.state, imu, padded, slice(first, anchor + 1), backward=True
-    )
-    ahead = make_leg(
-        mechanization, begin.state, imu, padded, slice(anchor, last + 1), backward=False
-    )
+    back = make_leg(mechanization, state, imu, padded, slice(first, anchor + 1), backward=True)
+    ahead = make_leg(mechanization, state, imu, padded, slice(anchor, last + 1), backward=False)
     origin = replace(origin, velocity=triad_of(begin.state.v_n))
     return _joined((back, ahead), origin, names, contributors, start)
 
 
 @dataclass(frozen=True, eq=False)
 class _Begin:
-    """The state at the entry, the errors that sensors and levelling have put on it, their names."""
+    """The state at the entry, the errors that sensors and levelling have put on it, their names.
+
+    And the rate that is missing from all samples, vehicle axes.
+    """
 
     state: NavState
     names: tuple[str, ...]
     contributors: tuple[str, ...]
     errors: Array
+    missing: Array
 
 
-_NOTHING: tuple[tuple[str, ...], tuple[str, ...], Array] = ((), (), np.zeros((0, 9)))
+_NO_NAMES: tuple[str, ...] = ()
+_NOTHING = (_NO_NAMES, _NO_NAMES, np.zeros((0, 9)), np.zeros(3))
 
 
 def _state(entry: Entry, roll: float, pitch: float, time: float) -> NavState:
@@ -243,7 +267,9 @@ def _carried(
     entry: Entry | None,
     origin: Entry,
     anchor: int,
+    there: ToStamp,
     mechanization: NorthEastDown,
+    zeroed: bool,
 ) -> _Begin:
     """Carry the attitude from where the vehicle was levelled to the entry, and its errors."""
     time = imu.index.to_numpy(dtype=np.float64)
@@ -266,11 +292,17 @@ def _carried(
         )
     still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))
-    leg = make_leg(mechanization, begin, imu, effects, slice(at, anchor + 1), backward=False)
+    turning = earth_rate(origin.lat_deg, ellipsoid=find_ellipsoid(mechanization.ellipsoid))
+    # The mean of the rates at rest, which was taken off, had the Earth's in it.
+    felt = rotation.rotate(rotation.conjugate(begin.q_nb), turning) if zeroed else np.zeros(3)
+    leg = make_leg(
+        mechanization, begin, _turning(imu, felt), effects, slice(at, anchor + 1), backward=False
+    )
     start = np.concatenate([effects.tilt, np.zeros((len(effects.names), 6))], axis=1)
     errors = leg.errors(start)[:, -1]
     noise = leg.noise_covariance()[-1]
-    heading = float(rotation.euler_from_quaternion(leg.nominal[-1, Q : Q + 4])[2])
+    at_entry = there.attitude_before(leg.nominal[-1, Q : Q + 4])
+    heading = float(rotation.euler_from_quaternion(at_entry)[2])
     turn = rotation.dcm_from_euler([0.0, 0.0, origin.heading_deg - heading])
     twist = np.kron(np.eye(3), turn)
     errors, noise = errors @ twist.T, twist @ noise @ twist.T
@@ -286,7 +318,9 @@ def _carried(
     values, vectors = np.linalg.eigh(noise)
     columns = (vectors * np.sqrt(np.maximum(values, 0.0))).T
     columns = columns[values > 1e-12 * max(values[-1], 1e-300)]
-    q_nb = rotation.compose(rotation.quaternion_from_dcm(turn), leg.nominal[-1, Q : Q + 4])
+    turned = rotation.quaternion_from_dcm(turn)
+    q_nb = rotation.compose(turned, leg.nominal[-1, Q : Q + 4])
+    at_rest = rotation.conjugate(rotation.compose(turned, begin.q_nb))
     state = NavState(
         time=float(time[anchor]),
         lat=begin.lat,
@@ -300,50 +334,18 @@ def _carried(
         tuple(f"noise before the entry {k + 1}" for k in range(len(columns))),
         tuple("sensor noise" for _ in columns),
         np.concatenate([errors, columns]),
+        rotation.rotate(at_rest, turning) if zeroed else np.zeros(3),
     )
 
 
-def _usual(time: Array, at: float) -> tuple[float, float]:
-    """The usual window, as far as there is a record; the entry is within in any case."""
-    return (
-        min(max(WINDOW[0], float(time[0])), at),
-        max(min(WINDOW[1], float(time[-1])), at + 1e-6),
-    )
-
-
-def _rows(
-    imu: pd.DataFrame, time: Array, window: Sequence[float], at: float
-) -> tuple[int, int, int]:
-    """First, entry's and last sample of the path."""
-    begin, end = float(window[0]), float(window[1])
-    slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-    if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
-        raise DataError(
-            f"the window from {begin:g} s to {end:g} s is not within the record, which has "
-            f"{time[0]:.6g} s to {time[-1]:.6g} s",
-            file=imu.attrs.get("source"),
-            quantity="window",
-            remedy="choose a window within it, its start before its end, in s from the trigger"
-            + _overlap(begin, end, time),
-        )
-    if not time[0] - slack <= at <= time[-1] + slack:
-        raise DataError(
-            f"the entry at {at:.6g} s is not within the record, which has {time[0]:.6g} s to "
-            f"{time[-1]:.6g} s",
-            file=imu.attrs.get("source"),
-            quantity="entry",
-            remedy="give the velocity at an instant of the record",
-        )
-    anchor = int(np.argmin(np.abs(time - at)))
-    first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
-    last = max(int(np.searchsorted(time, end + 1e-9, side="right")) - 1, anchor)
-    return first, anchor, last
-
-
-def _overlap(begin: float, end: float, time: Array) -> str:
-    low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
-    high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
-    return f": window=({low:g}, {high:g})" if low < high else ""
+def _turning(imu: pd.DataFrame, rate: Array) -> pd.DataFrame:
+    """An Imu table with a rate added to its own, (3,), rad/s."""
+    if not rate.any():
+        return imu
+    out = imu.copy()
+    out.attrs = dict(imu.attrs)
+    out[GYRO] += rate
+    return out
 
 
 def _padded(
@@ -376,7 +378,8 @@ def _joined(
     )
     moved = frames.place_difference(place, np.broadcast_to(place[anchor], place.shape))
     # The entry may lie between two samples.
-    moved = moved + (time[anchor] - entry.time) * np.asarray(entry.velocity)
+    between = 0.5 * (np.asarray(entry.velocity) + states[anchor, V : V + 3])
+    moved = moved + (time[anchor] - entry.time) * between
     q_nb = states[:, Q : Q + 4]
     table = pd.DataFrame(
         np.concatenate([moved, states[:, V : V + 3], rotation.euler_from_quaternion(q_nb)], axis=1),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,13 +113,12 @@ def prepare_unit(
     assert unit.gyro is not None
     triads, gyro = unit.accelerometers, unit.gyro.uncertainty
     limits = [_limits(data.time, y, t) for y, t in zip(data.accelerometers, triads, strict=True)]
-    gyro_limits = find_limits(
-        data.time, data.gyro, np.array(gyro.full_scale), np.array(gyro.quantization)
-    )
+    gyro_limits = _limits(data.time, data.gyro, unit.gyro)
     noise = [_noise(data.time, t.uncertainty) for t in triads]
     gyro_noise = _noise(data.time, gyro)
     findings: list[Finding] = [*data.findings]
     findings += saturation_findings(unit, data, limits, gyro_limits)
+    limits = [_with_held(limit, t) for limit, t in zip(limits, triads, strict=True)]
 
     own = _find_rest(unit, data, rest, impact, moving_at_impact, noise[0], gyro_noise)
     findings += rest_findings(
@@ -175,7 +175,7 @@ def prepare_unit(
         imu=imu,
         range_spoken=merged.spoken,
         clipped=merged.clipped,
-        gyro_clipped=gyro_limits.clipped,
+        gyro_clipped=_with_held(gyro_limits, unit.gyro).clipped,
         noise=merged.noise,
         gyro_noise=gyro_noise,
         rest=standing,
@@ -248,7 +248,16 @@ def _range_biases(
 
 def _limits(time: Array, values: Array, triad: RecordedTriad) -> RangeLimits:
     u = triad.uncertainty
-    return find_limits(time, values, np.array(u.full_scale), np.array(u.quantization))
+    return find_limits(
+        time, values, np.array(u.full_scale), np.array(u.quantization), held=triad.held
+    )
+
+
+def _with_held(limits: RangeLimits, triad: RecordedTriad) -> RangeLimits:
+    """What is spent, whether the values still show it or not."""
+    if triad.held is None:
+        return limits
+    return replace(limits, clipped=limits.clipped | triad.held)
 
 
 def _noise(time: Array, uncertainty: TriadUncertainty) -> Array:

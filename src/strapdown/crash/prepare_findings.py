@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 # Beyond this many standard deviations a number contradicts what is stated of it.
 SIGMAS = 4.0
+# Of the range: what interpolation and decimation make of two that are cut at other places.
+LEAST_STEP = 1e-3
 # A record that begins less than this before the impact has no stretch before it.
 SHORTEST = 0.05  # s
 # Of a specific force at rest that was read in g.
@@ -264,6 +266,7 @@ def bias_findings(
 def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
     """Ranges that do not meet where one takes over from the other."""
     found = []
+    largest = np.abs(merged.values).max(axis=0)
     for j in range(len(merged.step)):
         low, high = unit.accelerometers[j], unit.accelerometers[j + 1]
         for k, axis in enumerate("xyz"):
@@ -273,8 +276,14 @@ def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
             scale = level * np.hypot(
                 low.uncertainty.axis("scale")[k], high.uncertainty.axis("scale")[k]
             )
-            sd = float(np.hypot(merged.step_sd[j, k], scale))
-            if sd > 0.0 and abs(merged.step[j, k]) > SIGMAS * sd:
+            # Each feels the other axes by its own two angles.
+            angles = np.hypot(
+                low.uncertainty.axis("misalignment")[k], high.uncertainty.axis("misalignment")[k]
+            )
+            aside = angles * np.hypot(*np.delete(largest, k))
+            own = max(float(np.hypot(scale, aside)), LEAST_STEP * level)
+            sd = float(np.hypot(merged.step_sd[j, k], own))
+            if abs(merged.step[j, k]) > SIGMAS * sd:
                 found.append(
                     Finding(
                         f"where {low.name} and {high.name} take over from one another they differ "

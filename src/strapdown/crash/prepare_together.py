@@ -79,6 +79,7 @@ def _attitude_at_start(
         rest.end,
         still,
         window=(begin, begin + READ * step),
+        zeroed_at_rest=True,
     )
     attitude, sd = path.table.iloc[path.anchor], path.sd.iloc[path.anchor]
     return (

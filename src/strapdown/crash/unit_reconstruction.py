@@ -127,6 +127,7 @@ def reconstruct_unit(
         entry,
         window=window,
         mechanization=mechanization,
+        zeroed_at_rest=at_point.rest is not None,
     )
     first = int(np.searchsorted(at_point.imu.index, path.time[0] - 1e-9))
     part = at_point.imu.iloc[first : first + len(path.time)]

@@ -80,16 +80,21 @@ class RecordedTriad:
     uncertainty : TriadUncertainty
     name : str
         Of the part, for messages.
+    held : ndarray of bool, (n, 3), optional
+        Of a table that was brought to other stamps: whether a recorded sample at an end of the
+        range counts in a row, where the values themselves may be well within. None where the
+        table is as recorded.
 
     Raises
     ------
     ConfigError
-        The table or the uncertainty is of another kind.
+        The table or the uncertainty is of another kind, or `held` is not of its rows.
     """
 
     table: pd.DataFrame
     uncertainty: TriadUncertainty
     name: str
+    held: NDArray[np.bool_] | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.table, pd.DataFrame):
@@ -102,6 +107,13 @@ class RecordedTriad:
             )
         if not isinstance(self.uncertainty, TriadUncertainty):
             raise _kind(self.uncertainty, self.name, "uncertainty", "give a TriadUncertainty")
+        if self.held is not None and np.shape(self.held) != (len(self.table), 3):
+            raise ConfigError(
+                f"it has the shape {np.shape(self.held)}, and the table {len(self.table)} rows",
+                file=self.name,
+                quantity="held",
+                remedy="leave it out: what is at an end of the range as recorded is found",
+            )
 
 
 @dataclass(frozen=True, eq=False)

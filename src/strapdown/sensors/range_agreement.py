@@ -22,6 +22,8 @@ MOST_SD = 0.1
 # An element this far from the unit matrix is another axis or another sign, no scale factor.
 OTHER_AXIS = 0.5
 LEAST_SAMPLES = 20
+# An axis that moves by less than this part of what another does is told by the other's errors.
+LEAST_PART = 0.05
 # Scale factors make less of a difference than this.
 NEAR_G = 0.15
 
@@ -107,7 +109,8 @@ def agreement_findings(
             continue
         upper, lower = data.accelerometers[j][clear], data.accelerometers[j - 1][clear]
         # Noise in the lower range pulls the slope towards zero: only what moves well above it.
-        moved = lower.std(axis=0) > 3.0 * np.median(noise[j - 1], axis=0)
+        swing = lower.std(axis=0)
+        moved = swing > np.maximum(3.0 * np.median(noise[j - 1], axis=0), LEAST_PART * swing.max())
         matrix, sd = regress_range(upper, lower)
         for row, axis in enumerate("xyz"):
             told = (sd[row] < MOST_SD) & moved

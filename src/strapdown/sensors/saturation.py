@@ -48,7 +48,13 @@ class RangeLimits:
     beyond: Mask
 
 
-def find_limits(time: Array, values: Array, full_scale: Array, quantization: Array) -> RangeLimits:
+def find_limits(
+    time: Array,
+    values: Array,
+    full_scale: Array,
+    quantization: Array,
+    held: Mask | None = None,
+) -> RangeLimits:
     """Find the ends of a triad's range and the samples that stand there.
 
     Parameters
@@ -60,6 +66,8 @@ def find_limits(time: Array, values: Array, full_scale: Array, quantization: Arr
         As stated; may be infinite.
     quantization : ndarray, (3,)
         Step of the output; zero where there is none.
+    held : ndarray of bool, (n, k), optional
+        Samples in which others count that stood at an end: a low-pass swings beyond it there.
 
     Returns
     -------
@@ -79,7 +87,8 @@ def find_limits(time: Array, values: Array, full_scale: Array, quantization: Arr
     for k in range(axes):
         y, full = values[:, k], float(full_scale[k])
         slack = max(float(quantization[k]), ROUNDING * full) if np.isfinite(full) else 0.0
-        beyond[k] = bool(np.abs(y).max(initial=0.0) > full + slack)
+        own = y if held is None else y[~held[:, k]]
+        beyond[k] = bool(np.abs(own).max(initial=0.0) > full + slack)
         if np.isfinite(full):
             clipped[:, k] = (np.abs(y) >= full - slack) & (np.abs(y) <= full + slack)
         for sign in (1.0, -1.0):

@@ -22,7 +22,7 @@ from strapdown.sensors.unit_clocks import (
     clocks_by_correlation,
     clocks_by_trigger,
 )
-from strapdown.sensors.units_together import check_options, compare_sizes
+from strapdown.sensors.units_together import check_options, check_rate, compare_sizes
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -164,6 +164,7 @@ def synchronise(
     by_name = {u.name: u for u in units}
     check_lenders(by_name)
     given = [_channels(u) for u in units]
+    check_rate(rate, [g.step for u in given for t in _triads(u) for g in t.groups])
     findings = [f for u in given for t in _triads(u) for f in t.findings]
     findings += compare_sizes([(u.gyro, u.accelerometers) for u in given])
     zero_sd = 0.0
@@ -220,8 +221,8 @@ def _made(
 ) -> SynchronisedUnit:
     made = replace(
         unit,
-        accelerometers=tuple(a.triad for a in accelerometers),
-        gyro=None if gyro is None else gyro.triad,
+        accelerometers=tuple(_marked(a) for a in accelerometers),
+        gyro=None if gyro is None else _marked(gyro),
         trigger=0.0,
         trigger_sd=clock.sd,
         lender=lender,
@@ -236,6 +237,12 @@ def _made(
         None if lender is None else lender.name,
         gyro_time_sd,
     )
+
+
+def _marked(at: TriadAtStamps) -> RecordedTriad:
+    """A triad that knows where its record was held, if a low-pass hides it from its values."""
+    hidden = at.method in ("decimated", "averaged")
+    return replace(at.triad, held=at.clipped) if hidden else at.triad
 
 
 def _parts(u: UnitChannels) -> list[tuple[TriadChannels, RecordedTriad, list[str]]]:

@@ -18,6 +18,8 @@ METHODS = ("trigger", "correlation")
 DEGREES_APART = (40.0, 80.0)
 # And specific forces by this when one is in g; they differ from place to place, too.
 G_APART = (8.0, 12.0)
+# Common stamps that are closer than this make work, and no knowledge.
+MOST_FASTER = 10.0
 
 
 def check_options(
@@ -61,6 +63,30 @@ def check_options(
             f"there is no unit {reference!r}",
             quantity="reference",
             remedy=nearest(reference, names),
+        )
+
+
+def check_rate(rate: float, steps: Sequence[float]) -> None:
+    """Refuse common stamps that no record has anything to say of.
+
+    Parameters
+    ----------
+    rate : float, Hz
+    steps : sequence of float, s
+        Of the records.
+
+    Raises
+    ------
+    ConfigError
+        The rate is more than ten times that of the fastest.
+    """
+    fastest = 1.0 / min(steps)
+    if rate > MOST_FASTER * fastest:
+        raise ConfigError(
+            f"{rate:g} Hz is more than {MOST_FASTER:g} times the {fastest:.5g} Hz of the fastest "
+            "record",
+            quantity="rate",
+            remedy=f"use {fastest:.5g} Hz or less: nothing is known between samples",
         )
 
 

@@ -12,7 +12,7 @@ from strapdown.crash.gnss_start import GnssEntry
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
-from strapdown.sensors.triad_numbers import FARTHEST, triple
+from strapdown.sensors.triad_numbers import FARTHEST, finite, triple
 
 __all__ = ["check_crash_options"]
 
@@ -23,6 +23,7 @@ def check_crash_options(
     point: object,
     window: object,
     preparation: object,
+    peak_window: object,
     rule: object,
     gravity: object,
     mechanization: object,
@@ -58,12 +59,20 @@ def check_crash_options(
         raise _kind(
             preparation, "preparation", "give options of prepare_unit, as {'levelling': (0, 0, 1)}"
         )
-    for unit in units if isinstance(units, Sequence) else ():
-        own = None if preparation is None else preparation.get(unit.name, {})
-        if not (own is None or isinstance(own, Mapping)):
-            raise _kind(
-                own, f"preparation, {unit.name}", "give options, as {'levelling': (0, 0, 1)}"
-            )
+    names = {unit.name for unit in units}  # type: ignore[attr-defined]
+    for name, given in (preparation or {}).items():
+        remedy = (
+            "give options for all units as {'gravity': 9.81}, and those of one under its name, as "
+            "{'IMU1': {'levelling': (0, 0, 1)}}"
+        )
+        if name in names and not isinstance(given, Mapping):
+            raise _kind(given, f"preparation, {name}", remedy)
+        if name not in names and isinstance(given, Mapping):
+            raise ConfigError(f"there is no unit {name!r}", quantity="preparation", remedy=remedy)
+    if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
+        raise ConfigError(
+            f"{peak_window!r} is no length", quantity="peak_window", remedy="give s, as 0.030"
+        )
     if not isinstance(rule, EventRule):
         raise _kind(rule, "rule", "give an EventRule, or leave it out for 49 CFR 563")
     if not isinstance(gravity, int | float):

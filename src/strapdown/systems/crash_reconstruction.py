@@ -168,12 +168,16 @@ def reconstruct_crash(
     DivergenceError
         A path left what a vehicle can do.
     """
-    check_crash_options(units, entry, point, window, preparation, rule, gravity, mechanization)
+    check_crash_options(
+        units, entry, point, window, preparation, peak_window, rule, gravity, mechanization
+    )
     together = synchronise(units, method=clock, rate=rate, sampling=sampling, cut=False)
     findings = list(together.findings)
     there = prepare_together(together, point, gravity, preparation or {})
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
+    # Before each finds its own biases, which takes them from what tells how far two may differ.
+    comparison = compare_units(there) if len(there) > 1 else None
     tied: list[Entry | None] = [None if isinstance(entry, GnssEntry) else entry] * len(there)
     if isinstance(entry, GnssEntry):
         for k, of in enumerate(there):
@@ -192,7 +196,6 @@ def reconstruct_crash(
         )
 
     found = tuple(answers(of, start) for of, start in zip(there, tied, strict=True))
-    comparison = compare_units(there) if len(there) > 1 else None
     combined = answers(combine_units(there), tied[0]) if combine and len(there) > 1 else None
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings

@@ -10,7 +10,7 @@ from strapdown.crash.entry_priors import FixCorrelation
 from strapdown.crash.gnss_start import CONTRIBUTOR, GnssEntry, start_from_gnss
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
-from strapdown.exceptions import DataError
+from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.synchronise import synchronise
 from strapdown.simulation.crash_course import Setting
@@ -19,6 +19,7 @@ from strapdown.simulation.front_impacts import pole_impact
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.mounted_motion import MountedMotion
 from strapdown.simulation.paper_recorders import paper_units
+from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import GEODETIC, NED, VELOCITY
 
 CRASH = pole_impact(setting=Setting(stand=1.0, coast=2.0))
@@ -94,3 +95,33 @@ def test_a_mean_of_units_has_no_entry_of_its_own(cases):
     at, fixes, *_ = cases[0]
     with pytest.raises(DataError, match="let each unit find its entry"):
         start_from_gnss(replace(at, prepared=None), GnssEntry(fixes), (0.0, 0.0, 0.0))
+
+
+def test_units_that_find_their_own_biases_are_compared_with_them():
+    # What is left of the biases is as large as the noise of many samples: without it two units
+    # of one crash disagree beyond all chance.
+    designs = [d for d in paper_units() if d.gyro is not None]
+    fixes = simulate_gnss(CRASH.motion, RECEIVER, seed=2)
+    fixes.index = fixes.index - IMPACT
+    units = [record_crash(CRASH.motion, d, impact=IMPACT, seed=2)[0] for d in designs]
+    found = reconstruct_crash(units, GnssEntry(fixes, window=6.0, priors=PRIORS))
+    assert len(found.comparison.pairs) == 1
+    assert found.comparison.agree
+    # Nor are ranges blamed, whose 13 g ahead come in part on the axis to the side.
+    assert {f.quantity for f in found.findings} <= {"rest"}
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"antenna": (1.0, 2.0)}, "antenna: .* not three finite numbers"),
+        ({"priors": {"side_slip": 1.0}}, "did you mean 'side_slip_sd_deg'"),
+        ({"priors": {"antenna_sd": -1.0}}, "antenna_sd: -1.0 is no standard deviation"),
+        ({"window": "10"}, "window: '10' is no number"),
+        ({"before": np.nan}, "before: nan is no number"),
+    ],
+)
+def test_what_cannot_be_is_told(cases, options, words):
+    _, fixes, *_ = cases[0]
+    with pytest.raises(ConfigError, match=words):
+        GnssEntry(fixes, **options)

@@ -11,6 +11,7 @@ from tests.unit.crash.crash_case import RATE, prepared
 from strapdown import rotation
 from strapdown._kernels.perturbed_runs import perturbed_runs
 from strapdown.crash.combined_effects import combine_effects
+from strapdown.crash.delta_v_bound import resolved_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.leg import PLACE, VELOCITY
 from strapdown.crash.monte_carlo import sample_paths
@@ -111,6 +112,40 @@ def test_backward_and_forward_meet(case):
     # The same increments met backward. Each path is told in the level of its own entry: 3 m on,
     # that is turned by 5e-7 rad, over 3 m of path.
     assert np.abs(other.table[NED].to_numpy() - moved).max() < 3.0**2 / 6.3e6
+
+
+@pytest.mark.parametrize("attitude", [False, True])
+@pytest.mark.parametrize("at", [0.0557, 0.0581])
+def test_an_entry_between_samples_is_carried_to_the_nearest(case, at, attitude):
+    motion, imu, unit, effects, _, path = case
+    # In the middle of the pulse half a sample is 0.3 m/s, and 0.1 deg of heading.
+    now = motion.trajectory(np.array([IMPACT + at])).iloc[0]
+    entry = Entry(
+        time=at,
+        velocity=(now["VN"], now["VE"], now["VD"]),
+        heading_deg=now["heading"],
+        attitude_deg=(now["roll"], now["pitch"]) if attitude else None,
+    )
+    other = reconstruct_path(imu, effects, unit.levelling, -0.1, entry, window=WINDOW)
+    moved = other.table[NED].to_numpy() - truth(motion, other.time)
+    moved += truth(motion, np.array([at]))
+    # What chords between samples leave out of a pulse, dt²/12 of its slope, is in the velocity
+    # over the rest of the path, and in the place it is linear in time.
+    slope = np.pi / LENGTH * 2.0 * np.hypot(*CHANGE[:2]) / LENGTH
+    assert np.abs(moved).max() < 1.5 * slope / RATE**2 / 12.0 * (WINDOW[1] + LENGTH)
+    turned = other.table["heading"].to_numpy() - path.table["heading"].to_numpy()
+    assert np.abs(rotation.within_half_turn(turned)).max() < 0.01
+    # A scale factor that is wrong has gained its share of what was felt in between.
+    (scale,) = (k for k, name in enumerate(other.names) if name == "imu1 high-g scale x")
+    row = int(np.searchsorted(imu.index, other.time[other.anchor] - 1e-9))
+    gained = effects.force[scale, row, 0] * (other.time[other.anchor] - at)
+    assert other.start[scale, 3] == pytest.approx(gained, rel=0.1)
+
+
+def test_an_entry_outside_of_the_record_is_named_and_no_window(case):
+    _, imu, unit, effects, *_ = case
+    with pytest.raises(DataError, match="entry: the entry at 9 s is not within"):
+        reconstruct_path(imu, effects, unit.levelling, -0.1, Entry.from_speed(7.1, 0.05, time=9.0))
 
 
 def test_every_unknown_grows_as_navigation_does(case):
@@ -222,6 +257,30 @@ def test_noise_alone(case):
     have = np.diagonal(samples.covariance, axis1=1, axis2=2)[-1]
     want = np.diagonal(path.covariance, axis1=1, axis2=2)[-1]
     assert np.abs(have / want - 1.0).max() < 4 * np.sqrt(2 / 4000)
+
+
+@pytest.mark.parametrize("at", [-0.05, 0.05, 0.3])
+def test_noise_of_a_change_before_after_and_about_the_entry(case, at):
+    _, imu, unit, effects, *_ = case
+    silent = replace(
+        effects,
+        names=(),
+        contributors=(),
+        force=effects.force[:0],
+        rate=effects.rate[:0],
+        rest_force=effects.rest_force[:0],
+        tilt=effects.tilt[:0],
+        # So that what the gyros do to the attitude shows beside the noise of the force.
+        rate_noise=np.full_like(effects.rate_noise, 0.02),
+    )
+    stated = Entry.from_covariance(at, (2.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.zeros((6, 6)))
+    path = reconstruct_path(imu, silent, unit.levelling, None, stated, window=WINDOW)
+    runs = sample_paths(path, runs=4000, seed=2).errors[:, :, VELOCITY]
+    first, last = np.searchsorted(path.time, [-1e-9, 0.1 - 1e-9])
+    have = (runs[:, last] - runs[:, first]).std(axis=0)
+    bound = resolved_delta_v_bound(path, float(path.time[first]), float(path.time[last]))
+    # Standard deviations of 4000 runs are known to 1/sqrt(8000) each.
+    assert np.abs(have / bound.sd - 1.0).max() < 4 / np.sqrt(8000)
 
 
 def test_shares_add_up(case):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,8 @@ from strapdown.crash.prepare import prepare_unit
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.prepared_unit import FROM_GRAVITY
+from strapdown.sensors.synchronise import synchronise
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
 
 _spec = importlib.util.spec_from_file_location(
@@ -271,6 +274,68 @@ def test_a_gap_is_told():
     assert "without a sample from 0.2" in words(prepare_unit(made)) or "from 0.195" in words(
         prepare_unit(made)
     )
+
+
+@pytest.mark.parametrize(("offset", "drift"), [(0.0013, 0.0), (0.0, 5e-4)])
+def test_perfect_sensors_off_the_common_stamps_are_not_blamed(offset, drift):
+    # Their standard deviations are zero, and what interpolation leaves is infinitely many.
+    made, *_ = unit(
+        noisy=False,
+        low=TriadUncertainty(full_scale=8 * G),
+        high=TriadUncertainty(full_scale=100 * G),
+        gyro=TriadUncertainty(),
+        high_bias=(0.0, 0.0, 0.0),
+        gyro_bias=(0.0, 0.0, 0.0),
+    )
+
+    def late(table):
+        table.index = table.index * (1.0 + drift) + offset
+        return table
+
+    for part in (0, 1, "gyro"):
+        made = changed(made, part, late)
+    (at,) = synchronise([made]).units
+    out = prepare_unit(at.unit)
+    assert (out.range_spoken[:, 0] > 0).any()
+    assert not out.findings
+
+
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+def test_a_low_range_that_rings_into_its_end_does_not_speak_behind_a_low_pass(sampling):
+    # 12 g at 195 Hz, which dies away in 30 ms, come to a pulse of 13 g: the low range is cut on
+    # either side, and what a low-pass leaves of that is well within it.
+    made, force, _ = unit(rate=2000.0, noisy=False, low_bias=(0.0,) * 3, high_bias=(0.0,) * 3)
+    time = made.accelerometers[0].table.index.to_numpy()
+    after = np.maximum(time - 0.001, 0.0)
+    rings = 12 * G * np.exp(-after / 0.030) * np.sin(2 * np.pi * 195.0 * after)
+
+    def ringing(full):
+        def edit(table):
+            table["accel_x"] = np.clip(force[:, 0] + rings, -full, full)
+            return table
+
+        return edit
+
+    made = changed(changed(made, 0, ringing(2 * G)), 1, ringing(100 * G))
+    # The integral of a damped sine, w / (w² + 1/tau²).
+    turning = 2 * np.pi * 195.0
+    left = 12 * G * turning / (turning**2 + 0.030**-2)
+    (at,) = synchronise([made], sampling=sampling).units
+    out = prepare_unit(at.unit)
+    stamps, cut = at.accelerometers[0].triad.table.index.to_numpy(), np.abs(force[:, 0] + rings)
+    for first, last in itertools.pairwise(stamps[np.abs(stamps) < 0.2]):
+        within = cut[(time > first) & (time < last)]
+        if within.max() > 2 * G:
+            row = int(np.searchsorted(stamps, last - 1e-9))
+            assert out.range_spoken[row - 1 : row + 1, 0].all() or sampling == "mean"
+            assert out.range_spoken[row, 0] == 1
+    assert "reads more than" not in words(out)
+    changed_by = np.trapezoid((out.imu["accel_x"] - force[0, 0])[-0.2:0.4], dx=0.005)
+    if sampling == "mean":
+        changed_by = (out.imu["accel_x"] - force[0, 0])[-0.2:0.4].sum() * 0.005
+    truth = np.trapezoid((force[:, 0] - force[0, 0])[np.abs(time - 0.1) < 0.3], dx=5e-4) + left
+    # Of 7.2 m/s; speaking where it was cut, the low range took a metre per second of it.
+    assert changed_by == pytest.approx(truth, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,10 @@ import pytest
 from strapdown import CrashUnit, Entry, Mounting, TriadUncertainty, reconstruct_crash, sample_paths
 from strapdown.crash.reference_path import compare_with_reference
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.mounted_motion import MountedMotion
 from strapdown.simulation.paper_recorders import paper_units
 from strapdown.tables import NED
@@ -104,6 +106,27 @@ class TestEntry:
         reconstruct_crash([short], None, preparation={"moving_at_impact": False})
         reconstruct_crash([short], ENTRY)
 
+    def test_a_level_velocity_on_a_slope_is_told(self):
+        # 10 deg up: 1.2 m/s that the entry leaves out.
+        slope = np.radians(10.0)
+        up = np.array([np.cos(slope), 0.0, -np.sin(slope)])
+        motion = CrashMotion(
+            4.0,
+            Origin(45.0, 20.0, 100.0),
+            tuple(7.1 * up),
+            (HaversinePulse(2.0, 0.113, tuple(-7.2 * up)),),
+            pitch_deg=10.0,
+        )
+        unit, _ = record_crash(motion, DESIGNS["IMU1"], impact=2.0, seed=1)
+        # It coasts, and so is level to what the sensors leave: 2 deg.
+        options = {"preparation": {"steady_acceleration": 0.0}}
+        level = reconstruct_crash([unit], ENTRY, **options).findings
+        (told,) = (f for f in level if f.quantity == "entry")
+        assert "is 0 m/s upward" in told.what
+        assert "deg up from level" in told.what
+        climbing = Entry(0.0, tuple(7.1 * up), 0.0)
+        assert not any(f.quantity == "entry" for f in reconstruct_crash([unit], climbing).findings)
+
     @pytest.mark.parametrize(
         ("make", "words"),
         [
@@ -148,6 +171,11 @@ class TestArguments:
             ({"preparation": {"rest": (-3, -5)}}, "is no stretch"),
             ({"preparation": {"margin": "x"}}, "IMU1, margin: 'x'"),
             ({"preparation": {"impact": np.nan}}, "IMU1, impact: nan"),
+            ({"preparation": {"IMU9": {}}}, "preparation: there is no unit 'IMU9'"),
+            ({"preparation": {"IMU1": 3}}, "preparation, IMU1: this is of kind int"),
+            ({"peak_window": "30"}, "peak_window: '30' is no length"),
+            ({"peak_window": 0.0}, "peak_window: 0.0 is no length"),
+            ({"rate": 1e6}, "1e\\+06 Hz is more than 10 times the 200 Hz"),
             ({"rule": None}, "rule: this is of kind NoneType"),
             ({"gravity": "9.8"}, "gravity: this is of kind str"),
             ({"gravity": 1.0}, "gravity nowhere on the ground"),

@@ -1,0 +1,78 @@
+"""The samples of a record that a path is given at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+
+Array = NDArray[np.float64]
+
+#: Where a path is wanted if nothing is said, s from the trigger: Tadic and Vukajlovic (2016).
+WINDOW = (-0.1, 0.75)
+
+
+def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> tuple[int, int, int]:
+    """Find the first, the entry's and the last sample of a path.
+
+    Parameters
+    ----------
+    imu : DataFrame
+    at : float, s
+        Instant of the entry.
+    window : (float, float), s, optional
+        `WINDOW`, as far as there is a record, if not given.
+
+    Returns
+    -------
+    first, anchor, last : int
+        The entry's is the sample nearest to it, and within the path in any case.
+
+    Raises
+    ------
+    DataError
+        The record does not hold the entry or the window.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    if not time[0] - slack <= at <= time[-1] + slack:
+        raise DataError(
+            f"the entry at {at:.6g} s is not within the record, which has {time[0]:.6g} s to "
+            f"{time[-1]:.6g} s",
+            file=imu.attrs.get("source"),
+            quantity="entry",
+            remedy="give the velocity at an instant of the record",
+        )
+    begin, end = (float(x) for x in (_usual(time, at) if window is None else window))
+    if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
+        raise DataError(
+            f"the window from {begin:g} s to {end:g} s is not within the record, which has "
+            f"{time[0]:.6g} s to {time[-1]:.6g} s",
+            file=imu.attrs.get("source"),
+            quantity="window",
+            remedy="choose a window within it, its start before its end, in s from the trigger"
+            + _overlap(begin, end, time),
+        )
+    anchor = int(np.argmin(np.abs(time - at)))
+    first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
+    last = max(int(np.searchsorted(time, end + 1e-9, side="right")) - 1, anchor)
+    return first, anchor, last
+
+
+def _usual(time: Array, at: float) -> tuple[float, float]:
+    """The usual window, as far as there is a record; the entry is within in any case."""
+    return (
+        min(max(WINDOW[0], float(time[0])), at),
+        max(min(WINDOW[1], float(time[-1])), at + 1e-6),
+    )
+
+
+def _overlap(begin: float, end: float, time: Array) -> str:
+    low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
+    high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
+    return f": window=({low:g}, {high:g})" if low < high else ""
