@@ -30,3 +30,21 @@ def angle_rates(roll_pitch_heading: ArrayLike) -> Array:
     out[:, 2, 0], out[:, 2, 1] = c * np.tan(pitch), s * np.tan(pitch)
     out[:, 2, 2] = 1.0
     return out
+
+
+def angles_sd(roll_pitch_heading: ArrayLike, covariance: Array) -> Array:
+    """Standard deviations of the angles, to first order.
+
+    Parameters
+    ----------
+    roll_pitch_heading : array_like, (n, 3), deg
+    covariance : ndarray, (n, 3, 3), rad²
+        Of the rotation vector in local level, as `angle_rates` takes it.
+
+    Returns
+    -------
+    ndarray, (n, 3), deg
+    """
+    rates = angle_rates(roll_pitch_heading)
+    turned = np.einsum("nij,njk,nlk->nil", rates, covariance, rates)
+    return np.asarray(np.degrees(np.sqrt(np.diagonal(turned, axis1=1, axis2=2))))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.sample_effects import SampleEffects
+from strapdown.crash.window_weights import window_weights
 from strapdown.rotation import cross_matrix
 from strapdown.tables import ACCEL, GYRO
 
@@ -89,7 +90,7 @@ def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int
     Parameters
     ----------
     imu : DataFrame
-        Imu table. Between instantaneous samples the signal is a line.
+        Imu table; between its samples as `window_weights` says.
     effects : SampleEffects
         On the same samples.
     instant : float, s
@@ -99,15 +100,10 @@ def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int
     """
     time = imu.index.to_numpy(dtype=np.float64)
     length = float(time[row] - instant)
-    weights = np.zeros(len(time))
-    if imu.attrs.get("sampling") == "mean":
-        # A mean is of the interval that ends at its stamp.
-        weights[min(row + (length < 0.0), len(time) - 1)] = length
-    else:
-        other = int(np.clip(row - 1 if length > 0.0 else row + 1, 0, len(time) - 1))
-        away = abs(length / (time[row] - time[other])) if other != row else 0.0
-        weights[row] += length * (1.0 - 0.5 * away)
-        weights[other] += length * 0.5 * away
+    inside = min(max(instant, float(time[0])), float(time[-1]))
+    sampling = str(imu.attrs.get("sampling", "instantaneous"))
+    weights = window_weights(time, inside, float(time[row]), sampling)
+    weights[row] += inside - instant
     near = np.flatnonzero(weights)
     few = weights[near]
     return ToStamp(

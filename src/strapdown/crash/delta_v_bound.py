@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.by_contributor import NOISE, by_contributor
 from strapdown.crash.leg import ATTITUDE, VELOCITY
 from strapdown.crash.path import CrashPath
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.exceptions import DataError
+from strapdown.rotation import cross_matrix
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
-
-NOISE = "sensor noise"
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,27 +170,22 @@ def _noise_between(path: CrashPath, start: float, end: float) -> Array:
 def _turn_effect(path: CrashPath, start: float, end: float) -> Array:
     """What a turn of the attitude at `start` does to the velocity at `end`: (3, 3), m/s per rad."""
     gained = path.table[["VN", "VE", "VD"]].to_numpy()[None]
-    x, y, z = (_at(path.time, gained, end) - _at(path.time, gained, start))[0]
+    felt = (_at(path.time, gained, end) - _at(path.time, gained, start))[0]
     # Gravity is not turned by the attitude; what was felt is.
-    z = z - GRAVITY * (end - start)
-    return np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
+    felt[2] -= GRAVITY * (end - start)
+    return -cross_matrix(felt)
 
 
 def _bound(
     each: Array, contributors: tuple[str, ...], noise: Array, at_ends: ArrayLike | None
 ) -> DeltaVBound:
     products = np.einsum("pi,pj->pij", each, each).reshape(-1, 9)
-    columns = [a + b for a in "xyz" for b in "xyz"]
-    table = pd.DataFrame(products, columns=columns)
-    table = table.groupby(list(contributors), sort=False).sum()
-    extra = {NOISE: noise}
+    more = {NOISE: noise.ravel()}
     if at_ends is not None:
         ends = np.asarray(at_ends, dtype=np.float64)
-        extra["time of the window"] = ends.T @ ends
-    for name, covariance in extra.items():
-        already = table.loc[name].to_numpy() if name in table.index else np.zeros(9)
-        table.loc[name] = already + covariance.ravel()
-    table.index.name = "contributor"
+        more["time of the window"] = (ends.T @ ends).ravel()
+    columns = [a + b for a in "xyz" for b in "xyz"]
+    table = by_contributor(products, columns, contributors, more)
     return DeltaVBound(table.to_numpy().sum(axis=0).reshape(3, 3), table)
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.crash.angle_rates import angle_rates
+from strapdown.crash.angle_rates import angles_sd
 from strapdown.exceptions import Finding
 from strapdown.nav_state import NavState
 
@@ -111,9 +111,8 @@ class EntryState:
     @property
     def roll_pitch_heading_sd(self) -> Array:
         """Standard deviations of these angles to first order, (3,), deg; not near a pitch of 90."""
-        turned = angle_rates(self.state.roll_pitch_heading[None])[0]
-        block = turned @ self.covariance[ATTITUDE, ATTITUDE] @ turned.T
-        return np.asarray(np.degrees(np.sqrt(np.diag(block))))
+        block = self.covariance[ATTITUDE, ATTITUDE]
+        return np.asarray(angles_sd(self.state.roll_pitch_heading[None], block[None])[0])
 
     def with_biases_off(self, imu: pd.DataFrame) -> pd.DataFrame:
         """Return an Imu table without the biases that were found."""

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from strapdown import frames, rotation
 from strapdown._kernels.ned import ALT, LAT, LON, Q, V
-from strapdown.crash.angle_rates import angle_rates
+from strapdown.crash.angle_rates import angles_sd
 from strapdown.crash.between_stamps import ToStamp, to_stamp
+from strapdown.crash.by_contributor import NOISE, by_contributor
 from strapdown.crash.entry import Entry
-from strapdown.crash.leg import PLACE, VELOCITY, Leg, make_leg
+from strapdown.crash.leg import ATTITUDE, PLACE, VELOCITY, Leg, make_leg
 from strapdown.crash.path_window import path_rows
 from strapdown.crash.reconstruction_summary import path_line
 from strapdown.crash.sample_effects import SampleEffects
@@ -91,9 +92,7 @@ class CrashPath:
         Of the angles to first order, away from a pitch of 90 deg.
         """
         root = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
-        to_angles = angle_rates(self.table[EULER].to_numpy())
-        turned = np.einsum("nij,njk,nlk->nil", to_angles, self.covariance[:, :3, :3], to_angles)
-        angles = np.degrees(np.sqrt(np.diagonal(turned, axis1=1, axis2=2)))
+        angles = angles_sd(self.table[EULER], self.covariance[:, ATTITUDE, ATTITUDE])
         values = np.concatenate([root[:, PLACE], root[:, VELOCITY], angles], axis=1)
         return pd.DataFrame(values, index=self.table.index, columns=[*NED, *VELOCITIES, *EULER])
 
@@ -121,13 +120,8 @@ class CrashPath:
                 quantity="row",
                 remedy=f"the path has {len(self.time)} samples, counted from 0, or back from -1",
             )
-        squares = pd.DataFrame(self.errors[:, row] ** 2, columns=ERROR)
-        table = squares.groupby(list(self.contributors), sort=False).sum()
-        table.loc["sensor noise"] = table.reindex(["sensor noise"]).fillna(0.0).iloc[
-            0
-        ].to_numpy() + np.diagonal(self.noise_covariance[row])
-        table.index.name = "contributor"
-        return table
+        noise = {NOISE: np.diagonal(self.noise_covariance[row])}
+        return by_contributor(self.errors[:, row] ** 2, ERROR, self.contributors, noise)
 
 
 def reconstruct_path(
@@ -332,7 +326,7 @@ def _carried(
     return _Begin(
         state,
         tuple(f"noise before the entry {k + 1}" for k in range(len(columns))),
-        tuple("sensor noise" for _ in columns),
+        tuple(NOISE for _ in columns),
         np.concatenate([errors, columns]),
         rotation.rotate(at_rest, turning) if zeroed else np.zeros(3),
     )
