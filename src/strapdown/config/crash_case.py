@@ -106,11 +106,11 @@ class ReferenceSpec(TableSpec):
     source: str = ""
     #: Of a path: time, north, east, down of the reference point, with or without their sd.
     path: str | None = None
-    #: Of a change of velocity: of the axis, from time zero to `at_s`.
+    #: Of a change of velocity: along the axis, over the span; over the event, if not given.
     delta_v_m_per_s: FiniteFloat | None = None
     delta_v_sd_m_per_s: NotNegative = 0.0
     axis: Literal["forward", "right", "resultant"] = "forward"
-    at_s: FiniteFloat | None = None
+    over_s: Pair | None = None
 
 
 class OptionsSpec(TableSpec):

@@ -29,6 +29,7 @@ from strapdown.config import AttitudeSpec, ReproduceSpec, SimulateSpec, Trajecto
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.attitude import write_attitude
+from strapdown.report.crash_case import rerun_crash
 from strapdown.report.reproduction import make_reproduction, write_reproduction
 from strapdown.report.simulation import write_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
@@ -81,8 +82,13 @@ def _rerun_reproduction(configuration: dict[str, Any], out: Path, sealed: set[st
     return write_reproduction(make_reproduction(ReproduceSpec.model_validate(configuration)), out)
 
 
+def _rerun_crash(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    return rerun_crash(configuration, out)
+
+
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "attitude": _rerun_attitude,
+    "crash": _rerun_crash,
     "reproduce": _rerun_reproduction,
     "simulate": _rerun_simulation,
 }

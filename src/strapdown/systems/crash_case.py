@@ -2,56 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
-import pandas as pd
-
-from strapdown.config.crash_case import CaseSpec, ReferenceSpec
-from strapdown.crash.monte_carlo import PathSamples
-from strapdown.crash.reference_path import PathComparison
-from strapdown.crash.severity_model import InjuryRisk
+from strapdown.config.crash_case import CaseSpec, TriadSpec
+from strapdown.crash.entry import Entry
+from strapdown.crash.event_rule import EventRule
+from strapdown.crash.gnss_start import GnssEntry
+from strapdown.crash.monte_carlo import PathSamples, sample_paths
+from strapdown.crash.path import CrashPath
 from strapdown.exceptions import Finding
 from strapdown.formats.crash_record import CrashRecord
+from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.named_columns import read_fixes, read_reference_path
 from strapdown.results import InputFiles
 from strapdown.sensors.crash_unit import CrashUnit
-from strapdown.systems.crash_reconstruction import CrashReconstruction
+from strapdown.systems.attitude_source import input_files, sensor_file
+from strapdown.systems.case_references import ReferenceAnswer, compare_reference
+from strapdown.systems.case_severity import SeverityAnswer, case_severity
+from strapdown.systems.case_units import case_unit
+from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 
-__all__ = ["CaseResult", "ReferenceAnswer", "SeverityAnswer"]
+__all__ = ["CaseResult", "run_case", "whole_records"]
 
+Progress = Callable[[str, float], None]
 
-@dataclass(frozen=True, eq=False)
-class SeverityAnswer:
-    """What one model says, or why it says nothing."""
-
-    model: str
-    source: str
-    outcome: str
-    risk: InjuryRisk | None
-    because: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class ReferenceAnswer:
-    """The answers beside something else that is known.
-
-    Attributes
-    ----------
-    spec : ReferenceSpec
-    table : DataFrame or None
-        Of a path, as read.
-    path : PathComparison or None
-    delta_v, sd : float, m/s
-        Of ours over the same span; NaN for a path.
-    consistent : bool
-        Whether the difference is within the bounds of both.
-    """
-
-    spec: ReferenceSpec
-    table: pd.DataFrame | None
-    path: PathComparison | None
-    delta_v: float
-    sd: float
-    consistent: bool
+# Numbers that a Monte Carlo may hold at once: half a gigabyte.
+MOST_NUMBERS = 64_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +39,9 @@ class CaseResult:
     Attributes
     ----------
     spec : CaseSpec
-        Resolved.
+        Resolved; a record of several files is named by its folder.
     inputs : tuple of InputFiles
-        The case file (role ``case``), the records (``record``), sensors, references.
+        The case file (role ``case``), records (``record``), sensors, references, fixes.
     records : dict of str to CrashRecord
         By path as the case names it.
     units : tuple of CrashUnit
@@ -73,6 +51,7 @@ class CaseResult:
         Of the main path's Monte Carlo.
     severity : tuple of SeverityAnswer
     references : tuple of ReferenceAnswer
+        Of the main answer, then of every unit by itself.
     findings : tuple of Finding
         Of reading and reconstruction, in this order.
     """
@@ -86,3 +65,184 @@ class CaseResult:
     severity: tuple[SeverityAnswer, ...]
     references: tuple[ReferenceAnswer, ...]
     findings: tuple[Finding, ...]
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+def run_case(
+    spec: CaseSpec, case_file: Path | None = None, progress: Progress = _silent
+) -> CaseResult:
+    """Read the records of a case and reconstruct it.
+
+    Parameters
+    ----------
+    spec : CaseSpec
+        With absolute paths.
+    case_file : Path, optional
+        Where it was read from: an input, too.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    CaseResult
+
+    Raises
+    ------
+    ConfigError
+        A file is not there, or an option cannot be.
+    DataError
+        A record cannot be used; the message names file, row, quantity and remedy.
+    DivergenceError
+        A path left what a vehicle can do.
+    """
+    progress("reading", 0.02)
+    records, spec = whole_records(spec)
+    findings = [f for record in records.values() for f in record.findings]
+    units = tuple(case_unit(unit, records) for unit in spec.units)
+    tables = {r.path: read_reference_path(r.path) for r in spec.references if r.path is not None}
+    entry = _entry(spec)
+    inputs = _inputs(spec, case_file, records)
+    progress("reconstructing", 0.15)
+    options = spec.options
+    made = reconstruct_crash(
+        units,
+        entry,
+        point=spec.point.position_m,
+        window=options.window_s,
+        rate=options.rate_hz,
+        sampling=options.sampling,
+        clock=options.clock,
+        combine=options.combine,
+        preparation=_preparation(spec),
+        peak_window=options.peak_window_s,
+        rule=EventRule(zero_at=options.zero_at),
+        gravity=options.gravity_m_per_s2,
+    )
+    findings += made.findings
+    progress("drawing possible paths", 0.4)
+    samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed)
+    findings += said
+    references = tuple(
+        compare_reference(reference, unit, options.gravity_m_per_s2, tables)
+        for reference in spec.references
+        for unit in dict.fromkeys((made.main, *made.units))
+    )
+    return CaseResult(
+        spec,
+        inputs,
+        records,
+        units,
+        made,
+        samples,
+        case_severity(spec, made.main),
+        references,
+        tuple(dict.fromkeys(findings)),
+    )
+
+
+def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
+    """Read the records of a case, and name each of several files by its folder.
+
+    Raises
+    ------
+    ConfigError, DataError
+        As `read_crash_record`.
+    """
+    read = {t.path: read_crash_record(t.path) for t in _triads(spec)}
+    moved = {path: str(_whole(path, record)) for path, record in read.items()}
+    units = tuple(
+        unit.model_copy(
+            update={
+                "accelerometers": tuple(
+                    t.model_copy(update={"path": moved[t.path]}) for t in unit.accelerometers
+                ),
+                "gyro": None
+                if unit.gyro is None
+                else unit.gyro.model_copy(update={"path": moved[unit.gyro.path]}),
+            }
+        )
+        for unit in spec.units
+    )
+    records = {moved[path]: record for path, record in read.items()}
+    return records, spec.model_copy(update={"units": units})
+
+
+def _whole(path: str, record: CrashRecord) -> Path:
+    """The file, or the folder that holds all files of the record."""
+    given = Path(path)
+    return given.parent if given.is_file() and len(record.files) > 1 else given
+
+
+def _triads(spec: CaseSpec) -> Iterator[TriadSpec]:
+    for unit in spec.units:
+        yield from unit.accelerometers
+        if unit.gyro is not None:
+            yield unit.gyro
+
+
+def _inputs(
+    spec: CaseSpec, case_file: Path | None, records: dict[str, CrashRecord]
+) -> tuple[InputFiles, ...]:
+    found = [] if case_file is None else [input_files("case", str(case_file), (case_file,))]
+    found += [input_files("record", path, record.files) for path, record in records.items()]
+    for sensor in dict.fromkeys(t.sensor for t in _triads(spec)):
+        found += sensor_file(sensor)
+    others = [("reference", r.path) for r in spec.references if r.path is not None]
+    others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
+    found += [input_files(role, path, (Path(path),)) for role, path in dict.fromkeys(others)]
+    return tuple(found)
+
+
+def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
+    entry = spec.entry
+    if entry.kind == "standstill":
+        return None
+    if entry.kind == "gnss":
+        assert entry.path is not None
+        return GnssEntry(
+            read_fixes(entry.path), impact=entry.time_s, antenna=entry.antenna_m or (0.0, 0.0, 0.0)
+        )
+    assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
+    return Entry.from_speed(
+        entry.speed_m_per_s,
+        entry.speed_sd_m_per_s,
+        time=entry.time_s,
+        heading_deg=entry.heading_deg,
+        heading_sd_deg=entry.heading_sd_deg,
+        slip_deg=entry.slip_deg,
+        slip_sd_deg=entry.slip_sd_deg,
+        climb_sd=entry.climb_sd_m_per_s,
+        source=entry.source,
+    )
+
+
+def _preparation(spec: CaseSpec) -> dict[str, dict[str, object]]:
+    made: dict[str, dict[str, object]] = {}
+    for unit in spec.units:
+        own: dict[str, object] = {}
+        if unit.rest_s is not None:
+            own["rest"] = unit.rest_s
+        if unit.levelling_deg is not None:
+            own["levelling"] = (*unit.levelling_deg, unit.levelling_sd_deg)
+        if own:
+            made[unit.name] = own
+    return made
+
+
+def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None, list[Finding]]:
+    if runs == 0:
+        return None, []
+    most = max(2, MOST_NUMBERS // (9 * len(path.time)))
+    if runs <= most:
+        return sample_paths(path, runs=runs, seed=seed), []
+    return sample_paths(path, runs=most, seed=seed), [
+        Finding(
+            f"{runs} runs of {len(path.time)} samples would need more than half a gigabyte; "
+            f"{most} were made",
+            quantity="options, monte_carlo_runs",
+            remedy="take a lower rate_hz or a shorter window_s",
+        )
+    ]

@@ -1,0 +1,30 @@
+"""What ``strapdown crash`` prints."""
+
+from __future__ import annotations
+
+from strapdown.cli.console import console, print_table
+from strapdown.report.crash_limits import limitations
+from strapdown.report.crash_tables import answers_table, comparison_table, path_table
+from strapdown.report.crash_words import headline
+from strapdown.report.document import TableBlock
+from strapdown.systems.crash_case import CaseResult
+
+__all__ = ["print_crash"]
+
+
+def print_crash(result: CaseResult) -> None:
+    """Print the answers of a case, and what limits them."""
+    out = console()
+    for block in (answers_table(result), path_table(result), comparison_table(result)):
+        if block is not None and block.rows:
+            _print(block)
+    out.print(headline(result), style="bold")
+    found = limitations(result)
+    if found:
+        out.print("\nWhat limits it (more in the report):")
+        for head, _ in found:
+            out.print(f"  - {head}")
+
+
+def _print(block: TableBlock) -> None:
+    print_table(block.columns, block.rows, text=block.text, strong=block.strong)

@@ -1,0 +1,191 @@
+"""Tables whose columns have names that are fixed, with or without a unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, nearest
+from strapdown.formats import read_raw
+from strapdown.formats.recording import RawLog
+from strapdown.tables import NED, POSITION_SD, gnss_table
+from strapdown.tables.columns import GEODETIC, VELOCITY, VELOCITY_SD
+
+__all__ = ["read_fixes", "read_reference_path"]
+
+Array = NDArray[np.float64]
+
+#: What a unit is, and its factor to the one that the tables have.
+UNITS: dict[str, tuple[str, float]] = {
+    "s": ("s", 1.0),
+    "ms": ("s", 1e-3),
+    "m": ("m", 1.0),
+    "cm": ("m", 1e-2),
+    "mm": ("m", 1e-3),
+    "deg": ("deg", 1.0),
+    "m/s": ("m/s", 1.0),
+    "km/h": ("m/s", 1.0 / 3.6),
+}
+_HEAD = re.compile(r"\s*([A-Za-z][A-Za-z_ ]*?)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*")
+_ENDINGS = {"_m_per_s": "m/s", "_km_per_h": "km/h", "_mm": "mm", "_ms": "ms", "_deg": "deg"}
+_ENDINGS |= {"_m": "m", "_s": "s"}
+
+
+def read_reference_path(path: str | Path) -> pd.DataFrame:
+    """Read the path of a point, as cameras or a survey give it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A table with the columns ``time north east down``, and, where it is not exact,
+        ``north_sd east_sd down_sd``; s and m, if no column says ``[ms]`` or ``[mm]``.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by time in s, in m.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file.
+    DataError
+        A column is missing or not understood, a value is no number, or time does not advance.
+    """
+    raw = read_raw(Path(path))
+    units = {"time": "s"} | dict.fromkeys([*NED, *POSITION_SD], "m")
+    found = _columns(raw, units, ["time", *NED])
+    has_sd = [name for name in POSITION_SD if name in found]
+    if has_sd and len(has_sd) < len(POSITION_SD):
+        missing = next(name for name in POSITION_SD if name not in found)
+        raise DataError(
+            "it is missing, while another standard deviation is there",
+            file=raw.name,
+            quantity=missing,
+            remedy="give the standard deviations of all three components, or of none",
+        )
+    time = found.pop("time")
+    _check_advances(raw, time)
+    table = pd.DataFrame(found, index=pd.Index(time, name="time"))[[*NED, *has_sd]]
+    table.attrs["source"] = raw.name
+    return table
+
+
+def read_fixes(path: str | Path) -> pd.DataFrame:
+    """Read the fixes of a satellite receiver.
+
+    Parameters
+    ----------
+    path : str or Path
+        A table with the columns of a Gnss table and ``time``: ``lat lon`` deg, ``alt`` m,
+        ``VN VE VD`` m/s, ``north_sd east_sd down_sd`` m, ``VN_sd VE_sd VD_sd`` m/s; ``quality``
+        may be left out.
+
+    Returns
+    -------
+    DataFrame
+        A Gnss table; time as it stands in the file.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file.
+    DataError
+        A column is missing or not understood, or as `gnss_table`.
+    """
+    raw = read_raw(Path(path))
+    units = {"time": "s", "lat": "deg", "lon": "deg", "alt": "m", "quality": ""}
+    units |= dict.fromkeys([*VELOCITY, *VELOCITY_SD], "m/s") | dict.fromkeys(POSITION_SD, "m")
+    wanted = [name for name in units if name != "quality"]
+    found = _columns(raw, units, wanted)
+
+    def block(names: Sequence[str]) -> Array:
+        return np.column_stack([found[name] for name in names])
+
+    return gnss_table(
+        found["time"],
+        block(GEODETIC),
+        block(VELOCITY),
+        block(POSITION_SD),
+        block(VELOCITY_SD),
+        found.get("quality"),
+        source=raw.name,
+    )
+
+
+def _columns(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> dict[str, Array]:
+    """Columns by their name, in the units of the tables."""
+    by_lower = {name.lower(): name for name in units}
+    found: dict[str, Array] = {}
+    for head, values in raw.columns.items():
+        name, unit = _name_and_unit(head, by_lower)
+        unit = unit or raw.units.get(head, "")
+        if name is None:
+            continue
+        factor = 1.0
+        if unit:
+            of, factor = UNITS.get(unit, ("", 1.0))
+            if of != units[name]:
+                raise DataError(
+                    f"its unit is '{unit}', and {units[name] or 'none'} is needed",
+                    file=raw.name,
+                    quantity=head,
+                    remedy=f"use one of {', '.join(u for u in UNITS if UNITS[u][0] == units[name])}",
+                )
+        found[name] = _numbers(raw, head, values) * factor
+    for name in wanted:
+        if name not in found:
+            raise DataError(
+                f"there is no column '{name}'",
+                file=raw.name,
+                quantity="columns",
+                remedy=f"it needs {', '.join(wanted)}; {nearest(name, raw.columns)}",
+            )
+    return found
+
+
+def _name_and_unit(head: str, names: Mapping[str, str]) -> tuple[str | None, str]:
+    match = _HEAD.fullmatch(head)
+    if match is None:
+        return None, ""
+    word, unit = match[1].strip().replace(" ", "_"), match[2] or ""
+    if word.lower() in names:
+        return names[word.lower()], unit
+    for ending, of in _ENDINGS.items():
+        if word.lower().endswith(ending) and word.lower().removesuffix(ending) in names:
+            return names[word.lower().removesuffix(ending)], of
+    return None, ""
+
+
+def _numbers(raw: RawLog, name: str, values: NDArray[np.generic]) -> Array:
+    if values.dtype.kind not in "iuf":
+        raise DataError("it holds text", file=raw.name, quantity=name, remedy="give numbers alone")
+    numbers = values.astype(np.float64)
+    bad = np.flatnonzero(~np.isfinite(numbers))
+    if bad.size:
+        raise DataError(
+            f"{numbers[bad[0]]} is no number",
+            file=raw.name,
+            row=raw.row(int(bad[0])),
+            quantity=name,
+            remedy="give a finite number in every row, or take the row out",
+        )
+    return numbers
+
+
+def _check_advances(raw: RawLog, time: Array) -> None:
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if back.size:
+        k = int(back[0]) + 1
+        raise DataError(
+            f"time goes from {time[k - 1]:.6g} s to {time[k]:.6g} s",
+            file=raw.name,
+            row=raw.row(k),
+            quantity="time",
+            remedy="sort the rows by time, each instant once",
+        )

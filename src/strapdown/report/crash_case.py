@@ -1,0 +1,175 @@
+"""A crash case as files: page, PDF, JSON, tables and figures, sealed in a bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.config.crash_case import CaseSpec, read_case_spec
+from strapdown.report.chart import Chart
+from strapdown.report.crash_assumptions import CONVENTIONS
+from strapdown.report.crash_document import crash_document, drawings
+from strapdown.report.crash_figures import crash_figures
+from strapdown.report.crash_json import crash_json
+from strapdown.report.crash_signals import signals_table, trajectory_table, write_table
+from strapdown.report.document import Animation, ChartBlock, Document, Picture
+from strapdown.report.document_html import document_page
+from strapdown.report.document_pdf import write_pdf
+from strapdown.report.svg_chart import draw
+from strapdown.systems.crash_case import CaseResult, run_case
+
+__all__ = ["crash", "file_name", "rerun_crash", "write_crash"]
+
+Progress = Callable[[str, float], None]
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+def crash(
+    case: str | Path, out: str | Path, *, force: bool = False, progress: Progress = _silent
+) -> Seal:
+    """Reconstruct a crash from its case file and write the report as a sealed bundle.
+
+    Parameters
+    ----------
+    case : str or Path
+        The case, in TOML.
+    out : str or Path
+        Folder to make.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        The case does not hold together, or `out` may not be written.
+    DataError
+        A record cannot be used.
+    """
+    check_destination(Path(out), force)
+    spec = read_case_spec(Path(case))
+    result = run_case(spec, Path(case), progress)
+    return write_crash(result, out, force=force, progress=progress)
+
+
+def rerun_crash(configuration: dict[str, Any], out: Path) -> Seal:
+    """Run a sealed case again from its configuration."""
+    spec = CaseSpec.model_validate(configuration["case"])
+    path = configuration.get("case_path")
+    name = str(configuration["name"])
+    return write_crash(run_case(spec, None if path is None else Path(path)), out, name=name)
+
+
+def write_crash(
+    result: CaseResult,
+    out: str | Path,
+    *,
+    name: str | None = None,
+    force: bool = False,
+    progress: Progress = _silent,
+) -> Seal:
+    """Write the report of a case as a sealed bundle.
+
+    Parameters
+    ----------
+    result : CaseResult
+    out : str or Path
+        Folder to make.
+    name : str, optional
+        Of the folder, as the report names it; that of `out`, if not given.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        `out` exists and may not be replaced.
+    """
+    name = Path(out).absolute().name if name is None else name
+    case_file = next((str(i.path) for i in result.inputs if i.role == "case"), None)
+    progress("drawing the report", 0.55)
+    document = crash_document(result, crash_figures(result), name)
+    configuration = {
+        "name": name,
+        "case": result.spec.model_dump(mode="json", exclude_none=True),
+        **({} if case_file is None else {"case_path": case_file}),
+    }
+    seals: list[Seal] = []
+    with write_bundle(
+        Path(out),
+        command="crash",
+        configuration=configuration,
+        inputs=result.inputs,
+        force=force,
+        seals=seals,
+    ) as folder:
+        _write_numbers(result, folder)
+        progress("drawing the figures", 0.65)
+        (folder / "figures").mkdir()
+        _draw(document, folder / "figures")
+        progress("writing the page", 0.8)
+        (folder / "report.html").write_text(document_page(document), encoding="utf-8", newline="\n")
+        progress("setting the PDF", 0.85)
+        write_pdf(document, folder / "report.pdf")
+    return seals[0]
+
+
+def _write_numbers(result: CaseResult, folder: Path) -> None:
+    (folder / "crash.json").write_text(to_json(crash_json(result)), encoding="utf-8", newline="\n")
+    told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
+    main = result.reconstruction.main
+    write_table(trajectory_table(main.path), folder / "trajectory.csv", told)
+    made: set[str] = set()
+    for unit in result.reconstruction.answers:
+        own = file_name(unit.name, made)
+        write_table(signals_table(unit), folder / f"signals-{own}.csv", told)
+
+
+def file_name(name: str, made: set[str]) -> str:
+    """Return a name that may be a file's, another for each of those already made.
+
+    Parameters
+    ----------
+    name : str
+    made : set of str
+        Is added to.
+    """
+    plain = "".join(c if c.isascii() and c.isalnum() else "-" for c in name.lower()).strip("-")
+    plain = plain[:60] or "recorder"
+    own, number = plain, 2
+    while own in made:
+        own, number = f"{plain}-{number}", number + 1
+    made.add(own)
+    return own
+
+
+def _draw(document: Document, folder: Path) -> None:
+    for block in drawings(document):
+        match block:
+            case ChartBlock(chart=Chart() as chart):
+                draw(chart, folder / f"{chart.slug}.svg")
+            case Picture() as picture:
+                _write(folder / f"{picture.slug}.svg", picture.svg)
+            case Animation(stills=stills):
+                _write(folder / f"{stills.slug}.svg", stills.svg)
+            case _:
+                pass
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")

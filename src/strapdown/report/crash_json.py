@@ -1,0 +1,224 @@
+"""A crash case as plain data; every key carries its unit."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from strapdown import __version__
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.crash_type import CrashType
+from strapdown.crash.pdof import NedPdof
+from strapdown.crash.unit_comparison import UnitComparison
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.crash.velocity_change import EventChanges, VelocityChange
+from strapdown.report import crash_assumptions, crash_limits, crash_words
+from strapdown.systems.case_references import ReferenceAnswer
+from strapdown.systems.case_severity import SeverityAnswer, main_event
+from strapdown.systems.crash_case import CaseResult
+from strapdown.tables import EULER, NED, VELOCITY
+
+__all__ = ["crash_json"]
+
+AXES = ("forward", "right", "down")
+
+
+def crash_json(result: CaseResult) -> dict[str, Any]:
+    """Return a case as plain data.
+
+    Parameters
+    ----------
+    result : CaseResult
+
+    Returns
+    -------
+    dict
+        Bounds hold 95 %. What is no number is null.
+    """
+    made = result.reconstruction
+    return {
+        "schema": "strapdown crash 1",
+        "strapdown": __version__,
+        "title": result.spec.title,
+        "number": result.spec.number,
+        "conventions": dict(crash_assumptions.CONVENTIONS),
+        "headline": crash_words.headline(result),
+        "main": made.main.name,
+        "answers": [_unit(unit) for unit in made.answers],
+        "comparison": None if made.comparison is None else _comparison(made.comparison),
+        "severity": [_severity(s) for s in result.severity],
+        "references": [_reference(r) for r in result.references],
+        "assumptions": _pairs(crash_assumptions.assumptions(result)),
+        "limitations": _pairs(crash_limits.limitations(result)),
+        "findings": [vars(f) for f in result.findings],
+        "case": result.spec.model_dump(mode="json", exclude_none=True)
+        | {
+            "units": [
+                _named(unit.model_dump(mode="json", exclude_none=True))
+                for unit in result.spec.units
+            ]
+        },
+    }
+
+
+def _named(unit: dict[str, Any]) -> dict[str, Any]:
+    """A unit whose files are told by name: where they lie is no result."""
+    for triad in [*unit["accelerometers"], *([unit["gyro"]] if "gyro" in unit else [])]:
+        triad["path"] = _name(triad["path"])
+        if "sensor" in triad:
+            triad["sensor"] = _name(triad["sensor"])
+    return unit
+
+
+def _name(path: str) -> str:
+    return path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+
+
+def _pairs(rows: tuple[tuple[str, str], ...]) -> list[dict[str, str]]:
+    return [{"what": head, "text": text} for head, text in rows]
+
+
+def _number(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _about(value: float, half: float) -> dict[str, float | None]:
+    return {"value": _number(value), "low": _number(value - half), "high": _number(value + half)}
+
+
+def _unit(unit: UnitReconstruction) -> dict[str, Any]:
+    number = main_event(unit)
+    path = unit.path
+    table, sd = path.table.iloc[-1], path.sd.iloc[-1]
+    return {
+        "recorder": unit.name,
+        "main_event": None if number is None else number + 1,
+        "events": [
+            _event(unit, k, event, changes, kind)
+            for k, (event, changes, kind) in enumerate(
+                zip(unit.events.events, unit.body, unit.types, strict=True)
+            )
+        ],
+        "largest_change_without_event_m_per_s": unit.events.largest_change,
+        "path": {
+            "start_s": float(path.time[0]),
+            "end_s": float(path.time[-1]),
+            "entry_s": path.entry.time,
+            "entry_velocity_north_east_down_m_per_s": list(path.entry.velocity),
+            "end": {
+                **{f"{a}_m": _about(float(table[a]), TWO_SIDED_95 * float(sd[a])) for a in NED},
+                **{
+                    f"{a}_m_per_s": _about(float(table[a]), TWO_SIDED_95 * float(sd[a]))
+                    for a in VELOCITY
+                },
+                **{f"{a}_deg": _about(float(table[a]), TWO_SIDED_95 * float(sd[a])) for a in EULER},
+            },
+            "variances_at_the_end_m2": {
+                str(name): {a: float(row[a]) for a in NED}
+                for name, row in path.variances()[NED].iterrows()
+            },
+        },
+    }
+
+
+def _event(
+    unit: UnitReconstruction, k: int, event: CrashEvent, changes: EventChanges, kind: CrashType
+) -> dict[str, Any]:
+    ned = unit.ned[k]
+    return {
+        "event": k + 1,
+        "type": kind.name,
+        "because": kind.reason,
+        "time_zero_s": event.time_zero,
+        "time_zero_sd_s": event.time_zero_sd,
+        "time_zero_by": event.basis,
+        "end_s": event.end,
+        "lasts_beyond_record": event.lasts_beyond_record,
+        "starts_before_record": event.starts_before_record,
+        "peak_m_per_s2": event.peak,
+        "peak_time_s": event.peak_time,
+        "body": {"event": _change(changes.event), "peak": _change(changes.peak)},
+        "over_ground": None
+        if ned is None
+        else {"event": _change(ned.event), "peak": _change(ned.peak)},
+    }
+
+
+def _change(change: VelocityChange) -> dict[str, Any]:
+    axes = NED if change.delta_v.frame == "ned" else AXES
+    across, angle = change.interval.horizontal, change.pdof
+    return {
+        "start_s": change.delta_v.start,
+        "end_s": change.delta_v.end,
+        **{
+            f"{axis}_m_per_s": _about(float(v), h)
+            for axis, v, h in zip(axes, change.delta_v.vector, change.bound.half_width, strict=True)
+        },
+        "resultant_m_per_s": _about(change.resultant, change.resultant_bound),
+        "direction_of_force": {
+            **(
+                {"azimuth_deg": angle.azimuth_deg, "relative_deg": angle.relative_deg}
+                if isinstance(angle, NedPdof)
+                else {"horizontal_deg": angle.horizontal_deg}
+            ),
+            "low_deg": across.low_deg,
+            "high_deg": across.high_deg,
+            "undetermined": across.undetermined,
+            "vertical_deg": angle.vertical_deg,
+            "clock": angle.clock,
+        },
+    }
+
+
+def _comparison(comparison: UnitComparison) -> dict[str, Any]:
+    return {
+        "agree": comparison.agree,
+        "probability": comparison.probability,
+        "chi_square": comparison.chi_square,
+        "freedom": comparison.freedom,
+        "pairs": [
+            {
+                "first": pair.first,
+                "second": pair.second,
+                "difference_m_per_s": pair.difference[-1].tolist(),
+                "sd_m_per_s": pair.sd[-1].tolist(),
+                "chi_square": pair.chi_square,
+                "freedom": pair.freedom,
+                "probability": pair.probability,
+                "agree": pair.agree,
+            }
+            for pair in comparison.pairs
+        ],
+    }
+
+
+def _severity(answer: SeverityAnswer) -> dict[str, Any]:
+    risk = answer.risk
+    return {
+        "model": answer.model.name,
+        "outcome": answer.model.outcome,
+        "source": answer.model.source,
+        "probability": None if risk is None else risk.probability,
+        "low": None if risk is None else risk.low,
+        "high": None if risk is None else risk.high,
+        "because": answer.because,
+    }
+
+
+def _reference(answer: ReferenceAnswer) -> dict[str, Any]:
+    found, spec = answer.path, answer.spec
+    return {
+        "reference": spec.name,
+        "kind": spec.kind,
+        "source": spec.source,
+        "recorder": answer.unit,
+        "start_s": answer.span[0],
+        "end_s": answer.span[1],
+        "delta_v_m_per_s": _number(answer.delta_v),
+        "sd_m_per_s": _number(answer.sd),
+        "reference_delta_v_m_per_s": spec.delta_v_m_per_s,
+        "rms_m": None if found is None else list(found.rms),
+        "largest_m": None if found is None else list(found.largest),
+        "consistent": answer.consistent,
+    }

@@ -1,0 +1,110 @@
+"""Numbers of a crash report as a reader sees them: rounded by their bound, with their unit."""
+
+from __future__ import annotations
+
+import math
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.pdof_interval import AngleInterval
+
+__all__ = [
+    "KMH",
+    "about",
+    "angle_range",
+    "instant",
+    "plain",
+    "side_words",
+    "speed",
+    "speed_range",
+]
+
+#: m/s in km/h.
+KMH = 3.6
+G = STANDARD_GRAVITY
+MINUS = "\u2212"
+# A bound is told to this many digits, and its value to the same place.
+DIGITS = 2
+
+
+def plain(value: float, places: int) -> str:
+    """Write a number to so many places, with a real minus, and zero without a sign.
+
+    Parameters
+    ----------
+    value : float
+    places : int
+
+    Returns
+    -------
+    str
+        A dash for what is no number.
+    """
+    if not math.isfinite(value):
+        return "–"
+    text = f"{value:.{places}f}"
+    if float(text) == 0.0:
+        text = text.removeprefix("-")
+    return text.replace("-", MINUS)
+
+
+def _places(half: float) -> int:
+    """Places at which a bound has its second digit, at most four."""
+    if not (math.isfinite(half) and half > 0.0):
+        return 2
+    return min(4, max(0, DIGITS - 1 - math.floor(math.log10(half))))
+
+
+def about(value: float, half: float, unit: str) -> str:
+    """Write a value with the half width of its bound.
+
+    Parameters
+    ----------
+    value, half : float
+        In the unit.
+    unit : str
+
+    Returns
+    -------
+    str
+        As ``7.34 ± 0.27 m/s``.
+    """
+    places = _places(half)
+    return f"{plain(value, places)} ± {plain(half, places)} {unit}".rstrip()
+
+
+def speed(value: float, half: float) -> str:
+    """Write a speed in m/s with its bound, in km/h."""
+    return about(KMH * value, KMH * half, "km/h")
+
+
+def speed_range(value: float, half: float) -> str:
+    """Write the bound of a speed in m/s as a range, in km/h and m/s."""
+    places = _places(KMH * half)
+    low, high = KMH * (value - half), KMH * (value + half)
+    return (
+        f"{plain(low, places)} to {plain(high, places)} km/h with 95 %; {about(value, half, 'm/s')}"
+    )
+
+
+def instant(time: float) -> str:
+    """Write an instant or a length of time in s, to a tenth of a millisecond."""
+    text = plain(time, 4).rstrip("0")
+    return f"{text}0 s" if text.endswith(".") else f"{text} s"
+
+
+def angle_range(interval: AngleInterval) -> str:
+    """Write the bound of a direction."""
+    if interval.undetermined:
+        return "not determined: no direction is excluded with 95 %"
+    return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95 %"
+
+
+def side_words(forward: float, right: float) -> str:
+    """Say in words which way a change of velocity is, or a displacement: ``backward``."""
+    ahead = "forward" if forward > 0.0 else "backward"
+    aside = "to the right" if right > 0.0 else "to the left"
+    if abs(forward) > 2.5 * abs(right):
+        return ahead
+    if abs(right) > 2.5 * abs(forward):
+        return aside
+    return f"{ahead} and {aside}"

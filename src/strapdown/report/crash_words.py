@@ -1,0 +1,230 @@
+"""What a case found, in sentences; terminal, page and PDF say the same."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.pdof import Pdof
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.report.crash_values import (
+    KMH,
+    about,
+    angle_range,
+    instant,
+    plain,
+    side_words,
+    speed,
+    speed_range,
+)
+from strapdown.report.document import KeyFigure
+from strapdown.systems.case_severity import main_event
+from strapdown.systems.crash_case import CaseResult
+from strapdown.tables import NED
+
+__all__ = [
+    "axis_names",
+    "direction",
+    "entry_words",
+    "headline",
+    "key_figures",
+    "lead",
+    "path_words",
+    "units_words",
+]
+
+TYPES = {
+    "front": "an impact from the front",
+    "right": "an impact from the right",
+    "rear": "an impact from behind",
+    "left": "an impact from the left",
+    "rollover": "a rollover",
+    "undetermined": "of a type that the bounds leave open",
+}
+
+
+def headline(result: CaseResult) -> str:
+    """Return the answer in one sentence."""
+    unit = result.reconstruction.main
+    number = main_event(unit)
+    if number is None:
+        size, axis = unit.events.largest_change, unit.events.largest_axis
+        return (
+            f"There is no event after 49 CFR 563 in the record: the {axis} velocity changed by "
+            f"{plain(KMH * size, 1)} km/h at most within 150 ms, where 8 km/h make one."
+        )
+    whole = unit.body[number].event
+    return (
+        f"Delta-V {speed(whole.resultant, whole.resultant_bound)}; direction of force "
+        f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
+    )
+
+
+def direction(unit: UnitReconstruction, number: int) -> str:
+    """Return the direction of force of an event with its bound."""
+    whole = unit.body[number].event
+    across = whole.interval.horizontal
+    if across.undetermined:
+        return angle_range(across)
+    angle = whole.pdof
+    assert isinstance(angle, Pdof)
+    return f"{plain(angle.horizontal_deg, 1)}° ({angle_range(across)}), {angle.clock} o'clock"
+
+
+def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
+    """Return the numbers of page one."""
+    unit = result.reconstruction.main
+    number = main_event(unit)
+    figures = []
+    if number is None:
+        figures.append(KeyFigure("Delta-V", "no event", headline(result)))
+    else:
+        changes = unit.body[number]
+        whole, peak = changes.event, changes.peak
+        event = unit.events.events[number]
+        ms = 1e3 * (peak.delta_v.end - peak.delta_v.start)
+        figures.append(
+            KeyFigure(
+                "Delta-V",
+                speed(whole.resultant, whole.resultant_bound),
+                speed_range(whole.resultant, whole.resultant_bound),
+                f"over the event, {instant(event.time_zero)} to {instant(event.end)}; largest in "
+                f"{ms:.3g} ms {speed(peak.resultant, peak.resultant_bound)}",
+            )
+        )
+        across = whole.interval.horizontal
+        value = "not determined"
+        if not across.undetermined:
+            angle = whole.pdof
+            value = f"{plain(getattr(angle, 'horizontal_deg', np.nan), 1)}°, {angle.clock} o'clock"
+        figures.append(
+            KeyFigure(
+                "Direction of force",
+                value,
+                angle_range(across),
+                "where the force came from: 0° the front, clockwise seen from above",
+            )
+        )
+    place, half = _end(unit)
+    figures.append(
+        KeyFigure(
+            "Path",
+            f"{plain(float(np.hypot(*place[:2])), 2)} m",
+            ", ".join(
+                f"{name} {about(p, h, 'm')}"
+                for name, p, h in zip(axis_names(result), place, half, strict=True)
+            )
+            + " with 95 %",
+            f"from the place at {instant(unit.path.entry.time)} to that at "
+            f"{instant(unit.path.time[-1])}, {_axes(result)}",
+        )
+    )
+    return tuple(figures)
+
+
+def lead(result: CaseResult) -> str:
+    """Return the one paragraph of page one."""
+    unit = result.reconstruction.main
+    number = main_event(unit)
+    parts = []
+    if number is None:
+        parts.append(headline(result))
+    else:
+        changes = unit.body[number]
+        whole, peak = changes.event, changes.peak
+        event = unit.events.events[number]
+        forward, right = float(whole.delta_v.vector[0]), float(whole.delta_v.vector[1])
+        length = 1e3 * (event.end - event.time_zero)
+        parts.append(
+            f"Within {length:.0f} ms from {instant(event.time_zero)} the velocity of the "
+            f"{result.spec.point.name} changed by "
+            f"{speed(whole.resultant, whole.resultant_bound)} ("
+            f"{about(whole.resultant, whole.resultant_bound, 'm/s')}; all bounds hold 95 %), "
+            f"{side_words(forward, right)}. The force came from "
+            f"{direction(unit, number)}: {TYPES[unit.types[number].name]}."
+        )
+        others = len(unit.body) - 1
+        if others:
+            parts.append(
+                f"It is the largest of {len(unit.body)} events; the others are told under Delta-V."
+            )
+        parts.append(
+            f"The largest change within {1e3 * (peak.delta_v.end - peak.delta_v.start):.3g} ms was "
+            f"{speed(peak.resultant, peak.resultant_bound)}."
+        )
+    parts += [entry_words(result), path_words(result), units_words(result)]
+    return " ".join(p for p in parts if p)
+
+
+def entry_words(result: CaseResult) -> str:
+    """Return how the vehicle came, and how that is known."""
+    entry = result.spec.entry
+    if entry.kind == "standstill":
+        return "The vehicle stood still when the record began."
+    if entry.kind == "gnss":
+        at = result.reconstruction.main.path.entry
+        size = float(np.linalg.norm(at.velocity))
+        return (
+            f"At {instant(at.time)} it moved at {plain(KMH * size, 1)} km/h, found from the fixes "
+            "of a satellite receiver before the impact."
+        )
+    assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
+    half = TWO_SIDED_95 * entry.speed_sd_m_per_s
+    source = f" ({entry.source})" if entry.source else ""
+    return (
+        f"It entered at {speed(entry.speed_m_per_s, half)}{source}, which is stated and not found "
+        "from the record."
+    )
+
+
+def path_words(result: CaseResult) -> str:
+    """Return where the path ends."""
+    unit = result.reconstruction.main
+    place, half = _end(unit)
+    (ahead, aside, _), (first, second, _) = (axis_names(result), place)
+    return (
+        f"{instant(unit.path.time[-1])} after the trigger the {result.spec.point.name} was "
+        f"{about(first, half[0], 'm')} {ahead} and {about(second, half[1], 'm')} {aside} of where "
+        f"it entered, {_axes(result)}."
+    )
+
+
+def units_words(result: CaseResult) -> str:
+    """Return how many recorders there are, and whether they agree."""
+    made = result.reconstruction
+    names = [u.name for u in made.units]
+    if len(names) == 1:
+        return f"All of this rests on one recorder, {names[0]}, beside which there is no other."
+    assert made.comparison is not None
+    told = "agree within what is stated of them" if made.comparison.agree else "DO NOT AGREE"
+    mean = "the weighted mean of" if made.combined is not None else f"{made.main.name}, one of"
+    return (
+        f"It is {mean} {len(names)} recorders ({', '.join(names)}), which {told} "
+        f"(probability {_probability(made.comparison.probability)} of differences as large or "
+        "larger)."
+    )
+
+
+def _probability(value: float) -> str:
+    return "below 0.0001" if value < 1e-4 else f"{value:.2g}"
+
+
+def axis_names(result: CaseResult) -> tuple[str, str, str]:
+    """Return the names of the axes of the path: over ground where a heading is known."""
+    entry = result.spec.entry
+    if entry.kind == "gnss" or entry.heading_deg:
+        return ("north", "east", "down")
+    return ("forward", "right", "down")
+
+
+def _axes(result: CaseResult) -> str:
+    if axis_names(result)[0] == "north":
+        return "over ground"
+    return "in the axes of the vehicle at the entry"
+
+
+def _end(unit: UnitReconstruction) -> tuple[list[float], list[float]]:
+    """Place at the end of the path and the half widths of its bound, m."""
+    place = unit.path.table[NED].iloc[-1].tolist()
+    half = (TWO_SIDED_95 * unit.path.sd[NED].iloc[-1]).tolist()
+    return place, half
