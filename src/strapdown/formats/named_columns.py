@@ -131,11 +131,12 @@ def _columns(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> di
         if unit:
             of, factor = UNITS.get(unit, ("", 1.0))
             if of != units[name]:
+                known = ", ".join(u for u in UNITS if UNITS[u][0] == units[name])
                 raise DataError(
                     f"its unit is '{unit}', and {units[name] or 'none'} is needed",
                     file=raw.name,
                     quantity=head,
-                    remedy=f"use one of {', '.join(u for u in UNITS if UNITS[u][0] == units[name])}",
+                    remedy=f"use one of {known}",
                 )
         found[name] = _numbers(raw, head, values) * factor
     for name in wanted:
