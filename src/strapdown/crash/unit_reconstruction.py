@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 #: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
 PEAK_WINDOW = 0.030
+NO_ROLL = "whether it rolled over cannot be told without a gyro about the forward axis"
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,6 +174,20 @@ def reconstruct_unit(
                     remedy="choose a window that holds the whole event",
                 )
             )
+    # Of a roll that was assumed nothing can be told.
+    rolled = "roll" not in at_point.assumed_axes
+    types = classify_crashes(
+        [changes.event.delta_v for changes in body],
+        [changes.event.bound.covariance for changes in body],
+        events=events.events,
+        time=acceleration.time if rolled else None,
+        roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64) if rolled else None,
+        start_roll_deg=at_point.levelling.roll_deg,
+        roll_rate_sd=effects.roll_bias_sd,
+        start_roll_sd_deg=at_point.levelling.sd_deg,
+    )
+    if not rolled:
+        types = tuple(replace(t, reason=f"{t.reason}; {NO_ROLL}") for t in types)
     return UnitReconstruction(
         at_point.name,
         at_point,
@@ -182,16 +197,7 @@ def reconstruct_unit(
         path,
         tuple(body),
         tuple(ned),
-        classify_crashes(
-            [changes.event.delta_v for changes in body],
-            [changes.event.bound.covariance for changes in body],
-            events=events.events,
-            time=acceleration.time,
-            roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64),
-            start_roll_deg=at_point.levelling.roll_deg,
-            roll_rate_sd=effects.roll_bias_sd,
-            start_roll_sd_deg=at_point.levelling.sd_deg,
-        ),
+        types,
         tuple(findings),
     )
 
