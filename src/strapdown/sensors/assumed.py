@@ -14,7 +14,7 @@ from strapdown.sensors.triad_numbers import finite, triple
 
 Array = NDArray[np.float64]
 
-__all__ = ["Assumed", "SHAPES", "assumed_shapes"]
+__all__ = ["SHAPES", "Assumed", "assumed_shapes"]
 
 #: Of the two shapes in time, in the order of `assumed_shapes`, for the names of unknowns.
 SHAPES = ("by the end", "on the way")

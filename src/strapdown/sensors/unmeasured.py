@@ -146,9 +146,9 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
                 f"{_listed(kept)} {over}{why}",
                 file=unit.name,
                 quantity="gyro",
-                remedy="a vehicle that turned more is not where the path says, nor is the direction "
-                f"of force; what it turned before and after is in no bound{rollover}. Give a gyro, "
-                "or borrow one with gyro_from",
+                remedy="a vehicle that turned more is not where the path says, nor came the force "
+                f"from where it says; turning before and after is in no bound{rollover}. Give a "
+                "gyro, or borrow one with gyro_from",
             )
         )
     absent = unit.accelerometers[0].absent
