@@ -73,10 +73,11 @@ def compare_units(
     Notes
     -----
     Only directions that both units measure are compared: what one assumes of an axis says nothing
-    of the other. With the difference d of the increments of velocity and its covariance C from all that both
-    units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the attitude that
-    all were levelled at) cancels in d and in C. Ringing that the structure has at one place and
-    not at the other, and whatever else was not stated, shows as a disagreement; its words say
+    of the other. With the difference d of the increments of velocity and its covariance C from
+    all that both units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the
+    attitude that all were levelled at) cancels in d and in C. Ringing that the structure has at
+    one place and not at the other, and whatever else was not stated, shows as a disagreement; its
+    words say
     where it is largest. Swapped axes, a turned mounting and wrong positions are looked for in each
     pair.
 

@@ -139,6 +139,7 @@ def reconstruct_unit(
     findings = [
         *events.findings,
         *entry_findings(at_point, entry, path, events, mechanization),
+        *_unseen(at_point, events),
     ]
     for event in events.events:
         ends = event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
@@ -200,6 +201,21 @@ def reconstruct_unit(
         types,
         tuple(findings),
     )
+
+
+def _unseen(at_point: AtPoint, events: CrashEvents) -> list[Finding]:
+    """An impact along an axis that is assumed is none of the events."""
+    blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
+    if events.events or not blind:
+        return []
+    return [
+        Finding(
+            f"an impact along {' or '.join(blind)} would not show: that axis is assumed",
+            file=at_point.name,
+            quantity="delta-V",
+            remedy="that no event was found says nothing of such an impact",
+        )
+    ]
 
 
 def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:

@@ -32,17 +32,6 @@ AXES = ("forward", "right", "down")
 TURNS = ("roll", "pitch", "heading")
 ALL = (0, 1, 2)
 NO_GYRO = "no gyro"
-# What an axis that is not there is wrong by is another matter.
-ERRORS = (
-    "noise_density",
-    "bias",
-    "scale",
-    "misalignment",
-    "nonlinearity_2",
-    "g_sensitivity",
-    "vibration_rectification",
-    "quantization",
-)
 # A vehicle axis that a missing one has this part of is one of those assumed (squared cosine).
 PART = 0.1
 
@@ -196,7 +185,16 @@ def _filled(triad: RecordedTriad, columns: list[str]) -> RecordedTriad:
 
     x, y, z = np.where(keep, u.axis("full_scale"), np.inf)
     told = replace(
-        u, full_scale=(float(x), float(y), float(z)), **{name: left(name) for name in ERRORS}
+        u,
+        full_scale=(float(x), float(y), float(z)),
+        noise_density=left("noise_density"),
+        bias=left("bias"),
+        scale=left("scale"),
+        misalignment=left("misalignment"),
+        nonlinearity_2=left("nonlinearity_2"),
+        g_sensitivity=left("g_sensitivity"),
+        vibration_rectification=left("vibration_rectification"),
+        quantization=left("quantization"),
     )
     return replace(triad, table=table, uncertainty=told, absent=absent)
 
