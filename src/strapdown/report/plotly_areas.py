@@ -12,7 +12,6 @@ from strapdown.report.plotly_numbers import numbers
 
 __all__ = ["bar_labels", "bar_traces", "fill_traces", "see_through"]
 
-_LAST = 1001  # after the lines' entries of the legend
 Axes = tuple[str, str]
 
 
@@ -58,7 +57,6 @@ def _fill_trace(fill: Fill, axes: Axes, named: set[str], has_line: bool) -> dict
         "mode": "lines",
         "name": name,
         "legendgroup": name,
-        "legendrank": _LAST,
         "showlegend": shown,
         "x": x[:-1],
         "y": y[:-1],

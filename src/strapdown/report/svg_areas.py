@@ -20,11 +20,12 @@ _PATTERN = {"": "", ".": ".."}
 
 def draw_fills(panel: Panel, axis: Axes) -> None:
     """Draw the bands of a panel, below its lines."""
+    lines = {line.name for line in panel.lines if line.legend}
     for fill in panel.fills:
-        _draw_fill(fill, axis)
+        _draw_fill(fill, axis, fill.legend and fill.name not in lines)
 
 
-def _draw_fill(fill: Fill, axis: Axes) -> None:
+def _draw_fill(fill: Fill, axis: Axes, named: bool) -> None:
     whole = np.zeros(fill.x.size, dtype=np.bool_)
     for run in runs(fill.x, fill.low, fill.high):
         whole[run] = True
@@ -36,7 +37,7 @@ def _draw_fill(fill: Fill, axis: Axes) -> None:
         color=fill.colour,
         alpha=fill.opacity,
         lw=0,
-        label=fill.name if fill.legend else "_",
+        label=fill.name if named else "_",
     )
 
 

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.lines import Line2D
 
 from strapdown.report.chart import BLUE, VERMILLION, Bars, Chart, Fill, Line, Panel, runs
 from strapdown.report.plotly_areas import see_through
@@ -40,8 +41,8 @@ def test_a_band_goes_there_and_back_and_a_gap_parts_it():
     assert band["y"] == [-1, 0, 2, 1, None, 2, 3, 5, 4]
     assert band["fillcolor"] == see_through(BLUE, 0.25) == "rgba(0,114,178,0.25)"
     assert (band["showlegend"], curve["showlegend"]) == (True, True)
-    # Matplotlib lists what is filled after the lines; so does the page.
-    assert band["legendrank"] > 1000
+    legend = notebook_figure(chart).legends[0]
+    assert [text.get_text() for text in legend.get_texts()] == ["95 %", "delta-V"]
 
 
 def test_a_band_of_a_line_is_one_entry_with_it():
@@ -52,6 +53,7 @@ def test_a_band_of_a_line_is_one_entry_with_it():
     assert band["legendgroup"] == curve["legendgroup"]
     legend = notebook_figure(chart).legends[0]
     assert [text.get_text() for text in legend.get_texts()] == ["delta-V"]
+    assert isinstance(legend.legend_handles[0], Line2D)
 
 
 def test_a_picture_draws_the_same_band():
