@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import unicodedata
 
-__all__ = ["LONGEST", "plain_text"]
+__all__ = ["plain_text"]
 
-LONGEST = 4000  # characters
 _CUT = "… ({} characters)"
 # More of them on one letter would run over the lines above and below.
 _MOST_COMBINING = 3
@@ -14,7 +13,7 @@ _MOST_COMBINING = 3
 _SHAPELESS = frozenset({"Cc", "Cf", "Cs", "Co"})
 
 
-def plain_text(text: str, limit: int = LONGEST, *, lines: bool = False) -> str:
+def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
     r"""Text in which every character is seen and none commands.
 
     Parameters

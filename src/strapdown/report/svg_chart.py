@@ -120,7 +120,7 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
                 return stream.getvalue()
 
     width = _PAPER_WIDTH if paper else _WIDTH
-    height = _height(chart) * (0.85 if paper else 1.0)
+    height = _height(chart) * (_PAPER_WIDTH / _WIDTH if paper else 1.0)
     figure = Picture(figsize=(width, height), layout=RoundedLayout())
     FigureCanvasAgg(figure)
     axes = _axes(chart, figure)
