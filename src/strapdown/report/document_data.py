@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
+from strapdown.exceptions import DataError
 from strapdown.report.chart import Chart
 from strapdown.report.document import (
     Animation,
@@ -22,12 +25,13 @@ from strapdown.report.document import (
 )
 from strapdown.report.document_text import plain_document
 
-__all__ = ["Numbered", "document_data", "draw_stills"]
+__all__ = ["document_data", "draw_stills"]
 
 Place = Callable[[str], str]
+_INTERVAL_MS = 60  # between frames, where an animation does not say
 
 
-def draw_stills(document: Document) -> dict[str, str]:
+def draw_stills(document: Document) -> tuple[str, ...]:
     """Draw the charts of a document for paper.
 
     Parameters
@@ -36,13 +40,12 @@ def draw_stills(document: Document) -> dict[str, str]:
 
     Returns
     -------
-    dict of str to str
-        SVG by the chart's slug.
+    tuple of str
+        An SVG of each, in their order.
     """
     plain = plain_document(document)
     blocks = [*plain.front, *(block for section in plain.sections for block in section.blocks)]
-    charts = {block.chart.slug: block.chart for block in blocks if isinstance(block, ChartBlock)}
-    return {slug: _drawn(chart) for slug, chart in charts.items()}
+    return tuple(_drawn(block.chart) for block in blocks if isinstance(block, ChartBlock))
 
 
 def _drawn(chart: Chart) -> str:
@@ -54,25 +57,8 @@ def _drawn(chart: Chart) -> str:
         return path.read_text(encoding="utf-8")
 
 
-class Numbered:
-    """Numbers of figures and tables, in their order; one for a whole document."""
-
-    def __init__(self) -> None:
-        self._figures = self._tables = 0
-
-    def figure(self) -> int:
-        """Return the number of the next figure."""
-        self._figures += 1
-        return self._figures
-
-    def table(self) -> int:
-        """Return the number of the next table."""
-        self._tables += 1
-        return self._tables
-
-
 def document_data(
-    document: Document, stills: dict[str, str], place: Place, *, alive: bool
+    document: Document, stills: Sequence[str], place: Place, *, alive: bool
 ) -> dict[str, Any]:
     """Return a document as data for a template.
 
@@ -80,7 +66,7 @@ def document_data(
     ----------
     document : Document
         Its texts are made plain here.
-    stills : dict of str to str
+    stills : sequence of str
         From `draw_stills`.
     place : callable
         Takes a whole SVG, and returns what the template refers to it by.
@@ -91,10 +77,14 @@ def document_data(
     -------
     dict
         Strings, numbers, lists and dicts; charts under ``figure`` where alive.
+
+    Raises
+    ------
+    DataError
+        If a picture is no XML.
     """
     plain = plain_document(document)
-    numbers = Numbered()
-    writer = _Writer(stills, place, numbers, alive)
+    writer = _Writer(iter(stills), place, alive)
     return {
         "title": plain.title,
         "subtitle": plain.subtitle,
@@ -118,13 +108,11 @@ def _pairs(rows: tuple[tuple[str, str], ...]) -> list[list[str]]:
 
 
 class _Writer:
-    """Blocks as data."""
+    """Blocks as data; figures and tables are numbered in their order."""
 
-    def __init__(
-        self, stills: dict[str, str], place: Place, numbers: Numbered, alive: bool
-    ) -> None:
-        self._stills, self._place = stills, place
-        self._numbers, self._alive = numbers, alive
+    def __init__(self, stills: Iterator[str], place: Place, alive: bool) -> None:
+        self._stills, self._place, self._alive = stills, place, alive
+        self._figures, self._tables = count(1), count(1)
 
     def block(self, block: Block) -> dict[str, Any]:
         """Return one block."""
@@ -139,7 +127,7 @@ class _Writer:
         if isinstance(block, ChartBlock):
             return self._chart(block.chart)
         if isinstance(block, Picture):
-            return self._picture(block) | {"kind": "picture", "number": self._numbers.figure()}
+            return self._picture(block) | {"kind": "picture", "number": next(self._figures)}
         if isinstance(block, Animation):
             return self._animation(block)
         return self._key_figures(block)
@@ -148,7 +136,7 @@ class _Writer:
         return {
             "kind": "table",
             "title": "",
-            "number": self._numbers.table() if table.caption else 0,
+            "number": next(self._tables) if table.caption else 0,
             "columns": list(table.columns),
             "rows": [list(row) for row in table.rows],
             "words": [index in table.text for index in range(len(table.columns))],
@@ -157,7 +145,7 @@ class _Writer:
         }
 
     def _chart(self, chart: Chart) -> dict[str, Any]:
-        number = self._numbers.figure()
+        number = next(self._figures)
         data: dict[str, Any] = {
             "kind": "chart",
             "number": number,
@@ -165,7 +153,7 @@ class _Writer:
             "title": chart.title,
             "caption": chart.caption,
             "alt": f"{chart.title}. {chart.caption}".strip(),
-            "still": self._place(self._stills[chart.slug]),
+            "still": self._place(next(self._stills)),
             "width_mm": 170.0,
             "still_caption": "",
         }
@@ -176,6 +164,15 @@ class _Writer:
         return data
 
     def _picture(self, picture: Picture) -> dict[str, Any]:
+        try:
+            ElementTree.fromstring(picture.svg)
+        except ElementTree.ParseError as error:
+            raise DataError(
+                f"the picture '{picture.slug}' is no SVG: {error}",
+                file="report",
+                quantity=picture.title,
+                remedy="Escape the texts in it.",
+            ) from error
         return {
             "number": 0,
             "still_caption": "",
@@ -187,7 +184,7 @@ class _Writer:
         }
 
     def _animation(self, animation: Animation) -> dict[str, Any]:
-        number = self._numbers.figure()
+        number = next(self._figures)
         data: dict[str, Any] = {
             **self._picture(animation.stills),
             "kind": "animation",
@@ -199,7 +196,7 @@ class _Writer:
         }
         if self._alive:
             data["figure"] = dict(animation.figure)
-            data["interval_ms"] = 60
+            data["interval_ms"] = int(animation.figure.get("interval_ms", _INTERVAL_MS))
         return data
 
     def _key_figures(self, block: KeyFigures) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+from collections.abc import Sequence
 from importlib.resources import files
 from typing import Any
 
@@ -16,14 +17,14 @@ __all__ = ["document_page"]
 _HEIGHT = 420  # pixels, of a figure that does not say
 
 
-def document_page(document: Document, *, stills: dict[str, str] | None = None) -> str:
+def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
     """Lay a document out as a page.
 
     Parameters
     ----------
     document : Document
         Texts are made plain by `document_text.plain_document`, then escaped.
-    stills : dict of str to str, optional
+    stills : sequence of str, optional
         Charts for paper from `document_data.draw_stills`, where they are drawn already.
 
     Returns

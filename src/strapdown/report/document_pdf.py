@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,14 @@ from typing import Any
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.report.document import Document
 from strapdown.report.document_data import document_data, draw_stills
+from strapdown.report.pdf_letters import shown
 
 __all__ = ["write_pdf"]
 
 _TEMPLATE = "document.typ"
 
 
-def write_pdf(document: Document, path: Path, *, stills: dict[str, str] | None = None) -> None:
+def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = None) -> None:
     """Write a document as a PDF of A4 pages.
 
     Parameters
@@ -25,7 +27,7 @@ def write_pdf(document: Document, path: Path, *, stills: dict[str, str] | None =
     document : Document
         Texts are made plain by `document_text.plain_document`, and reach typst as values only.
     path : Path
-    stills : dict of str to str, optional
+    stills : sequence of str, optional
         Charts for paper from `document_data.draw_stills`, where they are drawn already.
 
     Raises
@@ -37,13 +39,14 @@ def write_pdf(document: Document, path: Path, *, stills: dict[str, str] | None =
 
     Notes
     -----
-    No date, and no font but those inside typst. Typst reads from a folder of its own, which is
-    gone afterwards, and from nowhere else.
+    No date, and no font but those inside typst; what these cannot show stands as its number, such
+    as ``[U+1F697]``. Tagged, PDF/UA-1. Typst reads from a folder of its own, which is gone
+    afterwards, and from nowhere else.
     """
     path.write_bytes(_pdf(document, draw_stills(document) if stills is None else stills))
 
 
-def _pdf(document: Document, stills: dict[str, str]) -> bytes:
+def _pdf(document: Document, stills: Sequence[str]) -> bytes:
     typst = _typst()
     with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
         folder = Path(name)
@@ -53,32 +56,49 @@ def _pdf(document: Document, stills: dict[str, str]) -> bytes:
             nonlocal count
             count += 1
             file = f"picture-{count}.svg"
-            (folder / file).write_text(svg, encoding="utf-8", errors="replace", newline="\n")
+            (folder / file).write_text(shown(svg), encoding="utf-8", newline="\n")
             return file
 
         data = document_data(document, stills, place, alive=False)
-        text = json.dumps(data, ensure_ascii=True, allow_nan=False)
-        (folder / "document.json").write_text(text, encoding="ascii")
+        text = shown(json.dumps(data, ensure_ascii=False, allow_nan=False))
+        (folder / "document.json").write_text(text, encoding="utf-8", newline="\n")
         template = files("strapdown.report").joinpath("templates", _TEMPLATE).read_bytes()
         (folder / _TEMPLATE).write_bytes(template)
         try:
-            pdf: bytes = typst.compile(
-                str(folder / _TEMPLATE),
-                root=str(folder),
-                font_paths=[],
-                ignore_system_fonts=True,
-                format="pdf",
-                package_path=str(folder),
-                package_cache_path=str(folder),
-                timestamp=0,
-            )
+            return _compiled(typst, folder)
         except typst.TypstError as error:
             raise DataError(
                 f"the document cannot be laid out: {str(error).splitlines()[0]}",
                 file="report.pdf",
-                remedy="The page shows the same document; report what typst says.",
+                remedy="Mend the picture that typst names, or leave the PDF out: the page shows "
+                "the same document.",
             ) from error
-    return pdf
+
+
+def _compiled(typst: Any, folder: Path) -> bytes:
+    """Return the PDF, for readers of the screen if its letters allow it (PDF/UA-1)."""
+
+    def compiled(**options: Any) -> bytes:
+        pdf: bytes = typst.compile(
+            str(folder / _TEMPLATE),
+            root=str(folder),
+            font_paths=[],
+            ignore_system_fonts=True,
+            format="pdf",
+            package_path=str(folder),
+            package_cache_path=str(folder),
+            timestamp=0,
+            **options,
+        )
+        return pdf
+
+    try:
+        return compiled(pdf_standards="ua-1")
+    except typst.TypstError as error:
+        # Marks that no font joins to their letter are shown as boxes, which PDF/UA does not allow.
+        if "PDF/UA-1" not in str(error):
+            raise
+        return compiled()
 
 
 def _typst() -> Any:

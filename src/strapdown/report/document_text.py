@@ -38,6 +38,7 @@ _LIMITS: dict[type, dict[str, int]] = {
     Picture: {"caption": _WORDS, "alt": _WORDS, "title": _TITLE},
     Animation: {"caption": _WORDS, "title": _TITLE},
 }
+_MARKED = len("[U+10FFFF]")
 # What plotly may read as markup; it would make links of others.
 _MARKUP = re.compile(r"<(?!/?(?:b|i|br|sub|sup)\s*/?>)", re.IGNORECASE)
 _SLUG = re.compile(r"[^A-Za-z0-9_-]+")
@@ -81,7 +82,7 @@ def _field(owner: Any, name: str) -> Any:
     if name == "slug":
         return _SLUG.sub("-", value)[:80].strip("-") or "part"
     if isinstance(owner, Picture) and name == "svg":
-        return value
+        return plain_text(value, _MARKED * len(value) + 1, lines=True)
     if isinstance(owner, Animation) and name == "figure":
         return _plain_figure(value)
     if isinstance(owner, Paragraph) and owner.kind == "mono" and name == "text":
@@ -93,7 +94,7 @@ def _plain_figure(value: Any) -> Any:
     """Copy of plotly's plain data in which texts cannot link to anywhere."""
     if isinstance(value, str):
         # Numbers may be packed into long texts: nothing is cut.
-        return _MARKUP.sub("&lt;", plain_text(value, len(value) * 10 + 1))
+        return _MARKUP.sub("&lt;", plain_text(value, _MARKED * len(value) + 1))
     if isinstance(value, Mapping):
         return {str(key): _plain_figure(item) for key, item in value.items()}
     if isinstance(value, list | tuple):

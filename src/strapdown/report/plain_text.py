@@ -9,7 +9,7 @@ __all__ = ["plain_text"]
 _CUT = "… ({} characters)"
 # More of them on one letter would run over the lines above and below.
 _MOST_COMBINING = 3
-# Control, format (direction, zero width), lone surrogates, private use: none has a shape of its own.
+# Control, format (direction, zero width), lone surrogates, private use: none has its own shape.
 _SHAPELESS = frozenset({"Cc", "Cf", "Cs", "Co"})
 
 

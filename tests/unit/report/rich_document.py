@@ -120,7 +120,8 @@ def plan_chart(slug="plan-live"):
 def animation(slug="motion", text="0.00 s"):
     t = np.linspace(0.0, 1.0, 21)
     frames = [
-        {"name": f"{v:.2f} s", "data": [{"x": [0, 18 * v], "y": [0, 4 * v * v]}]} for v in t.tolist()
+        {"name": f"{v:.2f} s", "data": [{"x": [0, 18 * v], "y": [0, 4 * v * v]}]}
+        for v in t.tolist()
     ]
     layout = {
         "height": 360,
@@ -200,7 +201,9 @@ def rich_document(evil=(), charts=8):
         KeyFigures(
             (
                 KeyFigure("Change of velocity", "51.3 km/h", "\u00b1 2.1 km/h (95 %)", "14.3 m/s"),
-                KeyFigure("Direction of force", "\u221212\u00b0", "\u00b1 4\u00b0 (95 %)", "front left"),
+                KeyFigure(
+                    "Direction of force", "\u221212\u00b0", "\u00b1 4\u00b0 (95 %)", "front left"
+                ),
                 KeyFigure("Speed at impact", "48 km/h", "44 to 52 km/h (95 %)"),
                 KeyFigure("Duration", "0.104 s", "\u00b1 0.006 s (95 %)"),
             ),

@@ -3,8 +3,7 @@
 (function () {
   var still = window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 
-  function control(box, figure, plot) {
-    var names = figure.frames.map(function (f) { return f.name; });
+  function control(box, names, plot) {
     var button = box.querySelector("button");
     var slider = box.querySelector("input");
     var shown = box.querySelector("output");
@@ -14,7 +13,7 @@
       slider.value = k;
       shown.textContent = names[k];
       slider.setAttribute("aria-valuetext", names[k]);
-      Plotly.animate(plot, [names[k]], {
+      Plotly.animate(plot, [String(k)], {
         mode: "immediate",
         transition: {duration: 0},
         frame: {duration: 0, redraw: true}
@@ -43,14 +42,16 @@
     var box = document.getElementById(source.dataset.target);
     var plot = box.querySelector(".plot");
     var figure = JSON.parse(source.textContent);
-    figure.frames = (figure.frames || []).map(function (frame, k) {
-      return Object.assign({}, frame, {name: String(frame.name === undefined ? k : frame.name)});
+    var names = (figure.frames || []).map(function (frame, k) {
+      return String(frame.name === undefined ? k + 1 : frame.name);
     });
+    // Names need not differ; numbers do.
+    (figure.frames || []).forEach(function (frame, k) { frame.name = String(k); });
     figure.config = {responsive: true, displayModeBar: false, showTips: false};
     box.classList.add("live");
     try {
       Plotly.newPlot(plot, figure).then(function () {
-        if (figure.frames.length) { control(box, figure, plot); }
+        if (names.length) { control(box, names, plot); }
       });
     } catch (error) {
       box.classList.remove("live");
