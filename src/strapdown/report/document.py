@@ -117,7 +117,8 @@ class Animation:
     ----------
     slug : str
     figure : mapping
-        Plain data: ``data``, ``layout``, ``frames``.
+        Plain data: ``data``, ``layout``, ``frames``, each with a name that says when it is, and
+        ``interval_ms`` between them, if not 60. The page has the button and the slider.
     stills : Picture
     """
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from strapdown.report.chart import Chart, Line, Panel, steady_range
+from strapdown.report.svg_areas import draw_bars, draw_fills, fill_outline, set_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,12 +48,13 @@ _STYLE: Any = {
     "axes.axisbelow": True,
     "text.parse_math": False,
 }
-_WIDTH = 9.0  # inches
+_WIDTH, _PAPER_WIDTH = 9.0, 6.7  # inches
+_PAPER = {"font.size": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6}
 _DPI = 160
 _TITLE, _CAPTION = 90, 155  # characters a line
 
 
-def draw(chart: Chart, path: Path, *, caption: bool = False) -> None:
+def draw(chart: Chart, path: Path, *, caption: bool = False, paper: bool = False) -> None:
     """Draw a chart into an SVG or a PNG file, as its ending says.
 
     Parameters
@@ -60,9 +63,11 @@ def draw(chart: Chart, path: Path, *, caption: bool = False) -> None:
     path : Path
     caption : bool
         Whether the caption stands in the picture: where no page says it.
+    paper : bool
+        Whether the picture is for the column of a printed page, which says the title itself.
     """
-    with _own_style():
-        figure = _figure(chart, caption)
+    with _own_style(_PAPER if paper else {}):
+        figure = _figure(chart, caption, paper)
         if path.suffix == ".png":
             figure.savefig(path, format="png", dpi=_DPI, metadata={"Software": None})
         else:
@@ -86,7 +91,7 @@ def notebook_figure(chart: Chart) -> Figure:
 
 
 @contextmanager
-def _own_style() -> Iterator[None]:
+def _own_style(more: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
     """Not the style of whoever runs it: the picture belongs to the seal."""
     import matplotlib as mpl
 
@@ -94,11 +99,11 @@ def _own_style() -> Iterator[None]:
         # A letter that the font lacks, in a name of the user's, is a box.
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE)
+        mpl.rcParams.update(_STYLE | dict(more))
         yield
 
 
-def _figure(chart: Chart, caption: bool = False) -> Figure:
+def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -114,7 +119,9 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
                 self.savefig(stream, format="png", dpi=_DPI)
                 return stream.getvalue()
 
-    figure = Picture(figsize=(_WIDTH, _height(chart)), layout=RoundedLayout())
+    width = _PAPER_WIDTH if paper else _WIDTH
+    height = _height(chart) * (_PAPER_WIDTH / _WIDTH if paper else 1.0)
+    figure = Picture(figsize=(width, height), layout=RoundedLayout())
     FigureCanvasAgg(figure)
     axes = _axes(chart, figure)
     for panel, axis in zip(chart.panels, axes, strict=True):
@@ -134,7 +141,8 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
             rotation=90,
             ha="right",
         )
-    figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
+    if not paper:
+        figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
     entries: dict[str, Any] = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
@@ -145,7 +153,7 @@ def _figure(chart: Chart, caption: bool = False) -> Figure:
             list(entries.values()),
             list(entries),
             loc="outside lower left",
-            ncols=max(1, min(6, 110 // (widest + 6))),
+            ncols=max(1, min(6, (80 if paper else 110) // (widest + 6))),
             frameon=False,
             # Nothing else below the panels gives way to a legend.
             title=fill(chart.caption, _CAPTION) if caption else None,
@@ -187,6 +195,8 @@ def _height(chart: Chart) -> float:
 
 
 def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
+    draw_fills(panel, axis)
+    draw_bars(panel, axis)
     for line in panel.lines:
         _draw_line(line, axis)
     if chart.log_x:
@@ -215,6 +225,7 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
         )
     if (ends := steady_range(panel)) is not None:
         axis.set_ylim(*ends)
+    set_ticks(panel, axis)
     if panel.steady:
         axis.ticklabel_format(axis="y", useOffset=False)
     if panel.x_label:
@@ -228,6 +239,8 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
 
 
 def _draw_line(line: Line, axis: Axes) -> None:
+    if line.inside:
+        fill_outline(line, axis)
     # Matplotlib leaves a name that begins with an underscore out of the legend.
     style: dict[str, Any] = {
         "color": line.colour,

@@ -1,0 +1,210 @@
+"""A document as plain data, from which a page and a PDF are laid out alike."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from itertools import count
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from strapdown.exceptions import DataError
+from strapdown.report.chart import Chart
+from strapdown.report.document import (
+    Animation,
+    Block,
+    ChartBlock,
+    Document,
+    Facts,
+    Items,
+    KeyFigures,
+    Paragraph,
+    Picture,
+    TableBlock,
+)
+from strapdown.report.document_text import plain_document
+
+__all__ = ["document_data", "draw_stills"]
+
+Place = Callable[[str], str]
+_INTERVAL_MS = 60  # between frames, where an animation does not say
+
+
+def draw_stills(document: Document) -> tuple[str, ...]:
+    """Draw the charts of a document for paper.
+
+    Parameters
+    ----------
+    document : Document
+
+    Returns
+    -------
+    tuple of str
+        An SVG of each, in their order.
+    """
+    plain = plain_document(document)
+    blocks = [*plain.front, *(block for section in plain.sections for block in section.blocks)]
+    return tuple(_drawn(block.chart) for block in blocks if isinstance(block, ChartBlock))
+
+
+def _drawn(chart: Chart) -> str:
+    from strapdown.report.svg_chart import draw
+
+    with tempfile.TemporaryDirectory(prefix="strapdown-") as folder:
+        path = Path(folder) / "chart.svg"
+        draw(chart, path, paper=True)
+        return path.read_text(encoding="utf-8")
+
+
+def document_data(
+    document: Document, stills: Sequence[str], place: Place, *, alive: bool
+) -> dict[str, Any]:
+    """Return a document as data for a template.
+
+    Parameters
+    ----------
+    document : Document
+        Its texts are made plain here.
+    stills : sequence of str
+        From `draw_stills`.
+    place : callable
+        Takes a whole SVG, and returns what the template refers to it by.
+    alive : bool
+        Whether charts come with plotly's data, too.
+
+    Returns
+    -------
+    dict
+        Strings, numbers, lists and dicts; charts under ``figure`` where alive.
+
+    Raises
+    ------
+    DataError
+        If a picture is no XML.
+    """
+    plain = plain_document(document)
+    writer = _Writer(iter(stills), place, alive)
+    return {
+        "title": plain.title,
+        "subtitle": plain.subtitle,
+        "footer": plain.footer,
+        "facts": _pairs(plain.facts),
+        "front": [writer.block(block) for block in plain.front],
+        "sections": [
+            {
+                "number": number,
+                "anchor": f"{number}-{section.slug}",
+                "title": section.title,
+                "blocks": [writer.block(block) for block in section.blocks],
+            }
+            for number, section in enumerate(plain.sections, start=1)
+        ],
+    }
+
+
+def _pairs(rows: tuple[tuple[str, str], ...]) -> list[list[str]]:
+    return [[name, text] for name, text in rows]
+
+
+class _Writer:
+    """Blocks as data; figures and tables are numbered in their order."""
+
+    def __init__(self, stills: Iterator[str], place: Place, alive: bool) -> None:
+        self._stills, self._place, self._alive = stills, place, alive
+        self._figures, self._tables = count(1), count(1)
+
+    def block(self, block: Block) -> dict[str, Any]:
+        """Return one block."""
+        if isinstance(block, Paragraph):
+            return {"kind": "paragraph", "style": block.kind, "text": block.text}
+        if isinstance(block, Items):
+            return {"kind": "items", "rows": _pairs(block.rows), "numbered": block.numbered}
+        if isinstance(block, Facts):
+            return {"kind": "facts", "rows": _pairs(block.rows)}
+        if isinstance(block, TableBlock):
+            return self._table(block)
+        if isinstance(block, ChartBlock):
+            return self._chart(block.chart)
+        if isinstance(block, Picture):
+            return self._picture(block) | {"kind": "picture", "number": next(self._figures)}
+        if isinstance(block, Animation):
+            return self._animation(block)
+        return self._key_figures(block)
+
+    def _table(self, table: TableBlock) -> dict[str, Any]:
+        return {
+            "kind": "table",
+            "title": "",
+            "number": next(self._tables) if table.caption else 0,
+            "columns": list(table.columns),
+            "rows": [list(row) for row in table.rows],
+            "words": [index in table.text for index in range(len(table.columns))],
+            "caption": table.caption,
+            "strong": [index in table.strong for index in range(len(table.rows))],
+        }
+
+    def _chart(self, chart: Chart) -> dict[str, Any]:
+        number = next(self._figures)
+        data: dict[str, Any] = {
+            "kind": "chart",
+            "number": number,
+            "id": f"figure-{number}",
+            "title": chart.title,
+            "caption": chart.caption,
+            "alt": f"{chart.title}. {chart.caption}".strip(),
+            "still": self._place(next(self._stills)),
+            "width_mm": 170.0,
+            "still_caption": "",
+        }
+        if self._alive:
+            from strapdown.report.plotly_chart import figure
+
+            data["figure"] = figure(chart)
+        return data
+
+    def _picture(self, picture: Picture) -> dict[str, Any]:
+        try:
+            ElementTree.fromstring(picture.svg)
+        except ElementTree.ParseError as error:
+            raise DataError(
+                f"the picture '{picture.slug}' is no SVG: {error}",
+                file="report",
+                quantity=picture.title,
+                remedy="Escape the texts in it.",
+            ) from error
+        return {
+            "number": 0,
+            "still_caption": "",
+            "title": picture.title,
+            "caption": picture.caption,
+            "alt": picture.alt or picture.title,
+            "still": self._place(picture.svg),
+            "width_mm": float(picture.width_mm),
+        }
+
+    def _animation(self, animation: Animation) -> dict[str, Any]:
+        number = next(self._figures)
+        data: dict[str, Any] = {
+            **self._picture(animation.stills),
+            "kind": "animation",
+            "number": number,
+            "id": f"figure-{number}",
+            "title": animation.title,
+            "caption": animation.caption,
+            "still_caption": animation.stills.caption,
+        }
+        if self._alive:
+            data["figure"] = dict(animation.figure)
+            data["interval_ms"] = int(animation.figure.get("interval_ms", _INTERVAL_MS))
+        return data
+
+    def _key_figures(self, block: KeyFigures) -> dict[str, Any]:
+        return {
+            "kind": "key_figures",
+            "figures": [
+                {"name": f.name, "value": f.value, "bound": f.bound, "note": f.note}
+                for f in block.figures
+            ],
+            "pictures": [self._picture(picture) for picture in block.pictures],
+        }

@@ -1,0 +1,74 @@
+"""A document as one page that needs no network, and works without scripts."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+from strapdown.report.document import Document
+from strapdown.report.document_data import document_data, draw_stills
+from strapdown.report.page import embedded, render
+
+__all__ = ["document_page"]
+
+_HEIGHT = 420  # pixels, of a figure that does not say
+
+
+def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
+    """Lay a document out as a page.
+
+    Parameters
+    ----------
+    document : Document
+        Texts are made plain by `document_text.plain_document`, then escaped.
+    stills : sequence of str, optional
+        Charts for paper from `document_data.draw_stills`, where they are drawn already.
+
+    Returns
+    -------
+    str
+        HTML; the same for the same document. Pictures stand in it as images, which run nothing and
+        fetch nothing, and a policy in the page forbids both to everything else.
+    """
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    drawn = draw_stills(document) if stills is None else stills
+    data = document_data(document, drawn, _image, alive=True)
+    sections = (block for section in data["sections"] for block in section["blocks"])
+    alive = [block for block in (*data["front"], *sections) if "figure" in block]
+    for block in alive:
+        block["json"] = embedded(_without_controls(block["figure"]))
+        block["height"] = int(block["figure"]["layout"].get("height", _HEIGHT))
+    script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
+    scripts = [get_plotlyjs(), script] if alive else []
+    return render(
+        "document.html",
+        {
+            "document": data,
+            "alive": bool(alive),
+            "script": Markup(script),
+            "policy": " ".join(map(_digest, scripts)) or "'none'",
+        },
+    )
+
+
+def _without_controls(figure: dict[str, Any]) -> dict[str, Any]:
+    """Leave out plotly's own buttons and sliders: the page has some that keys can reach."""
+    layout = {k: v for k, v in figure["layout"].items() if k not in ("updatemenus", "sliders")}
+    return figure | {"layout": layout}
+
+
+def _image(svg: str) -> str:
+    # A lone surrogate has no UTF-8.
+    whole = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
+    return f"data:image/svg+xml;base64,{whole}"
+
+
+def _digest(script: str) -> str:
+    """Name of a script in the page's policy; one that is not named does not run."""
+    whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    return f"'sha256-{whole}'"
