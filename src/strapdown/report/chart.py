@@ -63,6 +63,8 @@ class Line:
     low, high : ndarray, (n,), or None
         Ends of a horizontal bar through each point.
     legend : bool
+    inside : float
+        Opacity of the inside of a closed outline; NaN parts one outline from the next.
     """
 
     name: str
@@ -80,6 +82,66 @@ class Line:
     places: tuple[tuple[int, int], ...] = ()
     low: Array | None = None
     high: Array | None = None
+    legend: bool = True
+    inside: float = 0.0
+
+
+@dataclass(frozen=True)
+class Fill:
+    """A band between two curves, below every line: a bound, or what is assumed.
+
+    Attributes
+    ----------
+    name : str
+        For the legend; a line of the same name is the entry of both.
+    x, low, high : ndarray, (n,)
+        NaN in `low` or `high` breaks the band.
+    colour : str
+    opacity : float
+    legend : bool
+    """
+
+    name: str
+    x: Array
+    low: Array
+    high: Array
+    colour: str
+    opacity: float = 0.18
+    legend: bool = True
+
+
+@dataclass(frozen=True)
+class Bars:
+    """Bars: across in a panel of categories, else upright.
+
+    Attributes
+    ----------
+    name : str
+        For the legend; bars of one name are one entry.
+    at : ndarray, (n,)
+        Middle of each: the number of a category, or a value of the horizontal axis.
+    values : ndarray, (n,)
+        Where each ends.
+    colour : str
+    start : ndarray, (n,), or None
+        Where each begins; zero if not given.
+    width : float
+        In the unit of `at`.
+    pattern : {'', '/', 'x', '-', '|', '+', '.'}
+        For who sees no colour.
+    labels : tuple of str
+        One a bar, at its end, or none.
+    legend : bool
+    """
+
+    name: str
+    at: Array
+    values: Array
+    colour: str
+    start: Array | None = None
+    width: float = 0.6
+    pattern: str = ""
+    labels: tuple[str, ...] = ()
     legend: bool = True
 
 
@@ -131,6 +193,12 @@ class Panel:
     steady : float
         Values that span less are drawn as a constant, on an axis that spans one unit: rounding
         should not look like a signal.
+    fills : tuple of Fill
+    bars : tuple of Bars
+    step : float
+        Between ticks of the vertical axis, such as 30 degrees; 0 leaves them to the drawing.
+    x_step : float
+        The same of the horizontal axis, where it is the panel's own, or in the last panel.
     """
 
     y_label: str
@@ -142,6 +210,10 @@ class Panel:
     x_label: str = ""
     height: float = 1.0
     steady: float = 0.0
+    fills: tuple[Fill, ...] = ()
+    bars: tuple[Bars, ...] = ()
+    step: float = 0.0
+    x_step: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -181,12 +253,20 @@ def steady_range(panel: Panel) -> tuple[float, float] | None:
     """Ends of the vertical axis where the values are steady; else None."""
     if not panel.steady:
         return None
-    found = np.concatenate([line.y for line in panel.lines])
+    ends = [v for fill in panel.fills for v in (fill.low, fill.high)]
+    found = np.concatenate([*(line.y for line in panel.lines), *ends])
     found = found[np.isfinite(found)]
     if not found.size or np.ptp(found) >= panel.steady:
         return None
     middle = 0.5 * float(found.min() + found.max())
     return middle - 0.5, middle + 0.5
+
+
+def runs(*columns: Array) -> list[slice]:
+    """Stretches in which all columns are finite, which is how NaN breaks a curve."""
+    whole = np.isfinite(np.vstack(columns)).all(axis=0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(np.int8)))
+    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
 
 
 def look(k: int) -> dict[str, str]:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span, steady_range
+from strapdown.report.plotly_areas import bar_labels, bar_traces, fill_traces, see_through
+from strapdown.report.plotly_numbers import numbers
 
 _GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
 FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
@@ -68,7 +70,13 @@ def figure(chart: Chart) -> dict[str, Any]:
         if panel.x_label:
             layout[f"yaxis{suffix}"] |= {"scaleanchor": f"x{x_suffix}", "scaleratio": 1}
         _decorate(layout, panel, f"x{x_suffix}", f"y{suffix}", chart.log_x)
-        traces += _traces(panel, f"x{x_suffix}", f"y{suffix}", named)
+        axes = (f"x{x_suffix}", f"y{suffix}")
+        traces += fill_traces(panel, axes, named)
+        traces += bar_traces(panel, axes, named)
+        traces += _traces(panel, *axes, named)
+    if any(panel.bars for panel in chart.panels):
+        layout["barmode"] = "overlay"
+        layout["hovermode"] = "closest"
     layout["showlegend"] = any(trace["showlegend"] for trace in traces)
     return {"data": traces, "layout": layout}
 
@@ -131,6 +139,10 @@ def _x_axis(chart: Chart, domain: tuple[float, float], panel: Panel) -> dict[str
         "zeroline": False,
         "domain": list(domain),
     }
+    if panel.bars and panel.categories:
+        axis |= {"zeroline": True, "zerolinecolor": _INK, "zerolinewidth": 1}
+    if panel.x_step:
+        axis["dtick"] = panel.x_step
     if panel.x_label or not chart.log_x:
         return axis
     values = [_all(p.lines, what) for p in chart.panels for what in ("x", "low", "high")]
@@ -146,6 +158,8 @@ def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
         "domain": list(domain),
         "type": "linear",
     }
+    if panel.bars and not panel.categories:
+        axis |= {"zeroline": True, "zerolinecolor": _INK, "zerolinewidth": 1}
     if panel.categories:
         last = len(panel.categories) - 0.5
         return axis | {
@@ -156,7 +170,10 @@ def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
         }
     if panel.log:
         levels = np.array([level.y for level in panel.levels])
-        return axis | _log_ticks(np.concatenate([_all(panel.lines, "y"), levels]))
+        ends_of_fills = [v for fill in panel.fills for v in (fill.low, fill.high)]
+        return axis | _log_ticks(np.concatenate([_all(panel.lines, "y"), levels, *ends_of_fills]))
+    if panel.step:
+        axis["dtick"] = panel.step
     if (ends := steady_range(panel)) is not None:
         return axis | {"range": list(ends)}
     return axis
@@ -217,6 +234,7 @@ def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool)
         )
     for line in panel.lines:
         layout["annotations"] += _labels(line, x, y, (log_x, panel.log))
+    layout["annotations"] += bar_labels(panel, x, y)
     for level in panel.levels:
         layout["shapes"].append(
             {
@@ -287,8 +305,8 @@ def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dic
             "name": name,
             "legendgroup": name,
             "showlegend": shown,
-            "x": _numbers(line.x, 9),
-            "y": _numbers(line.y, 6),
+            "x": numbers(line.x, 9),
+            "y": numbers(line.y, 6),
             "xaxis": x_axis,
             "yaxis": y_axis,
             "line": {"color": line.colour, "width": line.width, "dash": line.dash},
@@ -300,21 +318,18 @@ def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dic
         }
         if line.hollow:
             trace["marker"]["line"] = {"width": 1.8}
+        if line.inside:
+            trace |= {"fill": "toself", "fillcolor": see_through(line.colour, line.inside)}
         if panel.categories:
             trace["hovertemplate"] = f"%{{x:.3g}}<extra>{name}</extra>"
         if line.low is not None and line.high is not None:
             trace["error_x"] = {
                 "type": "data",
                 "symmetric": False,
-                "array": _numbers(line.high - line.x, 6),
-                "arrayminus": _numbers(line.x - line.low, 6),
+                "array": numbers(line.high - line.x, 6),
+                "arrayminus": numbers(line.x - line.low, 6),
                 "thickness": 1.6,
                 "width": 5,
             }
         out.append(trace)
     return out
-
-
-def _numbers(values: Array, digits: int) -> list[float | None]:
-    """Numbers to so many significant digits; None, which breaks a line, for NaN."""
-    return [None if np.isnan(v) else float(f"{v:.{digits}g}") for v in values.tolist()]

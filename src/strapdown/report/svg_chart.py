@@ -10,6 +10,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 from strapdown.report.chart import Chart, Line, Panel, steady_range
+from strapdown.report.svg_areas import draw_bars, draw_fills, fill_outline, set_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -187,6 +188,8 @@ def _height(chart: Chart) -> float:
 
 
 def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
+    draw_fills(panel, axis)
+    draw_bars(panel, axis)
     for line in panel.lines:
         _draw_line(line, axis)
     if chart.log_x:
@@ -215,6 +218,7 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
         )
     if (ends := steady_range(panel)) is not None:
         axis.set_ylim(*ends)
+    set_ticks(panel, axis)
     if panel.steady:
         axis.ticklabel_format(axis="y", useOffset=False)
     if panel.x_label:
@@ -228,6 +232,8 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
 
 
 def _draw_line(line: Line, axis: Axes) -> None:
+    if line.inside:
+        fill_outline(line, axis)
     # Matplotlib leaves a name that begins with an underscore out of the legend.
     style: dict[str, Any] = {
         "color": line.colour,
