@@ -1,0 +1,226 @@
+"""The direction of force on a clock about the vehicle, with the interval it is known within."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown.crash.pdof_interval import AngleInterval
+from strapdown.report.chart import BLUE, GREY, ORANGE, VERMILLION
+from strapdown.report.crash_moments import interval_words, signed
+from strapdown.report.crash_outline import Outline, draw_outline
+from strapdown.report.document import Picture
+from strapdown.report.svg_drawing import INK, SMALL, Drawing, shortened
+
+__all__ = ["Direction", "pdof_dial"]
+
+_WIDTH, _RADIUS, _TOP = 330.0, 118.0, 142.0
+_CAR = 0.53  # of the dial's radius that the farthest corner of the vehicle reaches
+_RING = 0.86  # of it, where the ring of the intervals begins
+_SOFT = "#4a525c"
+# The least that is drawn of an interval, deg: a stroke that can be seen.
+_LEAST_WEDGE = 1.0
+
+
+@dataclass(frozen=True)
+class Direction:
+    """The direction of force of one event.
+
+    Attributes
+    ----------
+    name : str
+    horizontal_deg : float, deg
+        Where the force came from, clockwise from the front.
+    interval : AngleInterval or None
+        That holds 95 %.
+    clock : int
+    delta_v : float, m/s
+        Length of the change of velocity.
+    main : bool
+        Drawn strong; the others thin.
+    """
+
+    name: str
+    horizontal_deg: float
+    interval: AngleInterval | None
+    clock: int
+    delta_v: float
+    main: bool = True
+
+
+def pdof_dial(
+    outline: Outline,
+    directions: Sequence[Direction],
+    *,
+    point: Sequence[float] = (0.0, 0.0),
+    point_name: str = "reference point",
+) -> Picture:
+    """Draw directions of force about a vehicle, seen from above, its front upward.
+
+    Parameters
+    ----------
+    outline : Outline
+        In vehicle axes.
+    directions : sequence of Direction
+        One an event, in order of time.
+    point : sequence of float, m
+        The reference point in vehicle axes, which the dial is about.
+    point_name : str
+
+    Returns
+    -------
+    Picture
+        An arrow from where each force came from towards the point, its interval as a wedge; a
+        shaded ring where no direction is contradicted.
+    """
+    rows = sorted(directions, key=lambda d: not d.main)
+    height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 17.0 for d in rows)
+    height += 12.0 if not rows else 0.0 if len(rows) > 1 else -12.0
+    said = [_words(d) for d in directions]
+    alt = "Direction of force on a clock about the vehicle: " + "; ".join(said or ["no event"])
+    out = Drawing(_WIDTH, height, alt)
+    centre = np.array([0.5 * _WIDTH, _TOP])
+    for d in sorted(directions, key=lambda d: d.main):
+        _wedge(out, centre, d)
+    _clock(out, centre)
+    _vehicle(out, centre, outline, point)
+    for d in sorted(directions, key=lambda d: d.main):
+        _arrow(out, centre, outline, point, d)
+    out.circle(centre, 3.6, "#ffffff", 1.0, fill=INK)
+    at = 2.0 * _TOP + 2.0
+    out.circle((14.0, at), 3.6, None, fill=INK)
+    name = shortened(point_name, 160.0, SMALL)
+    out.text((23.0, at), f"{name}; front up, angles from it", SMALL, _SOFT)
+    at += 26.0
+    if not rows:
+        out.text((14.0, at), "no event, no direction of force", 13.0, INK, bold=True)
+    for d in rows:
+        at = _numbers(out, at, d, len(directions) > 1)
+    caption = (
+        "Where the force came from, seen from above, in vehicle axes: 0° the front, positive "
+        f"clockwise, +90° the right side. The arrow pushes at the {point_name}; wedge and numbers "
+        "in brackets: 95 % interval of the direction, from the change of velocity between time "
+        "zero and the end of the event along the turning axes."
+    )
+    return Picture("pdof", out.svg(), "Direction of force", caption, alt, width_mm=84.0)
+
+
+def _at(centre: np.ndarray, radius: float, angle_deg: float) -> tuple[float, float]:
+    a = math.radians(angle_deg)
+    return float(centre[0] + radius * math.sin(a)), float(centre[1] - radius * math.cos(a))
+
+
+def _arc(centre: np.ndarray, radius: float, low: float, high: float) -> list[tuple[float, float]]:
+    steps = max(2, math.ceil((high - low) / 3.0) + 1)
+    return [_at(centre, radius, a) for a in np.linspace(low, high, steps).tolist()]
+
+
+def _wedge(out: Drawing, centre: np.ndarray, d: Direction) -> None:
+    if d.interval is None:
+        return
+    low, high = d.interval.low_deg, d.interval.high_deg
+    inner, strong = _RING * _RADIUS, d.main
+    colour = BLUE if strong else GREY
+    if d.interval.undetermined:
+        ring = _arc(centre, _RADIUS, 0.0, 360.0) + _arc(centre, inner, 0.0, 360.0)[::-1]
+        if strong:
+            out.shape(ring, None, fill=colour, opacity=0.22)
+        return
+    short = 0.5 * max(_LEAST_WEDGE - (high - low), 0.0)
+    low, high = low - short, high + short
+    if strong:
+        out.shape(
+            [tuple(centre), *_arc(centre, _RADIUS, low, high)], None, fill=colour, opacity=0.16
+        )
+    ring = _arc(centre, _RADIUS, low, high) + _arc(centre, inner, low, high)[::-1]
+    out.shape(ring, None, fill=colour, opacity=0.45 if strong else 0.35)
+
+
+def _clock(out: Drawing, centre: np.ndarray) -> None:
+    out.circle(centre, _RADIUS, "#c3cad2", 1.0)
+    for angle in range(0, 360, 10):
+        hour = angle % 30 == 0
+        length = 7.0 if hour else 3.5
+        ends = _at(centre, _RADIUS, angle), _at(centre, _RADIUS - length, angle)
+        out.line(*ends, _SOFT if hour else "#c3cad2", 1.2 if hour else 0.8)
+    for hour in range(1, 13):
+        at = _at(centre, _RADIUS + 11.0, 30.0 * hour)
+        out.text(at, str(hour), 11.5, INK, anchor="middle", bold=hour % 3 == 0)
+    for angle, label in ((0, "0°"), (90, "+90°"), (180, "180°"), (-90, "−90°")):
+        x, y = _at(centre, _RADIUS + 11.0, angle)
+        upright = angle in (0, 180)
+        place = (x + 11.0, y) if upright else (x + math.copysign(4.0, angle), y + 14.0)
+        anchor = "start" if upright else "middle"
+        out.text(place, label, SMALL, _SOFT, anchor=anchor)
+
+
+def _scale(outline: Outline, point: Sequence[float]) -> float:
+    """Pixels a metre, about the point."""
+    reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
+    return _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
+
+
+def _vehicle(out: Drawing, centre: np.ndarray, outline: Outline, point: Sequence[float]) -> None:
+    scale = _scale(outline, point)
+    # Forward is up the page: a heading of -90 deg where x is to the right and y down.
+    there = outline.placed((0.0, 0.0), -90.0, point)
+    pixels = Outline(
+        centre + scale * there.body,
+        tuple(centre + scale * w for w in there.windows),
+        tuple(centre + scale * f for f in there.folds),
+    )
+    draw_outline(out, pixels, "#3d5166", 1.4, fill="#e9edf2")
+
+
+def _arrow(
+    out: Drawing, centre: np.ndarray, outline: Outline, point: Sequence[float], d: Direction
+) -> None:
+    if not math.isfinite(d.horizontal_deg):
+        return
+    edge = _scale(outline, point) * outline.edge(point, d.horizontal_deg)
+    tip = min(edge + 3.0, 0.60 * _RADIUS)
+    tail = (_RING - 0.01) * _RADIUS
+    unsure = d.interval is not None and d.interval.undetermined
+    colour = VERMILLION if d.main else ORANGE
+    out.line(centre, _at(centre, tip, d.horizontal_deg), colour, 0.9, "dot")
+    rim = _at(centre, tail, d.horizontal_deg), _at(centre, _RADIUS, d.horizontal_deg)
+    out.line(*rim, colour, 1.4, "dash" if unsure else "solid")
+    out.arrow(
+        _at(centre, tail, d.horizontal_deg),
+        _at(centre, tip, d.horizontal_deg),
+        colour,
+        4.0 if d.main and not unsure else 1.6,
+        "dash" if unsure else "solid",
+    )
+
+
+def _clock_words(d: Direction) -> str:
+    return f"{d.clock} o'clock"
+
+
+def _words(d: Direction) -> str:
+    angle, ends = interval_words(d.horizontal_deg, d.interval)
+    if ends == "undetermined":
+        return f"{d.name}: undetermined"
+    around = f" ({ends})" if ends else ""
+    return f"{d.name}: {angle}{around}, {_clock_words(d)}"
+
+
+def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
+    angle, ends = interval_words(d.horizontal_deg, d.interval)
+    speed = f"{signed(d.delta_v, 1)} m/s ({signed(3.6 * d.delta_v, 1)} km/h)"
+    if not d.main:
+        out.text((14.0, at), f"{_words(d)}; {speed}", SMALL, _SOFT)
+        return at + 17.0
+    title = f"{d.name}: " if many else ""
+    if ends == "undetermined":
+        out.text((14.0, at), f"{title}undetermined", 17.0, INK, bold=True)
+        out.text((14.0, at + 20.0), "the change of velocity is within its bound", 11.0, _SOFT)
+    else:
+        out.text((14.0, at), f"{title}{angle}, {_clock_words(d)}", 17.0, INK, bold=True)
+        out.text((14.0, at + 20.0), f"95 %: {ends}" if ends else "", 11.5, INK)
+    out.text((14.0, at + 37.0), f"change of velocity {speed}", 11.0, _SOFT)
+    return at + 64.0

@@ -1,0 +1,129 @@
+"""Instants and parts of a crash that several pictures share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.path import CrashPath
+from strapdown.crash.pdof_interval import AngleInterval
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.report.chart import BLACK, look
+
+Array = NDArray[np.float64]
+
+__all__ = [
+    "AROUND",
+    "angle_words",
+    "axis_names",
+    "crash_span",
+    "interval_words",
+    "main_event",
+    "path_moments",
+    "signed",
+    "unit_look",
+]
+
+#: What is drawn before time zero and after the end of an event, s.
+AROUND = (0.05, 0.10)
+# Of a record without an event, about the trigger.
+_NO_EVENT = (-0.1, 0.3)
+# Told apart without colour, the mean's is solid.
+_DASHES = ("dash", "dashdot", "longdash", "dot")
+
+
+def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
+    """Colour, dash and symbol of a unit in every picture of a report.
+
+    Parameters
+    ----------
+    number : int or None
+        Of the unit, from 0; None for the mean of the units.
+    alone : bool
+        There is one unit only, drawn solid.
+    """
+    if number is None:
+        return {"colour": BLACK, "dash": "solid", "symbol": "circle"}
+    found = look(number)
+    return {**found, "dash": "solid" if alone else _DASHES[number % len(_DASHES)]}
+
+
+def main_event(unit: UnitReconstruction) -> int | None:
+    """Number of the event with the largest change of velocity, from 0; None without any."""
+    sizes = [changes.event.resultant for changes in unit.body]
+    return int(np.argmax(sizes)) if sizes else None
+
+
+def crash_span(events: Sequence[CrashEvent], begin: float, end: float) -> tuple[float, float]:
+    """What of a record is drawn to show the crash: all its events, and a little about them, s."""
+    if events:
+        low, high = events[0].time_zero - AROUND[0], events[-1].end + AROUND[1]
+    else:
+        low, high = _NO_EVENT
+    low, high = max(low, begin), min(high, end)
+    return (low, high) if high > low else (begin, end)
+
+
+def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[str, float]]:
+    """Name the instants of a path that matter, in order of time; each within the path.
+
+    Returns
+    -------
+    list of (str, float)
+        ``begin`` (of the window), ``entry``, ``time zero`` and ``event end`` of each event,
+        ``end``; the names of instants that are one sample are joined by commas.
+    """
+    many = len(events) > 1
+    begin, end = float(path.time[0]), float(path.time[-1])
+    found = [("begin", begin), ("entry", path.entry.time)]
+    for k, event in enumerate(events, start=1):
+        which = f" {k}" if many else ""
+        found.append((f"time zero{which}", event.time_zero))
+        if not event.lasts_beyond_record:
+            found.append((f"event end{which}", event.end))
+    found.append(("end", end))
+    step = float(np.median(np.diff(path.time))) if len(path.time) > 1 else 0.0
+    out: list[tuple[str, float]] = []
+    for name, at in sorted(found, key=lambda one: one[1]):
+        if not begin - 1e-9 <= at <= end + 1e-9:
+            continue
+        if out and at - out[-1][1] < step:
+            out[-1] = (f"{out[-1][0]}, {name}", out[-1][1])
+        else:
+            out.append((name, at))
+    return out
+
+
+def axis_names(path: CrashPath) -> tuple[str, str]:
+    """What the first two axes of a path are: north and east, or forward and right at the entry."""
+    return ("north", "east") if path.entry.heading_deg else ("forward", "right")
+
+
+def signed(value: float, digits: int) -> str:
+    """Write a number with a true minus sign, and no minus before a zero."""
+    text = f"{value:.{digits}f}"
+    if not float(text):
+        text = text.removeprefix("-")
+    return text.replace("-", "−")
+
+
+def angle_words(angle_deg: float, digits: int) -> str:
+    """Write an angle in degrees, in (-180, 180]."""
+    wrapped = -math.remainder(-angle_deg, 360.0)
+    text = signed(wrapped, digits)
+    return f"{text.removeprefix('−') if wrapped <= -179.9999 else text}°"
+
+
+def interval_words(angle_deg: float, interval: AngleInterval | None) -> tuple[str, str]:
+    """Write a direction and its interval: ``−8.3°``, ``−12.1° to −4.2°`` or ``undetermined``."""
+    if interval is None:
+        return angle_words(angle_deg, 1), ""
+    if interval.undetermined:
+        return angle_words(angle_deg, 0), "undetermined"
+    digits = 1 if interval.width_deg < 20.0 else 0
+    ends = (angle_words(v, digits) for v in (interval.low_deg, interval.high_deg))
+    return angle_words(angle_deg, digits), " to ".join(ends)

@@ -1,0 +1,292 @@
+"""The path of the reference point from above, with its bound and the vehicle at a few instants."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.crash.crash_event import CrashEvent
+from strapdown.crash.leg import PLACE
+from strapdown.crash.path import CrashPath
+from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
+from strapdown.report.crash_moments import path_moments, signed
+from strapdown.report.crash_outline import Outline, draw_outline
+from strapdown.report.document import Picture
+from strapdown.report.error_envelope import envelope
+from strapdown.report.plan_view import PlanView
+from strapdown.report.svg_drawing import INK, SMALL, Box, Drawing, text_width
+from strapdown.tables import NED
+
+Array = NDArray[np.float64]
+
+__all__ = ["path_plan"]
+
+_WIDTH, _LEFT, _TOP = 640.0, 58.0, 12.0
+_HEIGHTS = (170.0, 380.0)
+_UNDER = 36.0  # ticks and name of the axis
+_ENLARGED = 270.0  # width of the second view
+# A path shorter than this part of the vehicle's length is drawn a second time, larger.
+_SHORT = 0.6
+_BAND, _BAND_EDGE = "#d3e8f6", SKY
+_LOOKS = (
+    *((BLUE, "solid"), (GREEN, "dash"), (PURPLE, "solid"), (ORANGE, "dash")),
+    *(("#882255", "solid"), ("#7f6000", "dash")),
+)
+_ARROW = 44.0  # pixels
+_SLOW = 0.05  # m/s: below it there is no arrow
+_EVERY = 0.1  # s between dots
+
+
+@dataclass(frozen=True, eq=False)
+class _Moment:
+    name: str
+    at: float
+    place: Array
+    heading_deg: float
+    colour: str
+    dash: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    path: CrashPath
+    places: Array
+    areas: list[Array]
+    moments: list[_Moment]
+    reference: Array | None
+
+
+def path_plan(
+    path: CrashPath,
+    outline: Outline,
+    *,
+    events: Sequence[CrashEvent] = (),
+    point: Sequence[float] = (0.0, 0.0),
+    names: tuple[str, str] = ("forward", "right"),
+    reference: pd.DataFrame | None = None,
+    reference_name: str = "reference",
+) -> Picture:
+    """Draw a path from above.
+
+    Parameters
+    ----------
+    path : CrashPath
+    outline : Outline
+        In vehicle axes.
+    events : sequence of CrashEvent
+    point : sequence of float, m
+        The reference point in vehicle axes, whose path it is.
+    names : (str, str)
+        Of the first two axes of the path.
+    reference : DataFrame, optional
+        ``north east`` of the point in the axes of the path, m, indexed by time.
+    reference_name : str
+
+    Returns
+    -------
+    Picture
+        Where the path is short against the vehicle, it is drawn a second time, larger.
+    """
+    plan = _plan(path, events, reference)
+    cars = [outline.placed(m.place, m.heading_deg, point) for m in plan.moments]
+    short = float(np.ptp(np.vstack(plan.areas), axis=0).max()) < _SHORT * float(
+        np.ptp(outline.body, axis=0).max()
+    )
+    width = _WIDTH - _LEFT - 8.0 - (_ENLARGED + 62.0 if short else 0.0)
+    points = np.vstack([*plan.areas, *(c.body for c in cars), *_given(plan)])
+    tail = np.empty((0, 2))
+    for _ in range(3):
+        view = PlanView.of(np.vstack([points, tail]), names, (_LEFT, _TOP), width, _HEIGHTS)
+        arrow = _entry_arrow(plan, outline, point, view.scale)
+        tail = np.empty((0, 2)) if arrow is None else arrow
+    beside = None
+    if short:
+        heights = (view.height, max(view.height, 0.7 * _ENLARGED))
+        small = np.vstack([*plan.areas, *_given(plan)])
+        left = _LEFT + width + 62.0
+        beside = PlanView.of(small, names, (left, _TOP), _ENLARGED, heights, 22.0)
+        view = replace(view, height=beside.height)
+    legend = _legend_rows(plan, reference_name)
+    bottom = _TOP + view.height + _UNDER
+    end = path.table[NED].iloc[-1]
+    alt = (
+        f"Path of the reference point from above: it ends {signed(float(end['north']), 2)} m "
+        f"{names[0]}, {signed(float(end['east']), 2)} m {names[1]} of its place at the entry"
+    )
+    speed = math.hypot(*path.entry.velocity[:2])
+    out = Drawing(_WIDTH, bottom + 17.0 * len(legend) + 4.0, alt)
+    view.draw_grid(out)
+    _draw_band(out, view, plan)
+    for k, (moment, car) in enumerate(zip(plan.moments, cars, strict=True)):
+        last = k == len(cars) - 1
+        draw_outline(
+            out,
+            Outline(
+                view.pixels(car.body),
+                tuple(view.pixels(w) for w in car.windows),
+                tuple(view.pixels(f) for f in car.folds),
+            ),
+            moment.colour,
+            1.5 if last else 1.2,
+            moment.dash,
+            fill="#5b6570" if last else None,
+            opacity=0.06,
+            details=last,
+        )
+    _draw_path(out, view, plan, beside is not None)
+    view.draw_bar(out)
+    if arrow is not None:
+        tail_at, tip = view.pixels(arrow)
+        out.arrow(tail_at.tolist(), tip.tolist(), VERMILLION, 2.6)
+        middle = (0.5 * (tail_at + tip)).tolist()
+        bodies = [_box(view.pixels(car.body)) for car in cars]
+        words = f"{signed(speed, 1)} m/s"
+        out.label(middle, words, 10.5, VERMILLION, away=9.0, avoid=bodies)
+    if beside is not None:
+        beside.draw_grid(out)
+        _draw_band(out, beside, plan)
+        _draw_path(out, beside, plan, False)
+        beside.draw_bar(out)
+        line = beside.pixels(plan.places)
+        avoid = [_box(line[k : k + 2], 4.0) for k in range(0, len(line) - 1, 2)]
+        for moment in plan.moments:
+            at = beside.pixels(moment.place)[0].tolist()
+            out.label(at, moment.name, SMALL, INK, away=9.0, avoid=avoid)
+        told = f"the path alone, {beside.scale / view.scale:.2g} times larger"
+        out.text((beside.left + 5.0, _TOP + 9.0), told, SMALL, "#4a525c", halo=True)
+    _draw_legend(out, legend, bottom + 8.0)
+    return Picture("path", out.svg(), "Path from above", _caption(names, short), alt)
+
+
+def _caption(names: tuple[str, str], short: bool) -> str:
+    axes = (
+        "north up"
+        if names[0] == "north"
+        else "axes forward and right as the vehicle stood at the entry"
+    )
+    return (
+        f"Path of the reference point seen from above, {axes}, in m from its place at the entry; "
+        "both axes to one scale. Shaded: the ellipses that hold 95 % of the error at each instant, "
+        "which grow from the entry, where the place is zero by definition. Outlines: the vehicle "
+        "at the instants named, turned by its heading alone. Dots every 100 ms."
+        + (" Right: the path alone, enlarged." if short else "")
+    )
+
+
+def _plan(path: CrashPath, events: Sequence[CrashEvent], reference: pd.DataFrame | None) -> _Plan:
+    places = path.table[NED[:2]].to_numpy(dtype=np.float64)
+    block = path.covariance[:, PLACE, PLACE][:, :2, :2]
+    course = np.unwrap(path.table["heading"].to_numpy(dtype=np.float64), period=360.0)
+    moments = []
+    named = path_moments(path, events)
+    between = iter(_LOOKS * (1 + len(named) // len(_LOOKS)))
+    for k, (name, at) in enumerate(named):
+        if name == "begin":
+            continue
+        place = np.array([np.interp(at, path.time, places[:, j]) for j in (0, 1)])
+        heading = float(np.interp(at, path.time, course))
+        colour, dash = (INK, "solid") if k == len(named) - 1 else next(between)
+        moments.append(_Moment(name, at, place, heading, colour, dash))
+    given = None if reference is None else reference[NED[:2]].to_numpy(dtype=np.float64)
+    return _Plan(path, places, envelope(places, block), moments, given)
+
+
+def _box(points: Array, rim: float = 0.0) -> Box:
+    (x0, y0), (x1, y1) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return x0 - rim, y0 - rim, x1 + rim, y1 + rim
+
+
+def _given(plan: _Plan) -> list[Array]:
+    return [plan.places] if plan.reference is None else [plan.places, plan.reference]
+
+
+def _entry_arrow(
+    plan: _Plan, outline: Outline, point: Sequence[float], scale: float
+) -> Array | None:
+    """Tail and tip of the arrow of the entry, behind the vehicle, m."""
+    velocity = np.array(plan.path.entry.velocity[:2])
+    speed = float(np.hypot(*velocity))
+    if speed < _SLOW:
+        return None
+    ahead = velocity / speed
+    at = plan.path.entry.time
+    place = np.array([np.interp(at, plan.path.time, plan.places[:, j]) for j in (0, 1)])
+    behind = math.degrees(math.atan2(-ahead[1], -ahead[0])) - plan.path.entry.heading_deg
+    tip = place - ahead * (outline.edge(point, behind) + 5.0 / scale)
+    return np.vstack([tip - ahead * _ARROW / scale, tip])
+
+
+def _draw_band(out: Drawing, view: PlanView, plan: _Plan) -> None:
+    """The edge of all areas together: first each with its edge, then all insides over it."""
+    areas = [view.pixels(area) for area in plan.areas]
+    for area in areas:
+        out.shape(area, _BAND_EDGE, 1.6, fill=_BAND)
+    for area in areas:
+        out.shape(area, _BAND, 0.4, fill=_BAND)
+
+
+def _draw_path(out: Drawing, view: PlanView, plan: _Plan, faint: bool) -> None:
+    if plan.reference is not None:
+        out.shape(view.pixels(plan.reference), VERMILLION, 1.6, "dash", closed=False)
+    pixels = view.pixels(plan.places)
+    keep = np.unique(np.linspace(0, len(pixels) - 1, min(len(pixels), 400)).astype(int))
+    out.shape(pixels[keep], INK, 1.4 if faint else 2.0, closed=False)
+    time = plan.path.time
+    dots = np.arange(math.ceil(time[0] / _EVERY - 1e-6), math.floor(time[-1] / _EVERY + 1e-6) + 1)
+    if not faint:
+        for at in (_EVERY * dots).tolist():
+            place = [np.interp(at, time, plan.places[:, j]) for j in (0, 1)]
+            out.circle(view.pixels(place)[0], 1.9, "#ffffff", 0.7, fill=INK)
+    for moment in plan.moments:
+        at = view.pixels(moment.place)[0]
+        out.circle(at, 2.6 if faint else 4.2, "#ffffff", 1.0, fill=moment.colour)
+
+
+def _legend_rows(plan: _Plan, reference_name: str) -> list[list[tuple[float, str, str, str]]]:
+    """Rows of entries: place from the left, kind, colour, words."""
+    speed = math.hypot(*plan.path.entry.velocity[:2])
+    told = (
+        f"{signed(speed, 1)} m/s ({signed(3.6 * speed, 1)} km/h)" if speed >= _SLOW else "at rest"
+    )
+    entries = [
+        ("path", INK, "path of the reference point"),
+        ("band", _BAND_EDGE, "within this with 95 %"),
+        ("arrow", VERMILLION, f"entry {told}"),
+    ]
+    if plan.reference is not None:
+        entries.append(("dash", VERMILLION, reference_name))
+    for m in plan.moments:
+        kind = f"moment {m.dash}"
+        entries.append((kind, m.colour, f"{m.name}, {signed(1e3 * m.at, 0)} ms"))
+    rows: list[list[tuple[float, str, str, str]]] = [[]]
+    x = _LEFT
+    for kind, colour, words in entries:
+        wide = 26.0 + text_width(words, 10.0) + 14.0
+        if rows[-1] and x + wide > _WIDTH:
+            rows.append([])
+            x = _LEFT
+        rows[-1].append((x, kind, colour, words))
+        x += wide
+    return rows
+
+
+def _draw_legend(out: Drawing, rows: list[list[tuple[float, str, str, str]]], top: float) -> None:
+    for k, row in enumerate(rows):
+        y = top + 17.0 * k
+        for x, kind, colour, words in row:
+            if kind == "band":
+                box = [(x, y - 5.0), (x + 20.0, y - 5.0), (x + 20.0, y + 5.0), (x, y + 5.0)]
+                out.shape(box, colour, 1.2, fill=_BAND)
+            elif kind.startswith("moment"):
+                out.line((x, y), (x + 20.0, y), colour, 1.6, kind.split()[1])
+                out.circle((x + 10.0, y), 4.0, "#ffffff", 1.0, fill=colour)
+            elif kind == "arrow":
+                out.arrow((x, y), (x + 20.0, y), colour, 2.0)
+            else:
+                out.line((x, y), (x + 20.0, y), colour, 2.0, kind)
+            out.text((x + 26.0, y), words, 10.0)

@@ -1,0 +1,285 @@
+"""A picture of lines, shapes and words as SVG: every word escaped, the same bytes every time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from xml.sax.saxutils import escape
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+__all__ = ["INK", "SMALL", "Box", "Drawing", "number", "overlap", "shortened", "text_width"]
+
+INK = "#1b1f24"
+#: The least size of a letter, in pixels of a picture at its size on paper.
+SMALL = 9.5
+# Dashes as they are named in charts, in widths of a thin line.
+_DASHES = {"dash": "6 4", "dot": "1.5 3", "dashdot": "7 3 1.5 3", "longdash": "11 4"}
+# Widths of letters over the size: those of DejaVu Sans, the widest of the usual fonts.
+_NARROW, _WIDE = frozenset("iIjl.,:;'|!()[] /tfr°′·"), frozenset("mwMWO@%Q—→←")
+_LINE = 1.18
+
+
+def number(value: float) -> str:
+    """Write a coordinate to a hundredth of a pixel, without trailing zeros."""
+    text = f"{value:.2f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def text_width(text: str, size: float, bold: bool = False) -> float:
+    """Width of a line of text in pixels, rather too much than too little."""
+    ems = sum(0.40 if c in _NARROW else 0.95 if c in _WIDE else 0.64 for c in text)
+    return ems * size * (1.08 if bold else 1.0)
+
+
+def shortened(text: str, width: float, size: float, bold: bool = False) -> str:
+    """Cut a text that is longer than so many pixels, and say so by dots."""
+    if text_width(text, size, bold) <= width:
+        return text
+    while text and text_width(text + "…", size, bold) > width:
+        text = text[:-1]
+    return text.rstrip() + "…"
+
+
+def overlap(a: Box, b: Box) -> float:
+    """Area that two boxes (left, top, right, bottom) share."""
+    across = min(a[2], b[2]) - max(a[0], b[0])
+    up = min(a[3], b[3]) - max(a[1], b[1])
+    return max(across, 0.0) * max(up, 0.0)
+
+
+class Drawing:
+    """Elements of an SVG, one after the other; y runs down the page.
+
+    Parameters
+    ----------
+    width, height : float
+        In pixels, 1/96 inch at the picture's size on paper.
+    alt : str
+        What the picture shows, in words.
+
+    Attributes
+    ----------
+    boxes : list of (str, Box)
+        Where each line of text stands, for who places others.
+    """
+
+    def __init__(self, width: float, height: float, alt: str = "") -> None:
+        self.width, self.height, self.alt = float(width), float(height), alt
+        self.boxes: list[tuple[str, Box]] = []
+        self._parts: list[str] = []
+
+    def svg(self) -> str:
+        """Return the whole picture."""
+        size = f'width="{number(self.width)}" height="{number(self.height)}"'
+        view = f'viewBox="0 0 {number(self.width)} {number(self.height)}"'
+        head = (
+            f'<svg xmlns="http://www.w3.org/2000/svg" {size} {view} role="img" '
+            'font-family="Helvetica, Arial, DejaVu Sans, sans-serif">'
+        )
+        title = f"<title>{_clean(self.alt)}</title>" if self.alt else ""
+        paper = (
+            f'<rect width="{number(self.width)}" height="{number(self.height)}" fill="#ffffff"/>'
+        )
+        return "\n".join([head + title, paper, *self._parts, "</svg>\n"])
+
+    def line(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        colour: str = INK,
+        width: float = 1.0,
+        dash: str = "solid",
+    ) -> None:
+        """Draw a straight line."""
+        (x1, y1), (x2, y2) = start, end
+        ends = f'x1="{number(x1)}" y1="{number(y1)}" x2="{number(x2)}" y2="{number(y2)}"'
+        self._parts.append(f"<line {ends}{_stroke(colour, width, dash)}/>")
+
+    def shape(
+        self,
+        points: ArrayLike,
+        colour: str | None = INK,
+        width: float = 1.0,
+        dash: str = "solid",
+        *,
+        fill: str | None = None,
+        opacity: float = 1.0,
+        closed: bool = True,
+    ) -> None:
+        """Draw a polygon, or a line of several points; not where fewer than two are finite."""
+        array = np.asarray(points, dtype=np.float64).reshape(-1, 2)
+        array = array[np.isfinite(array).all(axis=1)]
+        if len(array) < 2:
+            return
+        path = " ".join(f"{number(x)},{number(y)}" for x, y in array.tolist())
+        kind = "polygon" if closed else "polyline"
+        inside = f' fill="{fill or "none"}"' + (
+            f' fill-opacity="{number(opacity)}"' if fill and opacity < 1.0 else ""
+        )
+        self._parts.append(f'<{kind} points="{path}"{inside}{_stroke(colour, width, dash)}/>')
+
+    def circle(
+        self,
+        centre: Sequence[float],
+        radius: float,
+        colour: str | None = INK,
+        width: float = 1.0,
+        dash: str = "solid",
+        *,
+        fill: str | None = None,
+        opacity: float = 1.0,
+    ) -> None:
+        """Draw a circle."""
+        x, y = centre
+        at = f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}"'
+        inside = f' fill="{fill or "none"}"' + (
+            f' fill-opacity="{number(opacity)}"' if fill and opacity < 1.0 else ""
+        )
+        self._parts.append(f"<circle {at}{inside}{_stroke(colour, width, dash)}/>")
+
+    def arrow(
+        self,
+        tail: Sequence[float],
+        tip: Sequence[float],
+        colour: str = INK,
+        width: float = 2.0,
+        dash: str = "solid",
+    ) -> None:
+        """Draw an arrow with a filled head; nothing where it has no length."""
+        x, y = tip[0] - tail[0], tip[1] - tail[1]
+        length = math.hypot(x, y)
+        if not length > 0.0:
+            return
+        x, y = x / length, y / length
+        head = min(4.0 + 3.0 * width, length)
+        neck = (tip[0] - 0.8 * head * x, tip[1] - 0.8 * head * y)
+        base, half = (tip[0] - head * x, tip[1] - head * y), 0.42 * head
+        self.line(tail, neck, colour, width, dash)
+        wings = [(base[0] - half * y, base[1] + half * x), (base[0] + half * y, base[1] - half * x)]
+        self.shape([tip, wings[0], neck, wings[1]], None, fill=colour)
+
+    def text(
+        self,
+        at: Sequence[float],
+        text: str,
+        size: float = 11.0,
+        colour: str = INK,
+        *,
+        anchor: str = "start",
+        bold: bool = False,
+        turn: float = 0.0,
+        halo: bool = False,
+    ) -> Box:
+        """Write a line of text, its middle at the height of `at`; return where it stands.
+
+        Parameters
+        ----------
+        at : (float, float)
+        text : str
+            Escaped here.
+        size : float
+        colour : str
+        anchor : {'start', 'middle', 'end'}
+        bold : bool
+        turn : float, deg
+            Clockwise.
+        halo : bool
+            Whether a white rim keeps it from what is below.
+        """
+        x, y = at
+        box = self.box_of(at, text, size, anchor=anchor, bold=bold, turn=turn)
+        more = ' font-weight="bold"' if bold else ""
+        if anchor != "start":
+            more += f' text-anchor="{anchor}"'
+        if turn:
+            more += f' transform="rotate({number(turn)} {number(x)} {number(y)})"'
+        if halo:
+            more += (
+                ' stroke="#ffffff" stroke-width="3" stroke-linejoin="round" paint-order="stroke"'
+            )
+        place = f'x="{number(x)}" y="{number(y + 0.35 * size)}"'
+        look = f'font-size="{number(size)}" fill="{colour}"'
+        self._parts.append(f"<text {place} {look}{more}>{_clean(text)}</text>")
+        self.boxes.append((text, box))
+        return box
+
+    def box_of(
+        self,
+        at: Sequence[float],
+        text: str,
+        size: float,
+        *,
+        anchor: str = "start",
+        bold: bool = False,
+        turn: float = 0.0,
+    ) -> Box:
+        """Where a line of text would stand."""
+        width = text_width(text, size, bold)
+        left = {"start": 0.0, "middle": -0.5, "end": -1.0}[anchor] * width
+        corners = np.array([[left, -0.5], [left + width, -0.5], [left + width, 0.5], [left, 0.5]])
+        corners[:, 1] *= _LINE * size
+        c, s = math.cos(math.radians(turn)), math.sin(math.radians(turn))
+        turned = corners @ np.array([[c, s], [-s, c]]) + np.asarray(at, dtype=np.float64)
+        (x0, y0), (x1, y1) = turned.min(axis=0).tolist(), turned.max(axis=0).tolist()
+        return x0, y0, x1, y1
+
+    def label(
+        self,
+        at: Sequence[float],
+        text: str,
+        size: float = 10.0,
+        colour: str = INK,
+        *,
+        bold: bool = False,
+        away: float = 8.0,
+        avoid: Sequence[Box] = (),
+    ) -> Box:
+        """Write beside a point where the least is covered, with a thin line if far from it."""
+        best: tuple[float, tuple[float, float], str, bool] | None = None
+        for far, (dx, dy) in _tries(away, size):
+            anchor = "start" if dx > 0.1 else "end" if dx < -0.1 else "middle"
+            place = (at[0] + dx, at[1] + dy)
+            box = self.box_of(place, text, size, anchor=anchor, bold=bold)
+            covered = sum(overlap(box, other) for _, other in self.boxes)
+            covered += sum(overlap(box, other) for other in avoid)
+            outside = max(2.0 - box[0], box[2] - self.width + 2.0, 0.0)
+            outside += max(2.0 - box[1], box[3] - self.height + 2.0, 0.0)
+            cost = covered + 50.0 * outside + 0.5 * math.hypot(dx, dy)
+            if best is None or cost < best[0] - 1e-9:
+                best = (cost, place, anchor, far)
+        assert best is not None
+        _, place, anchor, far = best
+        if far:
+            self.line(at, place, "#8a939e", 0.7)
+        return self.text(place, text, size, colour, anchor=anchor, bold=bold, halo=True)
+
+
+def _tries(away: float, size: float) -> list[tuple[bool, tuple[float, float]]]:
+    found: list[tuple[bool, tuple[float, float]]] = []
+    for ring in (1.0, 1.8, 3.0, 4.5, 6.5):
+        reach = away * ring
+        for dx, dy in ((1, 0), (1, -1), (1, 1), (-1, 0), (-1, -1), (-1, 1), (0, -1), (0, 1)):
+            up = dy * (reach + (0.5 * size if not dx else 0.0))
+            found.append((ring > 1.8, (dx * reach, up)))
+    return found
+
+
+def _stroke(colour: str | None, width: float, dash: str) -> str:
+    if colour is None:
+        return ""
+    text = f' stroke="{colour}" stroke-width="{number(width)}" stroke-linejoin="round"'
+    if dash in _DASHES:
+        text += f' stroke-dasharray="{_DASHES[dash]}"'
+    return text
+
+
+def _clean(text: str) -> str:
+    """Escape markup, and leave out what XML cannot hold."""
+    kept = "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" else " " for c in text)
+    kept = "".join(c for c in kept if c not in "\ufffe\uffff\x7f")
+    return escape(kept)
