@@ -6,11 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
+from strapdown.config.crash_simulation import CrashSimulationSpec
 from strapdown.config.spec import Spec, specify
 from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
 
 __all__ = [
     "AttitudeSpec",
+    "CrashSimulationSpec",
     "LogSpec",
     "ReproduceSpec",
     "ScenarioSpec",
