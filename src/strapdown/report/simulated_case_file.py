@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from strapdown import earth
 from strapdown.formats.recorder_csv import ACCEL_HEADINGS, GYRO_HEADINGS, TIME
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.catalogue_keys import KEYS
@@ -125,6 +126,7 @@ _OPTIONS = """
 [options]
 rate_hz = {rate}  # of the common stamps
 sampling = "{sampling}"
+gravity_m_per_s2 = {gravity}  # yours: at the place
 clock = "trigger"  # trigger, or correlation of what the recorders felt
 monte_carlo_runs = 2000
 seed = 0
@@ -171,7 +173,13 @@ def case_text(recorded: RecordedCase, seed: int) -> str:
         )
     pieces += [_unit_text(unit) for unit in recorded.units]
     pieces.append(_REFERENCES)
-    pieces.append(_OPTIONS.format(sampling=_sampling(recorded), rate=_number(_rate(recorded))))
+    pieces.append(
+        _OPTIONS.format(
+            sampling=_sampling(recorded),
+            rate=_number(_rate(recorded)),
+            gravity=_number(_gravity(recorded), 5),
+        )
+    )
     return _aligned("".join(pieces))
 
 
@@ -257,6 +265,12 @@ def _differences(kind: str, sensor: str, told: TriadUncertainty) -> list[str]:
 
 def _sampling(recorded: RecordedCase) -> str:
     return str(recorded.units[0].unit.accelerometers[0].table.attrs["sampling"])
+
+
+def _gravity(recorded: RecordedCase) -> float:
+    motion = recorded.case.crash.motion
+    origin, shape = motion.origin, motion.ellipsoid
+    return float(earth.gravity([origin.lat_deg], [origin.alt], ellipsoid=shape)[0, 2])
 
 
 def _rate(recorded: RecordedCase) -> float:
