@@ -19,6 +19,7 @@ def modules() -> None:
     from strapdown.mechanization import MECHANIZATIONS, Mechanization
     from strapdown.sensors.catalogue import SENSORS, load_sensor
     from strapdown.simulation import SCENARIOS
+    from strapdown.simulation.crash_cases import CASES
     from strapdown.simulation.crash_scenarios import CRASHES
 
     out = console()
@@ -72,6 +73,16 @@ def modules() -> None:
             [name, f"{c.motion.duration:.3g}", c.kind or "–", f"{c.summary} ({c.source})"]
             for name, c in CRASHES.items()
         ],
+    )
+    out.print("The same crashes with recorders of their own", style="bold")
+    print_table(
+        ["name", "crash", "recorders", "what it is"],
+        [
+            [name, c.crash.name, ", ".join(c.usual), c.summary]
+            for name, c in CASES.items()
+            if name not in CRASHES
+        ],
+        text=(0, 1, 2, 3),
     )
     out.print("Sensors that can be simulated", style="bold")
     print_table(

@@ -15,12 +15,13 @@ def simulate(
         str,
         typer.Argument(
             metavar="NAME|FILE",
-            help="A scenario (see: strapdown modules), or a trajectory's file (.toml), whose "
-            "values the options replace.",
+            help="A scenario or a crash (see: strapdown modules), or a trajectory's file (.toml), "
+            "whose values the options replace.",
         ),
     ],
     rate: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Samples a second (100).")
+        float | None,
+        typer.Option(metavar="HZ", help="Samples a second (100; of a crash each recorder's own)."),
     ] = None,
     sampling: Annotated[
         str | None,
@@ -45,6 +46,13 @@ def simulate(
             "scenario's own.",
         ),
     ] = None,
+    units: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="Recorders of a crash, joined by commas, or all (IMU1,IMU2).",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder to make (NAME-simulated)."),
@@ -53,7 +61,7 @@ def simulate(
     json: Annotated[bool, typer.Option("--json", help="Print the scenario as JSON alone.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Write the log of a scenario or a trajectory together with its exact truth."""
+    """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.cli.console import console, print_seal, progress
     from strapdown.report.simulation import simulate as write
 
@@ -68,6 +76,7 @@ def simulate(
             seed=seed,
             sensor=sensor,
             formats=None if formats is None else formats.replace(",", " ").split(),
+            units=() if units is None else units.replace(",", " ").split(),
             force=force,
         )
     if json:
@@ -75,4 +84,7 @@ def simulate(
     elif not quiet:
         files = sorted(p.name for p in seal.path.iterdir())
         console().print(f"{title}: {', '.join(files)}")
-        print_seal(seal, "scenario.json")
+        case = (seal.path / "case.toml").is_file()
+        print_seal(seal, "case.toml" if case else "scenario.json")
+        if case:
+            console().print(f"Next  strapdown crash {seal.path / 'case.toml'}")

@@ -8,12 +8,14 @@ from pydantic import Field, FiniteFloat
 
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
+from strapdown.config.crash_simulation import CrashSimulationSpec
 from strapdown.config.spec import Spec, specify
 from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
 
 __all__ = [
     "AttitudeSpec",
     "CaseSpec",
+    "CrashSimulationSpec",
     "LogSpec",
     "ReproduceSpec",
     "ScenarioSpec",

@@ -7,12 +7,20 @@ from dataclasses import fields
 from pathlib import Path
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
-from strapdown.config import ScenarioSpec, SimulateSpec, read_trajectory_spec, specify
+from strapdown.config import (
+    CrashSimulationSpec,
+    ScenarioSpec,
+    SimulateSpec,
+    read_trajectory_spec,
+    specify,
+)
 from strapdown.exceptions import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
+from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.stated_errors import stated_errors
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
+from strapdown.simulation.crash_cases import CASES
 from strapdown.systems.attitude_source import scenario_errors, sensor_file, simulate_scenario
 
 __all__ = ["simulate", "write_simulation"]
@@ -27,19 +35,21 @@ def simulate(
     seed: int | None = None,
     sensor: str | None = None,
     formats: str | Sequence[str] | None = None,
+    units: Sequence[str] = (),
     force: bool = False,
 ) -> Seal:
-    """Write the log of a scenario or of a trajectory's file, with its exact truth.
+    """Write the log of a scenario, a trajectory's file or a crash, with its exact truth.
 
     Parameters
     ----------
     name : str
-        One of `simulation.SCENARIOS`, or the path of a trajectory's file, which ends in ``.toml``.
-        What is None below is as the file says, or else as named here.
+        One of `simulation.SCENARIOS`, the path of a trajectory's file, which ends in ``.toml``, or
+        one of `simulation.crash_cases.CASES`. What is None below is as the file says, or else as
+        named here.
     out : str or Path
         Folder to make.
     rate : float, Hz
-        100.
+        100; of a crash each recorder's own.
     sampling : {'instantaneous', 'mean'}
         The rate at each stamp (as without it), or its exact mean over the interval that ends there.
     seed : int
@@ -49,6 +59,8 @@ def simulate(
         of one unit of it, drawn with the seed, take the place of the scenario's own.
     formats : sequence of str
         Of `formats.log_writers.LOG_WRITERS`, or ``all``; ``csv``.
+    units : sequence of str
+        Of a crash: names of its recorders, or ``all``.
     force : bool
         Replace a bundle that is there.
 
@@ -57,7 +69,8 @@ def simulate(
     Seal
         The folder holds ``log.*`` (rad/s, body forward-right-down, with the true attitude in
         further columns), ``scenario.json``, and the truth: ``truth.csv`` with the attitude of a
-        scenario, ``trajectory.csv`` with the place, velocity and attitude of a trajectory.
+        scenario, ``trajectory.csv`` with the place, velocity and attitude of a trajectory. That of
+        a crash: as `crash_simulation.write_crash_simulation`.
 
     Raises
     ------
@@ -69,6 +82,29 @@ def simulate(
     if wanted is not None and not wanted:
         raise ConfigError("none is named", quantity="--format", remedy="name csv, npz, h5 or mat")
     wanted = wanted and [f.lower() for f in wanted]
+    if name.lower() in CASES:
+        if sensor is not None:
+            raise ConfigError(
+                "the recorders of a crash have parts of their own",
+                quantity="--sensor",
+                remedy="leave it out",
+            )
+        crash = specify(
+            CrashSimulationSpec,
+            name=name.lower(),
+            units=tuple(units),
+            rate_hz=rate,
+            sampling=(sampling or "instantaneous").lower(),
+            seed=seed or 0,
+            formats=tuple(wanted or ["csv"]),
+        )
+        return write_crash_simulation(crash, Path(out), force=force)
+    if units:
+        raise ConfigError(
+            f"'{name}' is no crash and has no recorders",
+            quantity="--units",
+            remedy="leave it out, or name a crash (see: strapdown modules)",
+        )
     if name.lower().endswith(".toml"):
         trajectory = read_trajectory_spec(
             Path(name),

@@ -25,11 +25,18 @@ from strapdown.bundle import (
     unsealed_changes,
     versions,
 )
-from strapdown.config import AttitudeSpec, ReproduceSpec, SimulateSpec, TrajectorySpec
+from strapdown.config import (
+    AttitudeSpec,
+    CrashSimulationSpec,
+    ReproduceSpec,
+    SimulateSpec,
+    TrajectorySpec,
+)
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.attitude import write_attitude
 from strapdown.report.crash_case import rerun_crash
+from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.reproduction import make_reproduction, write_reproduction
 from strapdown.report.simulation import write_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
@@ -75,6 +82,9 @@ def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]
     if "trajectory" in configuration:
         trajectory = TrajectorySpec.model_validate(configuration["trajectory"])
         return write_trajectory_simulation(trajectory, out)
+    if "crash" in configuration:
+        crash = CrashSimulationSpec.model_validate(configuration["crash"])
+        return write_crash_simulation(crash, out)
     return write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
