@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,11 @@ Array = NDArray[np.float64]
 
 __all__ = ["QUANTITIES", "CrashChannel", "CrashRecord"]
 
+
+def _sample_row(sample: int) -> int:
+    return sample + 1
+
+
 #: What a channel may be, and its unit in SI.
 QUANTITIES: dict[str, str] = {
     "acceleration": "m/s2",
@@ -22,6 +28,7 @@ QUANTITIES: dict[str, str] = {
     "velocity": "m/s",
     "displacement": "m",
     "force": "N",
+    "time": "s",
     "other": "",
 }
 
@@ -38,9 +45,10 @@ class CrashChannel:
         One of `QUANTITIES`; a velocity is a change of velocity from the first sample.
     axis : str
         ``x``, ``y``, ``z`` where it is known to lie along an axis that points forward, right or
-        down; with a minus where it points the other way; else empty.
+        down; with a minus where it points the other way; else empty. Of a log whose columns
+        name the sensor's own axes it is the sensor's.
     unit : str
-        As recorded; empty where nothing tells it.
+        As recorded, in this package's spelling where it is known; empty where nothing tells it.
     sampling : str or None
         ``instantaneous`` or ``mean``, where it is known.
     place : str
@@ -55,8 +63,18 @@ class CrashChannel:
         In SI, where the record states it.
     bandwidth : float or None
         Hz, of the low-pass before the sampler.
+    file : str
+        Name of the file that holds its samples, for messages.
+    row : callable
+        Row of that file in which a sample stands, counted from 1, by the sample's number.
+    clock : str
+        Name of the channel of quantity ``time`` that holds its stamps; empty where the stamps are
+        its own.
     load : callable
         Reads time (s, as recorded) and values (SI where the unit is known, else as recorded).
+    samples : callable or None
+        Reads the values alone, of a record whose stamps may have to be stated first. Those of a
+        clock are as recorded, whole numbers where it counts ticks.
     """
 
     name: str
@@ -71,6 +89,10 @@ class CrashChannel:
     remarks: tuple[str, ...] = ()
     full_scale: float | None = None
     bandwidth: float | None = None
+    file: str = ""
+    row: Callable[[int], int] = field(default=_sample_row, repr=False)
+    clock: str = ""
+    samples: Callable[[], NDArray[Any]] | None = field(default=None, repr=False)
 
 
 @dataclass(frozen=True, eq=False)

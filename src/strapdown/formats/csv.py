@@ -75,7 +75,7 @@ def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     """
     text, findings = decoded(data, name)
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
-    comments = [line for _, line in itertools.takewhile(_is_comment, numbered)]
+    comments = [line for _, line in itertools.takewhile(lambda n: is_comment(n[1]), numbered)]
     numbered = numbered[len(comments) :]
     if not numbered:
         raise DataError(
@@ -83,10 +83,10 @@ def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
             file=name,
             remedy="check that the recording was saved and copied whole",
         )
-    separator = _separator(numbered[0][1])
-    fields = _fields(numbered[0][1], separator)
+    separator = separator_of(numbered[0][1])
+    fields = fields_of(numbered[0][1], separator)
     names, units = _above(comments, fields, separator), {}
-    if not all(_is_data(f) for f in fields):
+    if not all(is_data(f) for f in fields):
         head = numbered.pop(0)
         names = fields[:-1] if len(fields) > 1 and not fields[-1] else fields
         if numbered and (below := _units(numbered[0][1], separator, len(names))):
@@ -138,17 +138,19 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
         return data.decode("cp1252", "replace"), [Finding(what, file=name)]
 
 
-def _is_comment(numbered: tuple[int, str]) -> bool:
-    return numbered[1].lstrip().startswith(COMMENTS)
+def is_comment(line: str) -> bool:
+    """Whether a line is a comment."""
+    return line.lstrip().startswith(COMMENTS)
 
 
-def _is_data(field: str) -> bool:
+def is_data(field: str) -> bool:
+    """Whether a field is a number, a date, or missing, and no name."""
     return field in NULLS or any(p.fullmatch(field) for p in (_NUMBER, _DATE, _HEX))
 
 
 def _units(line: str, separator: str | None, width: int) -> list[str] | None:
     """Units of a second header line, where every field of it is one."""
-    fields = [f.strip("[]() ") for f in _fields(line, separator)][:width]
+    fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
     known = [f.lower() in UNIT_OF for f in fields if f]
     return fields if len(fields) == width and known and all(known) else None
 
@@ -156,8 +158,8 @@ def _units(line: str, separator: str | None, width: int) -> list[str] | None:
 def _above(comments: list[str], fields: list[str], separator: str | None) -> list[str]:
     """Names of columns without a header: the last comment, where it is one; else numbers."""
     text = comments[-1].strip().lstrip("".join(COMMENTS)).strip() if comments else ""
-    names = _fields(text, separator)
-    if len(names) == len(fields) and not any(_is_data(n) for n in names):
+    names = fields_of(text, separator)
+    if len(names) == len(fields) and not any(is_data(n) for n in names):
         return names
     return [f"column {k + 1}" for k in range(len(fields))]
 
@@ -171,7 +173,7 @@ def _unique(names: list[str]) -> list[str]:
     return out
 
 
-def _separator(line: str) -> str | None:
+def separator_of(line: str) -> str | None:
     """The separator of a line; None stands for any run of blanks."""
     for candidate in ("\t", ";", ","):
         if candidate in line:
@@ -179,7 +181,8 @@ def _separator(line: str) -> str | None:
     return None
 
 
-def _fields(line: str, separator: str | None) -> list[str]:
+def fields_of(line: str, separator: str | None) -> list[str]:
+    """Fields of a line, without the blanks and quotes around them."""
     if separator is not None and '"' in line:
         import csv
 
@@ -227,7 +230,7 @@ def _whole_lines(
 
 def _count(line: str, separator: str | None) -> int:
     if separator is None or '"' in line:
-        return len(_fields(line, separator))
+        return len(fields_of(line, separator))
     return line.count(separator) + 1
 
 
@@ -235,12 +238,12 @@ def _was_cut(
     line: str, before: list[tuple[int, str]], width: int, separator: str | None, ended: bool
 ) -> bool:
     """Tell whether the last line stops in the middle of a field, or before the last one."""
-    fields = _fields(line, separator)
+    fields = fields_of(line, separator)
     if len(fields) < width:
         return True
     if ended or len(fields) != width:
         return False
-    ends = [_fields(other, separator)[-1] for _, other in before]
+    ends = [fields_of(other, separator)[-1] for _, other in before]
     if not all(_NUMBER.fullmatch(e) for e in ends):
         return False
     # Without a line end the last number may have lost digits; where all others have the same
@@ -260,7 +263,7 @@ def _parse(lines: list[str], count: int, separator: str | None) -> Columns:
         lines = ["\t".join(line.split()) for line in lines]
     # Arrow reads 0xFFF0 as a number; what a sensor meant by it is not known.
     odd = next((line for line in lines if "0x" in line or "0X" in line), "")
-    hexadecimal = [k for k, f in enumerate(_fields(odd, separator)) if _HEX.fullmatch(f)]
+    hexadecimal = [k for k, f in enumerate(fields_of(odd, separator)) if _HEX.fullmatch(f)]
     table = pa_csv.read_csv(
         pa.BufferReader("\n".join(lines).encode()),
         read_options=pa_csv.ReadOptions(
@@ -279,7 +282,7 @@ def _parse(lines: list[str], count: int, separator: str | None) -> Columns:
 
 def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
     line = next((line for line in lines if "," in line), "")
-    numbers = [f for f in _fields(line, separator) if _NUMBER.fullmatch(f)]
+    numbers = [f for f in fields_of(line, separator) if _NUMBER.fullmatch(f)]
     return any("," in n for n in numbers) and not any("." in n for n in numbers)
 
 

@@ -61,7 +61,7 @@ def inferred_unit(
             )
         )
         return str(unit.value), str(unit)
-    raise DataError(_not_told(unit), file=file, quantity=triad, remedy=_choices(triad, values))
+    raise DataError(not_told(unit), file=file, quantity=triad, remedy=_choices(triad, values))
 
 
 def _likely(unit: Inference | None) -> str | None:
@@ -72,7 +72,8 @@ def _flag(triad: str) -> str:
     return "the column's name" if triad == "mag" else f"--{triad}-unit"
 
 
-def _not_told(unit: Inference | None) -> str:
+def not_told(unit: Inference | None) -> str:
+    """What is said of a unit that the numbers do not tell."""
     if unit is None:
         return "the unit is not stated"
     pairs = [(v, p) for v, p in ((unit.value, unit.confidence), *unit.alternatives) if p > 0.005]

@@ -15,7 +15,7 @@ from strapdown.exceptions import DataError, Finding
 from strapdown.formats.nhtsa_channel import KMH, Channel
 from strapdown.formats.nhtsa_header import only, row_error, sections, to_number, to_whole
 
-__all__ = ["Channel", "CrashTest", "Vehicle", "read_nhtsa"]
+__all__ = ["Channel", "CrashTest", "Vehicle", "header_of", "read_nhtsa"]
 
 TEST_FIELDS, CHANNEL_FIELDS, VEHICLE_FIELDS = 20, 20, 42
 MM = 1e-3
@@ -119,8 +119,8 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     Parameters
     ----------
     path : str or Path
-        The header, ``v10146.EV5``; the channels, ``v10146.001`` and so on, stand beside it and
-        are read when their `Channel.table` is first asked for.
+        The header, ``v10146.EV5``, or the folder that holds it; the channels, ``v10146.001`` and
+        so on, stand beside it and are read when their `Channel.table` is first asked for.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def read_nhtsa(path: str | Path) -> CrashTest:
         The header is missing, empty, cut, or not in the form of EV5; its count of curves is not
         that of its rows.
     """
-    file = Path(path)
+    file = header_of(Path(path))
     rows = sections(file)
     test, line = only(rows, "TEST", file)
     if len(test) < TEST_FIELDS:
@@ -167,6 +167,29 @@ def read_nhtsa(path: str | Path) -> CrashTest:
         barrier=tuple(tuple(fields) for fields, _ in rows["BARRIER"]),
         findings=tuple(_findings(channels, file)),
     )
+
+
+def header_of(path: Path) -> Path:
+    """Return the header of a test, given as itself or as its folder.
+
+    Raises
+    ------
+    DataError
+        The folder holds none, or more than one.
+    """
+    if not path.is_dir():
+        return path
+    headers = sorted(p for p in path.iterdir() if p.suffix.lower() == ".ev5")
+    if len(headers) != 1:
+        held = ", ".join(p.name for p in headers[:6])
+        raise DataError(
+            f"the folder holds {len(headers)} headers: {held}"
+            if headers
+            else "the folder holds no .EV5 header",
+            file=path.resolve().name,
+            remedy="give the .EV5 file of one test",
+        )
+    return headers[0]
 
 
 def _channel(fields: list[str], file: Path, line: int, present: dict[str, Path]) -> Channel:

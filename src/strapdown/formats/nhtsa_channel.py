@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.exceptions import DataError, nearest
@@ -146,13 +147,30 @@ class Channel:
             There is no file; it is empty, cut, or not what the header says; a value is no
             finite number; time does not advance; the unit is not known.
         """
+        time, values = self.recorded
+        assert self.path is not None
+        unit, factor = self._si()
+        table = pd.DataFrame(
+            {"value": values * factor}, index=pd.Index(time, name="time"), copy=False
+        )
+        table.attrs = {"source": self.path.name, "unit": unit, "sampling": "instantaneous"}
+        return table
+
+    @cached_property
+    def recorded(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Stamps in s from the impact, and samples in the unit as recorded.
+
+        Raises
+        ------
+        DataError
+            As `table`, but of the unit.
+        """
         if self.path is None:
             raise DataError(
                 f"{self.name} is listed in the header, and its file is not in the folder",
                 quantity=f"channel {self.number}",
                 remedy="add the file from the database, or use a channel with `present`",
             )
-        unit, factor = self._si()
         if self.time_unit not in TIMES:
             raise DataError(
                 f"the time unit '{self.time_unit}' is not known",
@@ -160,14 +178,10 @@ class Channel:
                 quantity="time",
                 remedy=nearest(self.time_unit, TIMES),
             )
-        values = _read_pairs(self)
-        time = values[:, 0] * TIMES[self.time_unit]
+        pairs = _read_pairs(self)
+        time = pairs[:, 0] * TIMES[self.time_unit]
         _check_time(self, time)
-        table = pd.DataFrame(
-            {"value": values[:, 1] * factor}, index=pd.Index(time, name="time"), copy=False
-        )
-        table.attrs = {"source": self.path.name, "unit": unit, "sampling": "instantaneous"}
-        return table
+        return time, pairs[:, 1].copy()
 
     def _si(self) -> tuple[str, float]:
         if self.unit.upper() not in UNITS:

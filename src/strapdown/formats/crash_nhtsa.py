@@ -1,0 +1,194 @@
+"""Crash tests of the NHTSA database as crash records."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_text import LONGEST_NAME, clean
+from strapdown.formats.nhtsa import CrashTest, Vehicle, header_of, read_nhtsa
+from strapdown.formats.nhtsa_channel import UNITS, Channel
+
+Array = NDArray[np.float64]
+
+__all__ = ["detect", "read"]
+
+# Quantity by the unit in SI; moments and the rest are other.
+_QUANTITY = {
+    "m/s2": "acceleration",
+    "rad/s": "rate",
+    "m/s": "velocity",
+    "m": "displacement",
+    "N": "force",
+}
+# In this package's spelling, where it has one.
+_SPELLED = {"G'S": "g", "G": "g", "M/S2": "m/s2", "DPS": "deg/s", "DEG/SEC": "deg/s"} | {
+    "RAD/S": "rad/s",
+    "NWT": "N",
+    "N": "N",
+    "MM": "mm",
+    "KPH": "km/h",
+}
+# Seats and places of NHTSA Test Reference Guide, Version 5, Volume I, tables of codes, as far as
+# they are what the name suggests; others are shown as the code.
+_SEATS = {"01": "driver", "02": "front passenger", "03": "front centre passenger"} | {
+    "04": "left rear passenger",
+    "05": "centre rear passenger",
+    "06": "right rear passenger",
+}
+_PLACES = {
+    "HDCG": "head",
+    "CHST": "chest",
+    "PVCN": "pelvis",
+    "NEKU": "upper neck",
+    "NEKL": "lower neck",
+    "FMRL": "left femur",
+    "FMRR": "right femur",
+    "ENGN": "engine",
+    "FLLR": "floor, left rear",
+    "FLRR": "floor, right rear",
+    "VECG": "centre of gravity",
+}
+_STATUS = {"AM": "as measured", "CF": "channel failed", "NO": "no data"}
+
+
+def detect(path: Path) -> bool:
+    """Tell whether it is an EV5 header, or a folder that holds one."""
+    if path.is_dir():
+        return any(p.suffix.lower() == ".ev5" for p in path.iterdir())
+    if path.suffix.lower() == ".ev5":
+        return True
+    with path.open("rb") as stream:
+        return b"----- EV5 -----" in stream.read(4096)
+
+
+def read(path: Path) -> CrashRecord:
+    """Read a test; its channels read their files when they are asked.
+
+    Parameters
+    ----------
+    path : Path
+        The header, or the folder that holds it.
+
+    Returns
+    -------
+    CrashRecord
+        With the channels whose files are there.
+
+    Raises
+    ------
+    DataError
+        As `read_nhtsa`.
+    """
+    test = read_nhtsa(header_of(path))
+    there = [c for c in test.channels if c.path is not None]
+    vehicles = {v.number for v in test.vehicles}
+    return CrashRecord(
+        path=path,
+        format="nhtsa",
+        title=clean(test.title),
+        facts=_facts(test),
+        channels=tuple(_channel(c, vehicles) for c in there),
+        files=(test.path, *(c.path for c in there if c.path is not None)),
+        findings=test.findings,
+    )
+
+
+def _facts(test: CrashTest) -> dict[str, str]:
+    number = "".join(c for c in test.path.stem if c.isdigit())
+    facts = {
+        "test": number.lstrip("0"),
+        "objective": test.objective,
+        "date": test.date,
+        "laboratory": test.performer,
+        "contract": test.reference,
+        "recorder": test.comment,
+        "closing speed, m/s": _plain(test.closing_speed),
+        "impact angle, deg": _plain(test.impact_angle_deg),
+    }
+    for vehicle in test.vehicles:
+        one = "" if len(test.vehicles) == 1 else f"vehicle {vehicle.number}: "
+        facts |= {one + key: value for key, value in _vehicle(vehicle).items()}
+    return {k: clean(v) for k, v in facts.items() if v not in ("", "nan")}
+
+
+def _vehicle(vehicle: Vehicle) -> dict[str, str]:
+    return {
+        "vehicle": f"make {vehicle.make}, model {vehicle.model}, {vehicle.year or 'year unknown'}",
+        "vin": vehicle.vin,
+        "mass_kg": _plain(vehicle.mass),
+        "length_m": _plain(vehicle.length),
+        "width_m": _plain(vehicle.width),
+        "wheelbase_m": _plain(vehicle.wheelbase),
+        "cg_behind_front_axle_m": _plain(vehicle.cg_behind_front_axle),
+        "speed_m_per_s": _plain(vehicle.speed),
+    }
+
+
+def _plain(value: float) -> str:
+    """A number as the header has it, without the dust of its factor to SI."""
+    return "" if math.isnan(value) else f"{value:.10g}"
+
+
+def _channel(channel: Channel, vehicles: set[int]) -> CrashChannel:
+    assert channel.path is not None
+    unit = channel.unit.upper()
+    si, factor = UNITS.get(unit, ("", 1.0))
+    axis = channel.axis[:1].lower()
+    hz = channel.prefilter_hz
+    low_pass = "" if math.isnan(hz) else f"{hz:g} Hz before the sampler"
+    return CrashChannel(
+        name=str(channel.number),
+        quantity=_QUANTITY.get(si, "other"),
+        axis=axis if axis in ("x", "y", "z") else "",
+        unit=_SPELLED.get(unit, clean(channel.unit, LONGEST_NAME)),
+        load=_loader(channel),
+        sampling="instantaneous",
+        place=clean(channel.comment) or clean(channel.location),
+        body=_body(channel, vehicles),
+        low_pass=low_pass,
+        remarks=tuple(clean(r) for r in _remarks(channel)),
+        full_scale=None if math.isnan(channel.rating) else channel.rating * factor,
+        bandwidth=None if math.isnan(hz) or hz <= 0.0 else hz,
+        file=channel.path.name,
+    )
+
+
+def _body(channel: Channel, vehicles: set[int]) -> str:
+    if channel.vehicle not in vehicles:
+        return "barrier" if channel.vehicle == 0 else f"vehicle {channel.vehicle}"
+    whole = "vehicle" if len(vehicles) == 1 else f"vehicle {channel.vehicle}"
+    place = _PLACES.get(channel.location, f"part {channel.location}")
+    if channel.occupant not in ("", "NA", "00"):
+        who = _SEATS.get(channel.occupant, f"occupant {channel.occupant}")
+        return clean(f"{who}'s {place}" + ("" if whole == "vehicle" else f", {whole}"))
+    # An engine moves in its mounts and is pushed back.
+    return clean(f"engine of {whole}") if channel.location == "ENGN" else whole
+
+
+def _remarks(channel: Channel) -> list[str]:
+    known = _STATUS.get(channel.status, "")
+    remarks = [f"status {channel.status}" + (f", {known}" if known else "")]
+    remarks.append("primary" if channel.primary else "redundant")
+    remarks.append(f"location {channel.location}, axis {channel.axis}")
+    if channel.maker:
+        remarks.append(channel.maker)
+    if channel.calibrated:
+        remarks.append(f"calibrated {channel.calibrated}")
+    if channel.status != "AM" and channel.comment:
+        remarks.append(f"the laboratory says: {channel.comment}")
+    return remarks
+
+
+def _loader(channel: Channel) -> Callable[[], tuple[Array, Array]]:
+    def load() -> tuple[Array, Array]:
+        time, values = channel.recorded
+        factor = UNITS.get(channel.unit.upper(), ("", 1.0))[1]
+        return time, values * factor
+
+    return load

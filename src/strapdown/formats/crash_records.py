@@ -1,0 +1,107 @@
+"""Readers of crash records: one file a format, and the one table of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.formats import crash_nhtsa, crash_table
+from strapdown.formats.crash_record import CrashRecord
+
+__all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
+
+
+@dataclass(frozen=True)
+class CrashReader:
+    """How one format is recognised and read."""
+
+    title: str
+    detect: Callable[[Path], bool]
+    read: Callable[[Path], CrashRecord]
+
+
+#: In the order in which they are tried: what says what it is first, tables of columns last.
+CRASH_READERS: dict[str, CrashReader] = {
+    "nhtsa": CrashReader(
+        "test of the NHTSA vehicle database: .EV5 or its folder",
+        crash_nhtsa.detect,
+        crash_nhtsa.read,
+    ),
+    "table": CrashReader(
+        "table with a column a channel: .csv .txt, also .npz .parquet .h5 .mat",
+        crash_table.detect,
+        crash_table.read,
+    ),
+}
+
+
+def read_crash_record(
+    path: str | Path,
+    *,
+    format: str | None = None,  # noqa: A002
+) -> CrashRecord:
+    """Read a crash record of any known format.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or the folder of a test.
+    format : str, optional
+        A key of `CRASH_READERS`; if not given, it is recognised by its content.
+
+    Returns
+    -------
+    CrashRecord
+        Its channels read their samples when they are asked.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, or no such format.
+    DataError
+        It is of no known format, or damaged; the message names file, row, quantity and remedy.
+    """
+    file = Path(path)
+    if format is not None and format not in CRASH_READERS:
+        raise ConfigError(
+            f"there is no reader '{format}'",
+            quantity="format",
+            remedy=nearest(format, CRASH_READERS),
+        )
+    try:
+        return _read(file, format)
+    except (OSError, ValueError) as error:
+        # A name that no file can have, a file that may not be read, a link that leads in a ring.
+        raise DataError(
+            f"it cannot be read: {type(error).__name__}: {str(error)[:200]}",
+            file=file.name[:200],
+            remedy="check that it is a file of yours, and copied whole",
+        ) from error
+
+
+def _read(file: Path, form: str | None) -> CrashRecord:
+    if not file.exists():
+        raise ConfigError(
+            "there is no such file or folder", file=str(file), remedy="check the path"
+        )
+    if file.is_file() and file.stat().st_size == 0:
+        raise DataError(
+            "the file is empty",
+            file=file.name,
+            remedy="check that the recording was saved and copied whole",
+        )
+    if form is not None:
+        return CRASH_READERS[form].read(file)
+    for reader in CRASH_READERS.values():
+        if reader.detect(file):
+            return reader.read(file)
+    inside = sorted(p.name for p in file.iterdir()) if file.is_dir() else []
+    shown = ", ".join(inside[:6]) + (" …" if len(inside) > 6 else "")
+    kinds = "; ".join(r.title for r in CRASH_READERS.values())
+    raise DataError(
+        f"the folder is no known crash record; it holds: {shown or 'nothing'}",
+        file=file.resolve().name,
+        remedy=f"give one file of it, or one of: {kinds}",
+    )

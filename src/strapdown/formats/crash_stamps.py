@@ -1,0 +1,127 @@
+"""Stamps of a crash record in seconds: unit, direction, origin; a fault is named by its row."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats.inference.clock import infer_time_unit
+from strapdown.formats.judge import not_told
+from strapdown.formats.stamps import EPOCH
+
+Array = NDArray[np.float64]
+
+__all__ = ["Clock", "seconds_of"]
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """A column of stamps as it stands in a file.
+
+    Attributes
+    ----------
+    name : str
+        Of the column.
+    stamps : ndarray, (n,)
+        Whole numbers or not, as recorded.
+    unit : str
+        A key of `TIME_UNITS`, or empty where nothing states it.
+    file : str
+    row : callable
+        Row of the file in which a stamp stands.
+    """
+
+    name: str
+    stamps: NDArray[Any]
+    unit: str
+    file: str
+    row: Callable[[int], int]
+
+
+def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
+    """Turn stamps into increasing seconds.
+
+    Parameters
+    ----------
+    clock : Clock
+
+    Returns
+    -------
+    seconds : ndarray, (n,)
+        From the origin of the recorder; from the first stamp where that is more than 1e6 s away,
+        as a clock of 1970 is.
+    findings : list of Finding
+
+    Raises
+    ------
+    DataError
+        A stamp is missing, time does not advance, or the unit is neither stated nor evident.
+    """
+    findings: list[Finding] = []
+    stamps = clock.stamps
+    stamps = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps.astype(np.float64)
+    missing = np.flatnonzero(~np.isfinite(stamps))
+    if missing.size:
+        k = int(missing[0])
+        raise DataError(
+            f"no stamp ({clock.stamps[k]}; {missing.size} such)",
+            file=clock.file,
+            row=clock.row(k),
+            quantity=f"time ({clock.name})",
+            remedy="correct or delete that row",
+        )
+    ticks = (stamps - stamps[0]).astype(np.float64)
+    back = np.flatnonzero(np.diff(ticks) <= 0.0)
+    if back.size:
+        k = int(back[0])
+        same = ticks[k] == ticks[k + 1]
+        raise DataError(
+            f"the stamp {stamps[k + 1]} repeats that of the row before"
+            if same
+            else f"time goes back from {stamps[k]} to {stamps[k + 1]}",
+            file=clock.file,
+            row=clock.row(k + 1),
+            quantity=f"time ({clock.name})",
+            remedy="if the samples are evenly spaced, state their rate: rate_hz = 1000"
+            if same
+            else "sort or correct the rows; if two records were joined, split them",
+        )
+    unit = clock.unit or _evident(clock, stamps, findings)
+    factor = TIME_UNITS[unit]
+    if abs(float(stamps[0])) * factor <= EPOCH:
+        return stamps.astype(np.float64) * factor, findings
+    findings.append(
+        Finding(
+            f"stamps count from a distant origin; time here counts from the first, "
+            f"{stamps[0].item()} {unit}",
+            file=clock.file,
+            quantity=f"time ({clock.name})",
+        )
+    )
+    return ticks * factor, findings
+
+
+def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str:
+    said = infer_time_unit(stamps)
+    if said.settled:
+        findings.append(
+            Finding(
+                str(said),
+                file=clock.file,
+                quantity=f"time ({clock.name})",
+                remedy='if not, state it, as in time_unit = "ms"',
+            )
+        )
+        return str(said.value)
+    raise DataError(
+        not_told(said),
+        file=clock.file,
+        quantity=f"time ({clock.name})",
+        remedy='state it, as in time_unit = "ms"',
+    )

@@ -1,0 +1,257 @@
+"""Tables of columns as crash records: text tables of any layout, and other logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats.crash_names import ChannelName, read_channel_name
+from strapdown.formats.crash_preamble import read_text_table
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_stamps import Clock, seconds_of
+from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
+from strapdown.formats.crash_units import factor_of
+from strapdown.formats.find_columns import Column
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.recording import RawLog
+
+Array = NDArray[np.float64]
+
+__all__ = ["detect", "read", "record_of"]
+
+# Of a column of text so many fields must be numbers to be one with a fault in it.
+MOSTLY = 0.5
+# How even the steps of a column without a name must be, to be taken for a clock.
+EVEN = 0.01
+_OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
+
+
+def detect(path: Path) -> bool:
+    """Tell whether it is a file; what is no table is refused when it is read."""
+    return path.is_file()
+
+
+def read(path: Path) -> CrashRecord:
+    """Read a text table, or another log that has columns.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    CrashRecord
+        A channel for each column of numbers, by the column's name.
+
+    Raises
+    ------
+    DataError
+        It is no table, or a damaged one.
+    """
+    from strapdown.formats import READERS
+
+    general = {"mpu6050", "broad", "comma2k19", "sensorstream", "csv"}
+    for key, reader in READERS.items():
+        if key not in general and reader.detect(path):
+            return record_of(reader.read(path), path, key)
+    return record_of(read_text_table(path), path, "csv")
+
+
+def record_of(raw: RawLog, path: Path, form: str) -> CrashRecord:
+    """Make a record of the columns of a log.
+
+    Parameters
+    ----------
+    raw : RawLog
+    path : Path
+    form : str
+        Key of its format.
+
+    Returns
+    -------
+    CrashRecord
+
+    Raises
+    ------
+    DataError
+        No column holds numbers.
+    """
+    findings = list(raw.findings)
+    kept: list[str] = []
+    texts: list[str] = []
+    for source in raw.columns:
+        (kept if _is_numeric(raw, source) else texts).append(source)
+    if texts:
+        shown = ", ".join(clean(t, 40) for t in texts[:6]) + (" …" if len(texts) > 6 else "")
+        findings.append(Finding(f"columns of text, left out: {shown}", file=raw.name))
+    if not kept:
+        raise DataError(
+            "no column holds numbers",
+            file=raw.name,
+            remedy="give the record as CSV with one sample a row",
+        )
+    names = unique([clean(s, LONGEST_NAME) or f"column {k + 1}" for k, s in enumerate(kept)])
+    said = {s: _said(raw, s) for s in kept}
+    spelled = dict(zip(kept, names, strict=True))
+    clock = _clock(raw, said, spelled, findings)
+    if clock and said[clock].quantity != "time":
+        said[clock] = ChannelName("time")
+    channels = tuple(
+        _channel(raw, source, name, said, clock, spelled.get(clock, ""))
+        for source, name in spelled.items()
+    )
+    return CrashRecord(
+        path=path,
+        format=form,
+        title=clean(path.stem),
+        facts={},
+        channels=channels,
+        files=raw.files,
+        findings=tuple(findings),
+    )
+
+
+def _is_numeric(raw: RawLog, source: str) -> bool:
+    values = raw.columns[source]
+    if values.dtype.kind in "iufbM":
+        return True
+    import pandas as pd
+
+    texts = pd.Series(values).dropna()
+    if texts.empty:
+        return False
+    if ":" in str(texts.iloc[0]) and str(texts.iloc[0])[:4].isdecimal():
+        return True
+    found = pd.to_numeric(texts, errors="coerce").notna().mean()
+    return bool(found >= MOSTLY)
+
+
+def _said(raw: RawLog, source: str) -> ChannelName:
+    if source in raw.stated:
+        quantity, unit = raw.stated[source]
+        triad, _, axis = quantity.partition("_")
+        if quantity == "time":
+            return ChannelName("time", "", unit or "")
+        if triad in _OF_TRIAD:
+            return ChannelName(_OF_TRIAD[triad], axis, unit or "")
+    if raw.columns[source].dtype.kind == "M":
+        return ChannelName("time", "", "ns")
+    return read_channel_name(source, raw.units.get(source, ""))
+
+
+def _clock(
+    raw: RawLog, said: dict[str, ChannelName], names: dict[str, str], findings: list[Finding]
+) -> str:
+    """Column of the stamps, or empty where there is none."""
+    times = [s for s, n in said.items() if n.quantity == "time"]
+    stated = [s for s in times if said[s].unit] or times
+    if len(stated) > 1:
+        others = ", ".join(names[s] for s in stated[1:])
+        findings.append(
+            Finding(
+                f"{names[stated[0]]} is taken for the time, and {others} could be it, too",
+                file=raw.name,
+                quantity="time",
+                remedy=f'if not, name it, as in time = "{names[stated[1]]}"',
+            )
+        )
+    if stated:
+        return stated[0]
+    first = next(iter(said))
+    if _advances(raw.columns[first]) and said[first].quantity == "other" and len(said) > 1:
+        findings.append(
+            Finding(
+                f"{names[first]} advances evenly and is taken for the time",
+                file=raw.name,
+                quantity="time",
+                remedy='if not, state the rate, as in rate_hz = 1000, or time = "a column"',
+            )
+        )
+        return first
+    return ""
+
+
+def _advances(values: NDArray[Any]) -> bool:
+    """Whether these are evenly spaced stamps, and no count of samples."""
+    if values.dtype.kind not in "iuf" or values.size < 6:
+        return False
+    steps = np.diff(values.astype(np.float64))
+    if not (np.isfinite(steps).all() and steps.min() > 0.0):
+        return False
+    usual = float(np.median(steps))
+    counts = usual == 1.0 and bool((steps == 1.0).all()) and values[0] in (0, 1)
+    return not counts and bool(np.abs(steps - usual).max() <= EVEN * usual)
+
+
+def _channel(
+    raw: RawLog,
+    source: str,
+    name: str,
+    names: dict[str, ChannelName],
+    clock: str,
+    clock_name: str,
+) -> CrashChannel:
+    said = names[source]
+    factor = factor_of(said.quantity, said.unit) if said.unit else None
+    samples = _samples(raw, source, said, factor)
+    stamps = _stamps(raw, clock, names[clock].unit if clock else "")
+    remarks = []
+    if said.contradiction:
+        remarks.append(said.contradiction)
+    if said.change:
+        remarks.append("change of velocity since time zero of the recorder")
+    return CrashChannel(
+        name=name,
+        quantity=said.quantity,
+        axis=said.axis,
+        unit=clean(said.unit, LONGEST_NAME),
+        load=lambda: (stamps(), samples().astype(np.float64)),
+        sampling=None if said.quantity in ("velocity", "displacement") else raw.sampling,
+        remarks=tuple(remarks),
+        file=raw.name,
+        row=raw.row,
+        clock=clock_name,
+        samples=samples,
+    )
+
+
+def _samples(
+    raw: RawLog, source: str, said: ChannelName, factor: float | None
+) -> Callable[[], NDArray[Any]]:
+    column = Column(source, said.unit or None, "")
+
+    def read() -> NDArray[Any]:
+        if said.quantity == "time":
+            return ticks_of(raw, column)[0]
+        values = numbers(raw, column, said.quantity if said.quantity != "other" else source)
+        values = values.astype(np.float64)
+        if said.quantity == "velocity" and not said.change and values.size:
+            # Speed of the sensor, not a change: what it was at first is taken off.
+            values = values - values[0]
+        return values if factor is None else values * factor
+
+    return read
+
+
+def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
+    def read() -> Array:
+        if not clock:
+            if raw.rate:
+                count = len(next(iter(raw.columns.values())))
+                return np.arange(count, dtype=np.float64) / raw.rate
+            raise DataError(
+                "no column is known to hold the time",
+                file=raw.name,
+                quantity="time",
+                remedy='name it, as in time = "column 1", or state the rate: rate_hz = 1000',
+            )
+        stamps, dated = ticks_of(raw, Column(clock, None, ""))
+        unit = "ns" if dated else stated
+        return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]
+
+    return read

@@ -1,0 +1,158 @@
+"""The unit of a triad: as the record says it, as the case states it, or as its numbers tell it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
+from strapdown.formats.crash_units import FACTORS, factor_of, state_unit
+from strapdown.formats.inference import Signals, infer_signals
+from strapdown.formats.judge import not_told
+
+Array = NDArray[np.float64]
+
+__all__ = ["triad_factor"]
+
+_TRIAD = {"acceleration": "accel", "rate": "gyro"}
+# What is shown of numbers that tell no unit.
+_CHOICES = {"acceleration": ("g", "m/s2"), "rate": ("deg/s", "rad/s")}
+
+
+def triad_factor(
+    record: CrashRecord,
+    axes: Mapping[str, tuple[CrashChannel, Array]],
+    time: Array,
+    quantity: str,
+    stated: str | None,
+    findings: list[Finding],
+) -> tuple[dict[str, float], str]:
+    """Factors that turn the values of each axis into SI.
+
+    Parameters
+    ----------
+    record : CrashRecord
+    axes : dict of str to (CrashChannel, ndarray)
+        Values are SI where the channel's unit is known, else as recorded.
+    time : ndarray, (n,), s
+    quantity : {'acceleration', 'rate'}
+    stated : str or None
+        By the case.
+    findings : list of Finding
+        What was concluded is added.
+
+    Returns
+    -------
+    factors : dict of str to float
+    unit : str
+        As recorded, or stated.
+
+    Raises
+    ------
+    ConfigError
+        What is stated is no unit of the quantity, or contradicts the record.
+    DataError
+        Nothing tells the unit.
+    """
+    own = {a: c.unit for a, (c, _) in axes.items() if _known(c)}
+    velocity = {c.quantity == "velocity" for c, _ in axes.values()}
+    kind = "velocity" if velocity == {True} else quantity
+    wanted = state_unit(stated, kind) if stated else ""
+    for axis, unit in own.items():
+        if wanted and unit != wanted:
+            channel = axes[axis][0]
+            raise ConfigError(
+                f"unit = '{stated}' is stated, and the record says {unit} of {channel.name}",
+                file=record.path.name,
+                quantity="unit",
+                remedy="leave it out; if the record is wrong, correct its header",
+            )
+    open_axes = [a for a in axes if a not in own]
+    if not open_axes:
+        return dict.fromkeys(axes, 1.0), " ".join(dict.fromkeys(own.values()))
+    if not wanted:
+        if len(set(own.values())) == 1:
+            # One axis says it for the triad: a header is often filled in once.
+            wanted = next(iter(own.values()))
+            without = ", ".join(axes[a][0].name for a in open_axes)
+            findings.append(
+                Finding(
+                    f"no unit of {without}: taken as {wanted}, as that of {axes[next(iter(own))][0].name}",
+                    file=record.path.name,
+                    quantity="unit",
+                    remedy=f'if not, write it in the header; state unit = "{wanted}" if so',
+                )
+            )
+        else:
+            wanted = _evident(record, axes, time, kind, findings)
+    for axis in open_axes:
+        channel = axes[axis][0]
+        if channel.unit:
+            findings.append(
+                Finding(
+                    f"the record says '{channel.unit}', which is not known; read as {wanted}, as "
+                    "stated",
+                    file=channel.file or None,
+                    quantity=f"channel {channel.name}",
+                )
+            )
+    return {a: 1.0 if a in own else FACTORS[kind][wanted] for a in axes}, wanted
+
+
+def _known(channel: CrashChannel) -> bool:
+    """Whether the values are in SI already."""
+    return factor_of(channel.quantity, channel.unit) is not None
+
+
+def _evident(
+    record: CrashRecord,
+    axes: Mapping[str, tuple[CrashChannel, Array]],
+    time: Array,
+    quantity: str,
+    findings: list[Finding],
+) -> str:
+    block = [v for _, v in axes.values()]
+    names = ", ".join(c.name for c, _ in axes.values())
+    unit = None
+    if quantity in _TRIAD and len(block) == 3 and all(b.shape == time.shape for b in block):
+        values = np.column_stack(block)
+        triad = _TRIAD[quantity]
+        signals = Signals(
+            time,
+            gyro=values if triad == "gyro" else None,
+            accel=values if triad == "accel" else None,
+            time_unit="s",
+        )
+        said = {i.quantity: i for i in infer_signals(signals)}
+        unit, form = said.get(f"{triad}_unit"), said.get(f"{triad}_form")
+        if unit is not None and unit.settled and (form is None or form.value == "rate"):
+            findings.append(
+                Finding(
+                    str(unit),
+                    file=record.path.name,
+                    quantity=f"unit of {names}",
+                    remedy=f'if not, state it, as in unit = "{unit.value}"',
+                )
+            )
+            return str(unit.value)
+    raise DataError(
+        not_told(unit),
+        file=record.path.name,
+        quantity=names,
+        remedy=_choices(block, quantity),
+    )
+
+
+def _choices(block: list[Array], quantity: str) -> str:
+    largest = max(float(np.nanmax(np.abs(b), initial=0.0)) for b in block)
+    si = QUANTITIES[quantity]
+    units = _CHOICES.get(quantity, tuple(FACTORS[quantity])[:3])
+    told = " or ".join(
+        f'unit = "{u}" (the largest value, {largest:.4g}, is then '
+        f"{largest * FACTORS[quantity][u]:.4g} {si})"
+        for u in units
+    )
+    return f"write {told}"

@@ -1,0 +1,104 @@
+"""Units of crash records: what a text means, as a quantity and a factor to SI."""
+
+from __future__ import annotations
+
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.formats.columns import UNIT_OF
+
+__all__ = ["FACTORS", "factor_of", "state_unit", "unit_of"]
+
+#: Quantity to its units, each with the factor to SI. The mile, foot, inch and pound are those of
+#: the international agreement of 1959: 0.3048 m a foot, 0.45359237 kg a pound.
+FACTORS: dict[str, dict[str, float]] = {
+    "acceleration": dict(ACCEL_UNITS),
+    "rate": dict(GYRO_UNITS),
+    "velocity": {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "ft/s": 0.3048, "mm/s": 1e-3},
+    "displacement": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048},
+    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605},
+    "time": dict(TIME_UNITS),
+}
+_QUANTITY = {unit: quantity for quantity, units in FACTORS.items() for unit in units}
+# As crash laboratories and recorders write them, beside the spellings of other logs.
+_SPELLINGS = {
+    "m/s2": "m/(s*s) m/(s^2) m/s*s m/ss m/sec2 m/sec^2 m/s**2 meters/sec/sec",
+    "g": "g's g`s g-force gn g_n",
+    "rad/s": "radians/s radians/sec 1/s*rad",
+    "deg/s": "degrees/s degrees/sec degree/s deg/second °/sec",
+    "m/s": "meters/second metres/second",
+    "km/h": "km/h kph kmh km/hr kmph km_h km_per_h km·h-1",
+    "mph": "mph mi/h mile/h miles/h miles/hour mi/hr",
+    "ft/s": "ft/s ft/sec fps feet/s ft_s",
+    "mm/s": "mm/s",
+    "m": "m meter metre meters metres",
+    "cm": "cm",
+    "mm": "mm millimeter millimetre millimeters millimetres",
+    "in": "in inch inches",
+    "ft": "ft feet foot",
+    "N": "n newton newtons nwt",
+    "kN": "kn kilonewton kilonewtons",
+    "lbf": "lbf lbs",
+}
+_UNIT_OF = {
+    **{text: unit for text, unit in UNIT_OF.items() if unit in _QUANTITY},
+    **{spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()},
+}
+
+
+def unit_of(text: str) -> tuple[str, str] | None:
+    """Read a unit as a file writes it.
+
+    Parameters
+    ----------
+    text : str
+        As ``m/(s*s)``, ``G's``, ``km/h``, ``[deg/s]``.
+
+    Returns
+    -------
+    (str, str) or None
+        The quantity, a key of `FACTORS`, and the unit, a key of its table; None where it is none
+        of them.
+    """
+    plain = text.lower().replace(" ", "").strip("[]\t")
+    unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()"))
+    return None if unit is None else (_QUANTITY[unit], unit)
+
+
+def factor_of(quantity: str, unit: str) -> float | None:
+    """Factor to SI, or None where the unit is not known to be one of the quantity."""
+    return FACTORS.get(quantity, {}).get(unit)
+
+
+def state_unit(text: str, quantity: str, key: str = "unit") -> str:
+    """Check a unit that a case states.
+
+    Parameters
+    ----------
+    text : str
+    quantity : str
+        A key of `FACTORS`.
+    key : str
+        Of the case, for the message.
+
+    Returns
+    -------
+    str
+        In this package's spelling.
+
+    Raises
+    ------
+    ConfigError
+        It is no unit of that quantity.
+    """
+    known = FACTORS[quantity]
+    if text in known:
+        return text
+    found = unit_of(text)
+    if found is None or found[0] != quantity:
+        what = f"is a unit of {found[0]}" if found else "is no unit that is known"
+        raise ConfigError(
+            f"'{text}' {what}, and one of {quantity} is needed",
+            quantity=key,
+            remedy=nearest(text, known),
+        )
+    return found[1]

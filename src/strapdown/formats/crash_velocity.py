@@ -1,0 +1,91 @@
+"""Mean accelerations from a table of cumulative changes of velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.formats.crash_record import CrashChannel
+
+Array = NDArray[np.float64]
+
+__all__ = ["mean_acceleration", "mean_accelerations_of"]
+
+# A table that begins one step after time zero leaves out the row of zeros.
+ONE_STEP = 1.5
+
+
+def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
+    """Mean acceleration over each interval of a velocity channel.
+
+    Parameters
+    ----------
+    channel : CrashChannel
+        Of quantity ``velocity``.
+
+    Returns
+    -------
+    time : ndarray, (n,), s
+        End of each interval, as sampling ``mean`` has it.
+    acceleration : ndarray, (n,), m/s²
+        Change of velocity over the interval, divided by its length: exact, whatever happened
+        within it.
+
+    Raises
+    ------
+    DataError
+        The channel holds something else, has fewer than two samples, or a value is missing.
+    """
+    if channel.quantity != "velocity":
+        raise DataError(
+            f"it holds {channel.quantity}, and a change of velocity is needed",
+            file=channel.file or None,
+            quantity=channel.name,
+            remedy="give a column of delta-V",
+        )
+    time, velocity = channel.load()
+    bad = np.flatnonzero(~np.isfinite(velocity))
+    if bad.size or velocity.size < 2:
+        k = int(bad[0]) if bad.size else None
+        raise DataError(
+            f"not a finite number ({velocity[k]})" if k is not None else "fewer than two samples",
+            file=channel.file or None,
+            row=channel.row(k) if k is not None else None,
+            quantity=channel.name,
+            remedy="correct that row, or cut the table before it",
+        )
+    return mean_accelerations_of(time, velocity, from_zero=starts_at_zero(time, channel))
+
+
+def starts_at_zero(time: Array, channel: CrashChannel) -> bool:
+    """Whether the table begins one step after the time zero from which its changes count."""
+    counted = any("time zero" in r for r in channel.remarks)
+    return counted and time.size > 1 and 0.0 < time[0] <= ONE_STEP * (time[1] - time[0])
+
+
+def mean_accelerations_of(
+    time: ArrayLike, velocity: ArrayLike, *, from_zero: bool = False
+) -> tuple[Array, Array]:
+    """Mean acceleration over each interval.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        Increasing.
+    velocity : array_like, (n,), m/s
+    from_zero : bool
+        The velocity is a change since time zero, at which it was none: the interval from there to
+        the first stamp is one, too.
+
+    Returns
+    -------
+    time : ndarray, (n - 1,) or (n,), s
+        End of each interval.
+    acceleration : ndarray, m/s²
+    """
+    t = np.asarray(time, dtype=np.float64)
+    v = np.asarray(velocity, dtype=np.float64)
+    if from_zero:
+        t, v = np.concatenate([[0.0], t]), np.concatenate([[0.0], v])
+    return t[1:], np.diff(v) / np.diff(t)
