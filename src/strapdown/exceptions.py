@@ -1,7 +1,7 @@
 """What strapdown raises and what it reports: one root, one form of message.
 
-Every message answers four questions: in which file, at which row, about which
-quantity, and what to do now.
+Every message answers four questions: in which file, at which row or line, about
+which quantity, and what to do now.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ class Finding:
         The column or quantity.
     remedy : str, optional
         What the user can do about it.
+    line : int, optional
+        Line of a file that a person wrote, counted from 1; such a file has no rows.
     """
 
     what: str
@@ -44,11 +46,14 @@ class Finding:
     row: int | None = None
     quantity: str | None = None
     remedy: str | None = None
+    line: int | None = None
 
     def __str__(self) -> str:
         place = [self.file] if self.file else []
         if self.row is not None:
             place.append(f"row {self.row}")
+        if self.line is not None:
+            place.append(f"line {self.line}")
         if self.quantity:
             place.append(self.quantity)
         text = f"{', '.join(place)}: {self.what}" if place else self.what
@@ -62,7 +67,7 @@ class StrapdownError(Exception):
     ----------
     what : str
         What is wrong, with the numbers that show it.
-    file, row, quantity, remedy
+    file, row, quantity, remedy, line
         As in `Finding`.
     """
 
@@ -76,8 +81,9 @@ class StrapdownError(Exception):
         row: int | None = None,
         quantity: str | None = None,
         remedy: str | None = None,
+        line: int | None = None,
     ) -> None:
-        self.finding = Finding(what, file, row, quantity, remedy)
+        self.finding = Finding(what, file, row, quantity, remedy, line)
         super().__init__(str(self.finding))
 
 
@@ -99,7 +105,7 @@ class DivergenceError(StrapdownError):
     exit_code = 5
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def nearest(name: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
     """Return a sentence that helps with an unknown name.
 
     Parameters
@@ -108,6 +114,8 @@ def nearest(name: str, known: Iterable[str]) -> str:
         The word that was not understood.
     known : iterable of str
         The words that would have been.
+    also : iterable of str
+        Further such words, too many to be listed.
 
     Returns
     -------
@@ -116,6 +124,6 @@ def nearest(name: str, known: Iterable[str]) -> str:
         is near.
     """
     words = list(known)
-    close = difflib.get_close_matches(name, words, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(name, [*words, *also], n=1, cutoff=0.5)
     hint = f"did you mean '{close[0]}'? " if close else ""
     return f"{hint}Known: {', '.join(words)}."

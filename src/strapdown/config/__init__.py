@@ -6,16 +6,20 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat
 
+from strapdown.config.crash_case import CaseSpec
+from strapdown.config.crash_case_file import read_case_spec
 from strapdown.config.spec import Spec, specify
 from strapdown.config.trajectory import TrajectorySpec, read_trajectory_spec
 
 __all__ = [
     "AttitudeSpec",
+    "CaseSpec",
     "LogSpec",
     "ReproduceSpec",
     "ScenarioSpec",
     "SimulateSpec",
     "TrajectorySpec",
+    "read_case_spec",
     "read_trajectory_spec",
     "specify",
 ]

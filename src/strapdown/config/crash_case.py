@@ -2,33 +2,58 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictInt
 
 from strapdown.config.spec import TableSpec
+from strapdown.config.words import file_name, word, words
 
-Positive = Annotated[FiniteFloat, Field(gt=0.0)]
-NotNegative = Annotated[FiniteFloat, Field(ge=0.0)]
-Pair = tuple[FiniteFloat, FiniteFloat]
-Triple = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+# A number in quotation marks, or true for 1, is a slip and not a number.
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0.0)]
+NotNegative = Annotated[Number, Field(ge=0.0)]
+Pair = tuple[Number, Number]
+Triple = tuple[Number, Number, Number]
+#: Text of one line, that titles, tables and names of files can show.
+Words = Annotated[str, AfterValidator(words)]
+Word = Annotated[str, AfterValidator(word)]
+FileName = Annotated[str, AfterValidator(file_name)]
+
+
+def _listed(value: Any) -> Any:
+    return [value] if isinstance(value, str) else value
+
+
+def _text(value: Any) -> Any:
+    # Curves of some records are numbered.
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+Listed = BeforeValidator(_listed)
+Channel = Annotated[Word, BeforeValidator(_text)]
 
 
 class VehicleSpec(TableSpec):
-    """The vehicle, as far as a report draws and speaks of it."""
+    """The vehicle, as far as a report draws and speaks of it.
 
-    name: str = ""
+    Its front is `front_m` ahead of the origin of all positions, in the middle where that is not
+    given; `outline_m` takes the place of length, width and front: corners from above, forward and
+    right, in order around it.
+    """
+
+    name: Words = ""
     mass_kg: Positive | None = None
     length_m: Positive = 4.5
     width_m: Positive = 1.8
-    front_m: FiniteFloat | None = None
+    front_m: Number | None = None
     outline_m: tuple[Pair, ...] = ()
 
 
 class PointSpec(TableSpec):
     """The point whose motion is told."""
 
-    name: str = "reference point"
+    name: Words = "reference point"
     position_m: Triple = (0.0, 0.0, 0.0)
 
 
@@ -37,15 +62,15 @@ class EntrySpec(TableSpec):
 
     kind: Literal["speed", "standstill", "gnss"] = "speed"
     source: str = ""
-    speed_m_per_s: FiniteFloat | None = None
+    speed_m_per_s: Number | None = None
     speed_sd_m_per_s: NotNegative | None = None
-    time_s: FiniteFloat = 0.0
-    heading_deg: FiniteFloat = 0.0
+    time_s: Number = 0.0
+    heading_deg: Number = 0.0
     heading_sd_deg: NotNegative = 0.0
-    slip_deg: FiniteFloat = 0.0
+    slip_deg: Number = 0.0
     slip_sd_deg: NotNegative = 0.0
     climb_sd_m_per_s: NotNegative = 0.0
-    path: str | None = None
+    path: FileName | None = None
     antenna_m: Triple | None = None
     antenna_sd_m: NotNegative = 0.0
 
@@ -57,17 +82,17 @@ class TriadSpec(TableSpec):
     points the other way; an axis that is left out is missing.
     """
 
-    name: str = ""
-    path: str
-    channels: dict[Literal["x", "y", "z"], str] = Field(default_factory=dict)
-    time: str | None = None
-    time_unit: str | None = None
+    name: Words = ""
+    path: FileName
+    channels: dict[Literal["x", "y", "z"], Channel] = Field(default_factory=dict)
+    time: Channel | None = None
+    time_unit: Word | None = None
     rate_hz: Positive | None = None
-    unit: str | None = None
+    unit: Word | None = None
     sampling: Literal["instantaneous", "mean"] | None = None
-    sensor: str | None = None
+    sensor: FileName | None = None
     #: Replaces the sensor's: keys of the catalogue of sensors, each with its unit.
-    uncertainty: dict[str, FiniteFloat | Triple] = Field(default_factory=dict)
+    uncertainty: dict[Word, Number | Triple] = Field(default_factory=dict)
 
 
 class AssumedSpec(TableSpec):
@@ -82,16 +107,16 @@ class AssumedSpec(TableSpec):
 class UnitSpec(TableSpec):
     """A recorder on the vehicle."""
 
-    name: str
+    name: Word
     position_m: Triple = (0.0, 0.0, 0.0)
     position_sd_m: NotNegative = 0.0
     angles_deg: Triple = (0.0, 0.0, 0.0)
     angles_sd_deg: NotNegative = 0.0
-    trigger_s: FiniteFloat | None = None
+    trigger_s: Number | None = None
     trigger_sd_s: NotNegative = 0.0
     accelerometers: tuple[TriadSpec, ...] = Field(min_length=1)
     gyro: TriadSpec | None = None
-    gyro_from: str | None = None
+    gyro_from: Word | None = None
     assumed: AssumedSpec | None = None
     rest_s: Pair | None = None
     levelling_deg: Pair | None = None
@@ -102,15 +127,15 @@ class ReferenceSpec(TableSpec):
     """Something else that is known of the crash, beside which the answers are held."""
 
     kind: Literal["path", "delta_v"]
-    name: str
+    name: Word
     source: str = ""
     #: Of a path: time, north, east, down of the reference point, with or without their sd.
-    path: str | None = None
+    path: FileName | None = None
     #: Of a change of velocity: of the axis, from time zero to `at_s`.
-    delta_v_m_per_s: FiniteFloat | None = None
+    delta_v_m_per_s: Number | None = None
     delta_v_sd_m_per_s: NotNegative = 0.0
     axis: Literal["forward", "right", "resultant"] = "forward"
-    at_s: FiniteFloat | None = None
+    at_s: Number | None = None
 
 
 class OptionsSpec(TableSpec):
@@ -120,16 +145,16 @@ class OptionsSpec(TableSpec):
     rate_hz: Positive = 200.0
     sampling: Literal["instantaneous", "mean"] = "instantaneous"
     clock: Literal["trigger", "correlation"] = "trigger"
-    combine: bool = True
+    combine: StrictBool = True
     peak_window_s: Positive = 0.030
     gravity_m_per_s2: Positive = 9.80665
     zero_at: Literal["interval", "threshold"] = "interval"
-    monte_carlo_runs: int = Field(default=2000, ge=0, le=100_000)
-    seed: int = Field(default=0, ge=0)
+    monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
+    seed: StrictInt = Field(default=0, ge=0)
     #: Names of severity models; None takes those that fit the type of the crash.
-    severity: tuple[str, ...] | None = None
-    severity_inputs: dict[str, FiniteFloat | str] = Field(default_factory=dict)
-    formats: tuple[Literal["csv", "mme"], ...] = ("csv",)
+    severity: Annotated[tuple[Word, ...] | None, Listed] = None
+    severity_inputs: dict[Word, Number | Words] = Field(default_factory=dict)
+    formats: Annotated[tuple[Literal["csv", "mme"], ...], Listed] = ("csv",)
 
 
 class CaseSpec(TableSpec):
@@ -138,9 +163,9 @@ class CaseSpec(TableSpec):
     unwritten: ClassVar[tuple[str, ...]] = ("name",)
 
     name: str = "case"
-    title: str
-    number: str = ""
-    author: str = ""
+    title: Word
+    number: Words = ""
+    author: Words = ""
     description: str = ""
     vehicle: VehicleSpec = VehicleSpec()
     point: PointSpec = PointSpec()

@@ -1,0 +1,155 @@
+"""The keys of a table that a person wrote, as those of its specification."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from strapdown.config.quantities import base_of, converted, keys_of
+from strapdown.config.shown import shown, shown_key
+from strapdown.config.spec import TableSpec
+from strapdown.config.toml_file import TomlFile
+from strapdown.config.toml_lines import KeyPath
+from strapdown.exceptions import ConfigError, nearest
+
+__all__ = ["canonical"]
+
+
+def canonical(
+    file: TomlFile, form: type[TableSpec]
+) -> tuple[dict[str, Any], dict[KeyPath, KeyPath]]:
+    """Put every quantity in the unit of its field.
+
+    Parameters
+    ----------
+    file : TomlFile
+    form : type
+        The specification that it is one of.
+
+    Returns
+    -------
+    table : dict
+        With the names of the fields.
+    written : dict
+        By the path of a field, its path in the file, where the file has another unit.
+
+    Raises
+    ------
+    ConfigError
+        A key is not known or lacks its unit, or two give one quantity.
+    """
+    return _Keys(file, form).read()
+
+
+class _Keys:
+    def __init__(self, file: TomlFile, form: type[TableSpec]) -> None:
+        self.file = file
+        self.form = form
+        self.written: dict[KeyPath, KeyPath] = {}
+
+    def read(self) -> tuple[dict[str, Any], dict[KeyPath, KeyPath]]:
+        return self._table(self.file.table, self.form, ()), self.written
+
+    def _table(self, table: dict[str, Any], form: type[TableSpec], path: KeyPath) -> dict[str, Any]:
+        known = _known(form)
+        found: dict[str, Any] = {}
+        by: dict[str, str] = {}
+        for key, value in table.items():
+            name = known.get(key)
+            if name is None:
+                raise self._unknown(key, value, form, path)
+            if name in found:
+                raise self._twice(by[name], key, table, path)
+            by[name] = key
+            inner = table_of(form, name)
+            if inner is not None and isinstance(value, dict):
+                found[name] = self._table(value, inner, (*path, key))
+            elif inner is not None and isinstance(value, list):
+                found[name] = [
+                    self._table(part, inner, (*path, key, k)) if isinstance(part, dict) else part
+                    for k, part in enumerate(value)
+                ]
+            else:
+                found[name] = converted(value, key, name)
+            if key != name:
+                self.written[*path, name] = (*path, key)
+        return found
+
+    def _twice(self, first: str, second: str, table: dict[str, Any], path: KeyPath) -> ConfigError:
+        return self.file.refuse(
+            (*path, second),
+            f"{second} = {shown(table[second])} and, in line {self.file.line((*path, first))}, "
+            f"{first} = {shown(table[first])} are one quantity in two units",
+            "keep one of the two",
+        )
+
+    def _unknown(self, key: str, value: Any, form: type[TableSpec], path: KeyPath) -> ConfigError:
+        known = _known(form)
+        bases = [n for n in dict.fromkeys(known.values()) if len(keys_of(n)) > 1 or base_of(n) != n]
+        same = [n for n in bases if key == base_of(n)]
+        begun = [n for n in bases if key.startswith(f"{base_of(n)}_")]
+        elsewhere = [header for header, other in self._forms() if key in _known(other)]
+        what = "there is no such key"
+        if same:
+            what = f"{shown(value)} has no unit"
+            remedy = f"write {_either(keys_of(same[0]))}"
+        elif begun:
+            name = max(begun, key=lambda n: len(base_of(n)))
+            remedy = f"write {_either(keys_of(name))}"
+        elif elsewhere:
+            remedy = (
+                f"it belongs to {_either(elsewhere)}: a key belongs to the last header above it, "
+                "so move it there, above any further header"
+            )
+        else:
+            fields = [n for n in form.model_fields if n not in form.unwritten]
+            remedy = nearest(key[:100], fields, also=known)
+        return self.file.refuse((*path, key), what, remedy)
+
+    def _forms(self) -> Iterator[tuple[str, type[TableSpec]]]:
+        yield "the top of the file", self.form
+        yield from _below(self.form, "")
+
+
+def _below(form: type[TableSpec], prefix: str) -> Iterator[tuple[str, type[TableSpec]]]:
+    for name in form.model_fields:
+        inner = table_of(form, name)
+        if inner is not None:
+            header = f"{prefix}{name}"
+            several = _is_list(form.model_fields[name].annotation)
+            yield (f"[[{header}]]" if several else f"[{header}]"), inner
+            yield from _below(inner, f"{header}.")
+
+
+def table_of(form: type[TableSpec], name: str) -> type[TableSpec] | None:
+    """The specification of a field that is a table, or a list of them."""
+    return _inner(form.model_fields[name].annotation)
+
+
+def _inner(annotation: Any) -> type[TableSpec] | None:
+    if isinstance(annotation, type) and issubclass(annotation, TableSpec):
+        return annotation
+    if get_origin(annotation) in (tuple, Union, UnionType, Annotated):
+        for part in get_args(annotation):
+            found = _inner(part)
+            if found is not None:
+                return found
+    return None
+
+
+def _is_list(annotation: Any) -> bool:
+    return get_origin(annotation) is tuple
+
+
+def _known(form: type[TableSpec]) -> dict[str, str]:
+    """By every key that is understood, its field."""
+    fields = [name for name in form.model_fields if name not in form.unwritten]
+    return {key: name for name in fields for key in keys_of(name)}
+
+
+def _either(words: tuple[str, ...] | list[str]) -> str:
+    shown_words = [shown_key(word) for word in words]
+    if len(shown_words) == 1:
+        return shown_words[0]
+    return f"{', '.join(shown_words[:-1])} or {shown_words[-1]}"

@@ -1,0 +1,50 @@
+"""A crash case read from its file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from strapdown.config.case_keys import canonical
+from strapdown.config.case_paths import with_absolute_paths
+from strapdown.config.case_wanted import what_to_write
+from strapdown.config.crash_case import CaseSpec
+from strapdown.config.explain import explained
+from strapdown.config.placeholders import refuse_placeholders
+from strapdown.config.toml_file import read_toml
+
+__all__ = ["read_case_spec"]
+
+
+def read_case_spec(path: str | Path) -> CaseSpec:
+    """Read the file of a crash case.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    CaseSpec
+        Named after the file; every quantity in the unit of its field, every file that it names as
+        an absolute path, found from the folder of the case.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
+        does not fit, or two contradict each other; the message names the line, or both.
+    """
+    path = Path(path)
+    file = read_toml(path, "a case has three levels")
+    if "name" in file.table:
+        remedy = "a case is named after its file; write title = …"
+        raise file.refuse(("name",), "there is no such key", remedy)
+    refuse_placeholders(file)
+    table, written = canonical(file, CaseSpec)
+    try:
+        spec = CaseSpec(**{**table, "name": path.stem})
+        return CaseSpec(**with_absolute_paths(file, spec.model_dump()))
+    except ValidationError as error:
+        raise explained(error.errors()[0], file, written=written, wanted=what_to_write) from None

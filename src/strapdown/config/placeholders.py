@@ -1,0 +1,62 @@
+"""What a case leaves open: values that only the user can know, written as a question mark."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from strapdown.config.case_wanted import wanted_at
+from strapdown.config.toml_file import TomlFile, place_of
+from strapdown.config.toml_lines import KeyPath
+from strapdown.exceptions import ConfigError
+
+__all__ = ["PLACEHOLDER", "refuse_placeholders"]
+
+#: Stands where only the user can know.
+PLACEHOLDER = "?"
+#: More of them are counted, not listed.
+MOST = 60
+
+
+def refuse_placeholders(file: TomlFile) -> None:
+    """Name every value that is still open.
+
+    Raises
+    ------
+    ConfigError
+        There are some; the message has the line of each, and what is wanted there.
+    """
+    # A vector that is open in each component is one.
+    open_keys = list(dict.fromkeys(_open(file.table, ())))
+    if not open_keys:
+        return
+    lines = []
+    for path in open_keys[:MOST]:
+        wanted = wanted_at(path)
+        lines.append(
+            f"  line {file.line(path)}, {place_of(path)}" + (f": {wanted}" if wanted else "")
+        )
+    if len(open_keys) > MOST:
+        lines.append(f"  and {len(open_keys) - MOST} more")
+    count = len(open_keys)
+    what = "one value is still open" if count == 1 else f"{count} values are still open"
+    raise ConfigError(
+        "\n".join([f"{what}:", *lines]),
+        file=file.path.name,
+        remedy=f'put what you know in place of each "{PLACEHOLDER}", numbers without quotation '
+        "marks; a key that may be left out may be deleted",
+    )
+
+
+def _open(node: Any, path: KeyPath) -> Iterator[KeyPath]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _open(value, (*path, key))
+    elif isinstance(node, list):
+        for k, value in enumerate(node):
+            if isinstance(value, dict):
+                yield from _open(value, (*path, k))
+            else:
+                yield from (path for _ in _open(value, path))
+    elif isinstance(node, str) and node.strip() == PLACEHOLDER:
+        yield path
