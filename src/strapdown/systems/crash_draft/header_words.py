@@ -1,0 +1,151 @@
+"""What a column's heading says of a crash record's channel, in the words of several languages."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from strapdown.formats.columns import UNIT_OF, read_name
+
+__all__ = ["Heading", "read_heading"]
+
+# Words and beginnings of words, longest first where one begins another.
+_TIME = ("zeit", "temps", "tiempo", "tempo", "vrijeme", "vreme", "czas", "stamp", "clock", "time")
+_COUNTER = ("n", "nr", "no", "num", "number", "index", "idx", "sample", "count", "counter", "row")
+_OTHER = (
+    "temp tmp batt volt spannung druck press humid feucht mag magn kompass compass lat lon alt "
+    "satell status flag valid quality speed geschw vitesse brems brake throttle engine rpm"
+).split()
+_ACCEL = (
+    "acc accel beschl accél aceler przysp ubrz versnell specificforce lowg highg gforce nd hd"
+).split()
+_RATE = "gyro gyr rate omega angular drehrate winkelg gier wank nick yaw roll pitch rot".split()
+_VELOCITY = "deltav dv delta-v".split()
+_AXES = {
+    "x": "x longitudinal longit long laengs längs forward fwd roll wank".split(),
+    "y": "y lateral quer right transv pitch nick".split(),
+    "z": "z vertical vertikal vert hoch down yaw gier".split(),
+}
+_UNITS = {"grad/s": "deg/s", "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "mph": "mph"}
+_BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
+_WORD = re.compile(r"[^\W\d_]+|\d+")
+_NUMBERED = re.compile(r"(.*?)[ _\-]?(\d+)$")
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What a heading says.
+
+    Attributes
+    ----------
+    quantity : str
+        ``time``, ``counter``, ``acceleration``, ``rate``, ``velocity``, ``other``; empty where
+        it says nothing.
+    axis : str
+        ``x``, ``y``, ``z`` or empty.
+    unit : str
+        In this package's spelling, ``km/h`` or ``mph``; empty where it says none.
+    stem : str
+        What is left without axis and unit: channels of one triad share it.
+    number : int or None
+        With which it ends: of channels that are counted.
+    """
+
+    quantity: str
+    axis: str
+    unit: str
+    stem: str
+    number: int | None = None
+
+
+def read_heading(name: str) -> Heading:
+    """Read a heading.
+
+    Parameters
+    ----------
+    name : str
+        As ``Beschl. HD X [g]``, ``gyro_z_deg_s``, ``a2``, ``yaw rate``.
+
+    Notes
+    -----
+    A single ``g`` with an axis is an acceleration to one maker and a gyro to another: it says
+    its axis and nothing else.
+    """
+    said = read_name(name)
+    unit = said.unit or _unit(name)
+    plain = _BRACKET.sub(" ", name).lower()
+    words = [w for w in _WORD.findall(plain) if w]
+    quantity, axis = _known(said.quantity)
+    stem_words = words
+    if words and not axis:
+        axis, stem_words = _axis(words)
+    elif axis:
+        _, stem_words = _axis(words)
+    joined = "".join(words)
+    if joined in ("gx", "gy", "gz"):
+        quantity = ""
+    if not quantity or quantity == "other":
+        quantity = _quantity(words, joined) or quantity
+    if unit in ("m/s2", "g", "mg") and quantity != "other":
+        quantity = "acceleration"
+    elif unit in ("rad/s", "deg/s", "mrad/s", "mdeg/s") and quantity != "other":
+        quantity = "rate"
+    elif unit in ("km/h", "m/s", "mph") and quantity == "velocity":
+        pass
+    elif unit in ("s", "ms", "us", "ns") and quantity not in ("other", "counter"):
+        quantity = "time"
+    number = _NUMBERED.match(plain.strip())
+    return Heading(
+        quantity,
+        axis if quantity in ("", "acceleration", "rate", "velocity") else "",
+        unit,
+        " ".join(stem_words),
+        int(number.group(2)) if number and len(number.group(2)) < 6 else None,
+    )
+
+
+def _known(quantity: str | None) -> tuple[str, str]:
+    if quantity is None:
+        return "", ""
+    if quantity == "time":
+        return "time", ""
+    triad, _, axis = quantity.partition("_")
+    kind = {"accel": "acceleration", "gyro": "rate"}.get(triad, "other")
+    return kind, axis if axis in ("x", "y", "z") else ""
+
+
+def _unit(name: str) -> str:
+    bracket = _BRACKET.search(name)
+    if not bracket:
+        return ""
+    text = bracket.group(1).lower().replace(" ", "")
+    return UNIT_OF.get(text, _UNITS.get(text, ""))
+
+
+def _quantity(words: list[str], joined: str) -> str:
+    if any(joined.startswith(v.replace("-", "")) for v in _VELOCITY):
+        return "velocity"
+    for word in words:
+        if any(word.startswith(o) for o in _OTHER):
+            return "other"
+    for kind, known in (("rate", _RATE), ("acceleration", _ACCEL)):
+        if any(word.startswith(k) if len(k) > 2 else word == k for word in words for k in known):
+            return kind
+    if any(word.startswith(t) or word.endswith(t) for word in words for t in _TIME):
+        return "time"
+    if joined in _COUNTER or (words and words[-1] in _COUNTER):
+        return "counter"
+    return ""
+
+
+def _axis(words: list[str]) -> tuple[str, list[str]]:
+    """The axis of the last word that is one, or that ends in one; and the others."""
+    for k in range(len(words) - 1, -1, -1):
+        for axis, known in _AXES.items():
+            if words[k] in known:
+                return axis, words[:k] + words[k + 1 :]
+    for k in range(len(words) - 1, -1, -1):
+        word = words[k]
+        if 1 < len(word) <= 5 and word[-1] in _AXES:
+            return word[-1], [*words[:k], word[:-1], *words[k + 1 :]]
+    return "", words

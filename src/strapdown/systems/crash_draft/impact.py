@@ -1,0 +1,163 @@
+"""When a unit was struck, by its own clock, and how it was at rest before."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.crash.event_detector import EventDetector
+from strapdown.crash.event_rule import PART_563
+from strapdown.sensors.pre_crash import find_pre_crash_rest
+from strapdown.systems.crash_draft.mounting_at_rest import Sitting, sitting_at_rest
+from strapdown.systems.crash_draft.parts import Part
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+__all__ = ["Impact", "find_impact"]
+
+# What is before the largest pulse by less is part of it.
+BEFORE, REACH = 0.3, 3.0  # s
+LEAST_BASE = 5  # samples
+# A record that counts from its trigger has it at zero, this near to where the event begins.
+AT_ZERO = 0.05  # s
+CHANGE_OVER = 0.15  # s
+
+
+@dataclass(frozen=True)
+class Impact:
+    """What accelerometers tell of a crash.
+
+    Attributes
+    ----------
+    trigger : float, s
+        On their clock.
+    trigger_sd : float, s
+    at_zero : bool
+        The record counts from its trigger.
+    found : bool
+        Whether there is an event after 49 CFR 563.
+    largest : float, m/s
+        Horizontal change of velocity of the event; without one, the largest within 150 ms.
+    peak : float, m/s²
+        Of the resultant, without gravity.
+    change : ndarray, (3,), m/s
+        In sensor axes, over 150 ms from the trigger, with the resting value taken off.
+    base : ndarray, (3,), m/s²
+        The resting value.
+    rest : (float, float) or None, s
+    grade : str
+        Of the rest: ``still``, ``steady``, or empty.
+    sitting : Sitting or None
+    more : int
+        Events after the first.
+    """
+
+    trigger: float
+    trigger_sd: float
+    at_zero: bool
+    found: bool
+    largest: float
+    peak: float
+    change: Array
+    base: Array
+    rest: tuple[float, float] | None
+    grade: str
+    sitting: Sitting | None
+    more: int
+
+
+def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
+    """Find the impact and the rest before it.
+
+    Parameters
+    ----------
+    strong : Part
+        The accelerometer of the highest range.
+    fine : Part
+        Of the lowest, on the same clock; may be the same.
+    gyro : Part, optional
+        On the same clock.
+    """
+    time = strong.time
+    rest = _rest(fine, gyro, _struck(strong))
+    base, fine_base = _base(strong, rest), _base(fine, rest)
+    free = np.nan_to_num(strong.values - base)
+    sitting = sitting_at_rest(fine_base) if len(fine.axes) == 3 else None
+    level = sitting.into_vehicle(free) if sitting else free
+    step = float(np.median(np.diff(time)))
+    before = time < time[int(np.argmax(np.linalg.norm(free, axis=1)))] - BEFORE
+    noise = free[before].std(axis=0) if before.sum() > LEAST_BASE else np.zeros(3)
+    detector = EventDetector(noise=tuple(float(n) for n in noise))
+    detector.extend(time, level)
+    events = [*detector.events, *([detector.current] if detector.current else [])]
+    peak_at = int(np.argmax(np.linalg.norm(free, axis=1)))
+    if events:
+        first = events[0]
+        trigger, sd = first.time_zero, first.time_zero_sd
+        during = (time >= first.time_zero) & (time <= first.end)
+        largest = float(np.linalg.norm(level[during, :2].sum(axis=0)) * step)
+    else:
+        trigger, sd = float(time[peak_at]), math.nan
+        largest = detector.largest_change[0]
+    # Time zero is known no better than the interval that it is looked for with lets it.
+    sd = max(sd if math.isfinite(sd) else 0.0, step, 0.25 * PART_563.wake_window)
+    at_zero = bool(time[0] <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
+    after = (time >= trigger) & (time <= trigger + CHANGE_OVER)
+    change = free[after].sum(axis=0) * step
+    return Impact(
+        0.0 if at_zero else trigger,
+        step / math.sqrt(12.0) if at_zero else sd,
+        at_zero,
+        bool(events),
+        largest,
+        float(np.linalg.norm(free[peak_at])),
+        change,
+        fine_base,
+        None if rest is None else (rest[0], rest[1]),
+        "" if rest is None else rest[2],
+        sitting,
+        max(len(events) - 1, 0),
+    )
+
+
+def _struck(part: Part) -> float:
+    """When it felt most, less what a pulse lasts."""
+    free = part.values - np.nanmedian(part.values, axis=0)
+    return float(part.time[int(np.argmax(np.nansum(free**2, axis=1)))]) - BEFORE
+
+
+def _base(part: Part, rest: tuple[float, float, str] | None) -> Array:
+    """Resting value: the mean over the rest; else over what is before the largest pulse."""
+    time, values, has = part.time, part.values, part.axes
+    out = np.full(3, np.nan)
+    struck = _struck(part)
+    windows = [(rest[0], rest[1])] if rest else []
+    windows += [(struck - REACH, struck), (float(time[0]), 0.5 * float(time[0] + struck))]
+    for start, end in windows:
+        rows = (time >= start) & (time <= end)
+        if rows.sum() >= LEAST_BASE:
+            out[has] = values[rows][:, has].mean(axis=0)
+            return out
+    # A record that begins with the crash: it is zeroed, or nothing can be said.
+    out[has] = values[: LEAST_BASE - 2, has].mean(axis=0)
+    return out
+
+
+def _rest(fine: Part, gyro: Part | None, impact: float) -> tuple[float, float, str] | None:
+    if len(fine.axes) < 3:
+        return None
+    rates = np.zeros_like(fine.values)
+    if gyro is not None and len(gyro.axes) == 3:
+        rates = np.column_stack([np.interp(fine.time, gyro.time, gyro.values[:, k]) for k in range(3)])
+    imu = pd.DataFrame(
+        np.column_stack([rates, fine.values]),
+        index=pd.Index(fine.time, name="time"),
+        columns=[*GYRO, *ACCEL],
+    )
+    found = find_pre_crash_rest(imu, impact=impact)
+    return None if found is None else (found.start, found.end, found.grade)

@@ -1,0 +1,136 @@
+"""Lines of a TOML file with comments: text of any origin comes back from it as it was."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+__all__ = ["ASK", "Asked", "Page", "array", "inline", "number", "plain", "string"]
+
+#: What stands where only a person knows the value.
+ASK = '"?"'
+WIDTH = 100
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_SHORT = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+LONGEST = 300
+
+
+def string(text: str) -> str:
+    """A basic string of TOML.
+
+    Parameters
+    ----------
+    text : str
+        Of any characters; halves of surrogate pairs, which no UTF-8 holds, become U+FFFD.
+    """
+    return '"' + "".join(_escaped(c) for c in text) + '"'
+
+
+def _escaped(c: str) -> str:
+    if c in _SHORT:
+        return _SHORT[c]
+    code = ord(c)
+    if 0xD800 <= code <= 0xDFFF:
+        return "\\uFFFD"
+    if not c.isprintable():
+        return f"\\u{code:04X}" if code <= 0xFFFF else f"\\U{code:08X}"
+    return c
+
+
+def plain(text: str) -> str:
+    """Text for a comment: one line, no control characters, no longer than 300."""
+    one = "".join(c if c.isprintable() else " " for c in text)
+    return one if len(one) <= LONGEST else one[: LONGEST - 1] + "…"
+
+
+def number(value: float, digits: int = 6) -> str:
+    """A float of TOML, in no more digits than it is known to."""
+    text = f"{value:.{digits}g}"
+    return text if any(c in text for c in ".en") else f"{text}.0"
+
+
+def array(values: Sequence[float | None]) -> str:
+    """Numbers, with a question where one is not known."""
+    return "[" + ", ".join(ASK if v is None else number(v) for v in values) + "]"
+
+
+def inline(table: Mapping[str, str]) -> str:
+    """An inline table of strings."""
+    pairs = (f"{k if _BARE.fullmatch(k) else string(k)} = {string(v)}" for k, v in table.items())
+    return "{ " + ", ".join(pairs) + " }"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A value that is left to the user.
+
+    Attributes
+    ----------
+    line : int
+        Of the file, counted from 1.
+    key : str
+    what : str
+    """
+
+    line: int
+    key: str
+    what: str
+
+
+@dataclass
+class Page:
+    """A file as it is written, line by line."""
+
+    lines: list[str] = field(default_factory=list)
+    asked: list[Asked] = field(default_factory=list)
+
+    def say(self, *paragraphs: str) -> None:
+        """Comment lines, wrapped; text in them is made harmless."""
+        for text in paragraphs:
+            shown = "".join(c if c.isprintable() else " " for c in text)
+            if len(shown) > 6 * LONGEST:
+                shown = shown[: 6 * LONGEST - 1] + "…"
+            wrapped = textwrap.wrap(
+                shown, WIDTH - 2, break_long_words=True, break_on_hyphens=False
+            )
+            self.lines += [f"# {line}".rstrip() for line in wrapped or [""]]
+
+    def table(self, header: str, *remarks: str) -> None:
+        """A blank line, comments, and the header of a table."""
+        self.blank()
+        self.say(*remarks)
+        self.lines.append(header)
+
+    def blank(self) -> None:
+        """A blank line, never two."""
+        if self.lines and self.lines[-1]:
+            self.lines.append("")
+
+    def key(self, name: str, value: str, remark: str = "", *, what: str = "") -> None:
+        """One key with its remark, beside it where it fits, else above.
+
+        Parameters
+        ----------
+        name, value : str
+            The value as TOML.
+        remark : str
+        what : str
+            Short, for the list of what is left to the user; the remark, if not given.
+        """
+        text = f"{name} = {value}"
+        remark = "".join(c if c.isprintable() else " " for c in remark)
+        beside = f"{text:<34}  # {remark}"
+        if remark and len(beside) > WIDTH:
+            self.say(remark)
+            beside = text
+        self.lines.append(beside if remark else text)
+        if ASK in value:
+            said = what or remark.removeprefix("only you know: ")
+            self.asked.append(Asked(len(self.lines), name, said))
+
+    @property
+    def text(self) -> str:
+        """The whole file."""
+        return "\n".join(self.lines) + "\n"

@@ -1,0 +1,287 @@
+"""What three columns of numbers are: an accelerometer or a gyro, and in which unit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, STANDARD_GRAVITY, TIME_UNITS
+from strapdown.formats.inference.conclusion import THRESHOLD, posterior
+from strapdown.formats.inference.gravity import infer_accel
+from strapdown.formats.inference.rotation_rate import infer_gyro
+from strapdown.sensors.saturation import find_limits
+from strapdown.systems.crash_draft.parts import Clock
+
+Array = NDArray[np.float64]
+
+__all__ = ["Answer", "Quiet", "accel_unit", "gyro_unit", "quiet_part", "same_quantity"]
+
+# A stretch is quiet until a sample steps off by this many times the usual step.
+BURST = 15.0
+LEAST_QUIET = 10  # samples
+# Noise and zero-rate offset of the MEMS gyros of crash recorders: decades about these, with a
+# standard deviation that covers an order of magnitude either way twice.
+USUAL_NOISE, USUAL_OFFSET, DECADES = math.radians(0.1), math.radians(1.0), 0.7
+# Turns in a crash: a tenth of a revolution a second, within a factor of four.
+USUAL_PEAK, PEAK_DECADES = math.radians(120.0), 0.6
+# Two ranges of one sensor, or two recorders, agree so far.
+LEAST_CORRELATION = 0.8
+SCALE_TOLERANCE = 0.2
+# Ends of the ranges of accelerometers, in g, and how exactly they are met.
+FULL_SCALES = (
+    *(1.2, 1.5, 1.7, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 18.0, 20.0, 24.0, 25.0, 30.0),
+    *(35.0, 37.0, 40.0, 50.0, 55.0, 64.0, 70.0, 75.0, 100.0, 120.0, 150.0, 200.0, 250.0, 400.0),
+    *(500.0, 1000.0, 2000.0),
+)
+ROUND = 0.003
+# Four fifths of the power of a crash are within so long.
+PULSE = (0.008, 0.8)  # s
+# Of a reading: where a low range stands at its end, the two have nothing to agree on.
+NEAR_END = 0.98
+
+
+@dataclass(frozen=True)
+class Quiet:
+    """Rest of a triad before something happens, in its own numbers.
+
+    Attributes
+    ----------
+    count : int
+        Samples from the first.
+    mean, sd : ndarray, (3,)
+    """
+
+    count: int
+    mean: Array
+    sd: Array
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A unit with what speaks for it.
+
+    Attributes
+    ----------
+    unit : str
+        The likeliest.
+    confidence : float
+    why : str
+    others : tuple of (str, float)
+        Units with their probabilities, the likeliest first, `unit` among them.
+    gravity : float
+        Probability that it is an accelerometer with gravity in it, in whatever unit.
+    """
+
+    unit: str
+    confidence: float
+    why: str
+    others: tuple[tuple[str, float], ...] = ()
+    gravity: float = 0.0
+
+    @property
+    def settled(self) -> bool:
+        """Whether it is sure enough to be written without asking."""
+        return self.confidence >= THRESHOLD
+
+
+def quiet_part(values: Array) -> Quiet:
+    """The samples before the first burst of any column.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+    """
+    steps = np.abs(np.diff(values, axis=0))
+    usual = np.median(steps, axis=0)
+    # A coarse converter repeats most values; its step is what a change is measured by.
+    least = np.array([s[s > 0].min(initial=np.inf) if (s > 0).any() else np.inf for s in steps.T])
+    limit = BURST * np.maximum(usual, least)
+    bursts = np.flatnonzero((steps > limit).any(axis=1))
+    count = int(bursts[0]) if bursts.size else len(values)
+    if count < min(LEAST_QUIET, len(values)):
+        count = min(LEAST_QUIET, len(values))
+    part = values[:count]
+    return Quiet(count, part.mean(axis=0), part.std(axis=0))
+
+
+def accel_unit(values: Array, step: float, quiet: Quiet) -> Answer:
+    """Unit of an accelerometer by the length of its rest.
+
+    Parameters
+    ----------
+    values : ndarray, (n, 3)
+    step : float, s
+    quiet : Quiet
+        Of these values.
+
+    Returns
+    -------
+    Answer
+        With confidence 0 where gravity is not in it; `gravity` tells how sure it is that it is.
+
+    Notes
+    -----
+    Counts of a converter may be 1024 a gravity, as mg nearly are. A sensor that stood at its end
+    tells them apart: full scales are round in g, and converters end at a power of two.
+    """
+    length = float(np.linalg.norm(quiet.mean))
+    said, form, gravity, _ = infer_accel(values[: quiet.count], step if step > 0 else None)
+    pairs = [(str(v), p) for v, p in ((said.value, said.confidence), *said.alternatives) if v]
+    there = gravity.confidence if gravity.value == "present" else 0.0
+    there = min(there, form.confidence if form.value == "rate" else 0.0)
+    likeliest = pairs[0][0] if pairs else "m/s2"
+    told = f"at rest its length is {length:.4g}, that of gravity in {likeliest}"
+    sure = pairs[0][1] if pairs else 0.0
+    if there >= THRESHOLD and sure < THRESHOLD and (end := _round_end(values, likeliest)):
+        told += f", and it ends at {end:g} g"
+        sure = THRESHOLD
+    return Answer(likeliest, min(sure, there), told, tuple(pairs), there)
+
+
+def _round_end(values: Array, unit: str) -> float | None:
+    """Full scale in g, where values stand at an end that is round in this unit and no power of two."""
+    limits = find_limits(
+        np.arange(len(values)) * 1e-3, values, np.full(3, np.inf), np.zeros(3)
+    )
+    ends = [abs(e) for e in (*limits.lower, *limits.upper) if np.isfinite(e)]
+    if not ends:
+        return None
+    end = max(ends)
+    power = 2.0 ** round(math.log2(end))
+    in_g = end * ACCEL_UNITS[unit] / STANDARD_GRAVITY
+    near = min(FULL_SCALES, key=lambda f: abs(in_g / f - 1.0))
+    if abs(in_g / near - 1.0) > ROUND or abs(end / power - 1.0) <= ROUND:
+        return None
+    return near
+
+
+def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
+    """Unit of time by how long the crash lasts.
+
+    Parameters
+    ----------
+    clock : Clock
+        Whose `rate` is that of its likeliest unit, and whose `candidates` are not settled.
+    values : ndarray, (n, k)
+        In any unit.
+
+    Returns
+    -------
+    (unit, why) or None
+        None where more than one unit, or none, makes a crash of it.
+    """
+    free = values - np.median(values, axis=0)
+    power = np.cumsum((free**2).sum(axis=1))
+    edges = np.searchsorted(power, np.array([0.1, 0.9]) * power[-1])
+    samples = int(edges[1] - edges[0])
+    if samples < 3:
+        return None
+    lasts = {u: samples * f * clock.step for u, f in TIME_UNITS.items()}
+    fits = [u for u, length in lasts.items() if PULSE[0] <= length <= PULSE[1]]
+    if len(fits) != 1:
+        return None
+    unit = fits[0]
+    return unit, (
+        f"in {unit} four fifths of the pulse last {lasts[unit]:.2g} s, as a crash does, in any "
+        "other unit a thousand times less or more"
+    )
+
+
+def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
+    """Unit of a gyro by its size, its rest and its noise.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+    values : ndarray, (n, 3)
+    quiet : Quiet
+
+    Notes
+    -----
+    The probabilities of `formats.inference` hold the largest rates of the crash; to them come
+    the rest's offset and noise, and the peak, each as a broad normal distribution of the
+    logarithm.
+    """
+    crash = slice(max(quiet.count - 1, 0), None)
+    said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
+    prior = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
+    peak = float(np.abs(values - quiet.mean).max())
+    offset = float(np.abs(quiet.mean).max())
+    noise = float(np.sqrt(np.mean(quiet.sd**2)))
+    weights = {}
+    for unit in ("rad/s", "deg/s"):
+        scale = GYRO_UNITS[unit]
+        log = math.log(max(prior.get(unit, 1e-6), 1e-6))
+        for size, usual, decades in (
+            (peak, USUAL_PEAK, PEAK_DECADES),
+            (offset, USUAL_OFFSET, DECADES),
+            (noise, USUAL_NOISE, DECADES),
+        ):
+            if size > 0.0:
+                log -= 0.5 * (math.log10(size * scale / usual) / decades) ** 2
+        weights[unit] = log
+    found = posterior(weights)
+    unit = next(iter(found))
+    factor = GYRO_UNITS[unit] / GYRO_UNITS["deg/s"]
+    told = (
+        f"in {unit} its largest is {peak * factor:.4g} deg/s, its rest {offset * factor:.3g} deg/s "
+        f"and its noise {noise * factor:.3g} deg/s"
+    )
+    return Answer(unit, found[unit], told, tuple(found.items()))
+
+
+def same_quantity(
+    known: Array, other: Array
+) -> tuple[str, float, float] | None:
+    """Unit of a triad by one that felt the same and is known.
+
+    Parameters
+    ----------
+    known : ndarray, (n, 3), m/s²
+    other : ndarray, (n, 3)
+        At the same instants, in a unit that is looked for.
+
+    Returns
+    -------
+    (unit, ratio, correlation) or None
+        The ratio is that of the scale found to the unit's; None where they do not agree.
+    """
+    slope, correlation = regress(known, other)
+    if correlation < LEAST_CORRELATION or slope <= 0.0:
+        return None
+    scales = {u: s for u, s in ACCEL_UNITS.items() if s > 0.0}
+    unit = min(scales, key=lambda u: abs(math.log(slope / scales[u])))
+    ratio = slope / scales[unit]
+    if abs(ratio - 1.0) > SCALE_TOLERANCE:
+        return None
+    return unit, ratio, correlation
+
+
+def regress(known: Array, other: Array) -> tuple[float, float]:
+    """Scale of `other` to `known` where neither is at its end, and how well they correlate."""
+    ends = NEAR_END * np.nanmax(np.abs(known), axis=0)
+    inside = np.abs(known) < ends
+    x, y = [], []
+    for k in range(known.shape[1]):
+        rows = inside[:, k] & np.isfinite(known[:, k]) & np.isfinite(other[:, k])
+        if rows.sum() < 3:
+            continue
+        x.append(other[rows, k] - np.median(other[rows, k]))
+        y.append(known[rows, k] - np.median(known[rows, k]))
+    if not x:
+        return 0.0, 0.0
+    a, b = np.concatenate(x), np.concatenate(y)
+    power, own = float(a @ a), float(b @ b)
+    if power <= 0.0 or own <= 0.0:
+        return 0.0, 0.0
+    # Both are noisy: the slope between the two regressions is not drawn to zero.
+    correlation = float(a @ b) / math.sqrt(power * own)
+    return math.copysign(math.sqrt(own / power), correlation), correlation
+
+
+def gravity_in(unit: str) -> float:
+    """Length of gravity in a unit."""
+    return STANDARD_GRAVITY / ACCEL_UNITS[unit]
