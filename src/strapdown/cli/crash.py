@@ -29,7 +29,7 @@ def crash(
     from strapdown.bundle import check_destination, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.crash_tables import print_crash
-    from strapdown.config.crash_case import read_case_spec
+    from strapdown.config.crash_case_file import read_case_spec
     from strapdown.report.crash_case import write_crash
     from strapdown.systems.crash_case import run_case
 

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
-from strapdown.config.crash_case import CaseSpec, read_case_spec
+from strapdown.config.crash_case import CaseSpec
+from strapdown.config.crash_case_file import read_case_spec
 from strapdown.report.chart import Chart
 from strapdown.report.crash_assumptions import CONVENTIONS
 from strapdown.report.crash_document import crash_document, drawings

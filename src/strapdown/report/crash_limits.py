@@ -190,11 +190,11 @@ def _rest(result: CaseResult) -> Iterator[tuple[str, str]]:
                 "biases and levelling are known the less the shorter it is, and the bounds are so "
                 "much wider.",
             )
-    for unit in result.units:
-        if unit.gyro is None and unit.gyro_from is not None:
+    for recorder in result.units:
+        if recorder.gyro is None and recorder.gyro_from is not None:
             yield (
-                f"{unit.name} has no gyro",
-                f"It borrows that of {unit.gyro_from}: a rigid vehicle turns everywhere alike.",
+                f"{recorder.name} has no gyro",
+                f"It borrows that of {recorder.gyro_from}: a rigid vehicle turns everywhere alike.",
             )
 
 

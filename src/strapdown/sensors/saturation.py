@@ -14,7 +14,9 @@ __all__ = ["RangeLimits", "find_limits"]
 
 # A crash holds a sensor at its end for tens of milliseconds; what is flat for longer is a rest.
 LONGEST_FLAT = 0.5  # s
-LEAST_FLAT = 3  # samples
+# Noise of a few steps puts three equal numbers on the crest of a pulse in one case of a hundred,
+# and a record has a dozen crests.
+LEAST_FLAT = 4  # samples
 # The top of a smooth pulse in coarse steps is flat, too, but is left by one step.
 LEAST_JUMP = 3.0  # steps
 # So many cannot be where a fast rise meets a slow fall, unless there is no noise at all.
@@ -79,7 +81,7 @@ def find_limits(
     Notes
     -----
     A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
-    an end where it stays on the very same extreme value of the record for three samples or
+    an end where it stays on the very same extreme value of the record for four samples or
     more, up to 0.5 s, and jumps by three steps or more on both sides (ten samples or more: on one
     side): noise repeats no number, and the top of a smooth pulse is left by fewer steps. Below a
     tenth of the range, or of the largest reading, it needs ten samples and jumps on both sides.
