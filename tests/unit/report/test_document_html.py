@@ -1,0 +1,158 @@
+"""A document as a page: whole, offline, and safe from its own texts."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from strapdown.exceptions import DataError
+from strapdown.report.chart import Chart
+from strapdown.report.document import Animation, Document, Picture
+from strapdown.report.document_data import draw_stills
+from strapdown.report.document_html import document_page
+from strapdown.report.document_text import plain_document
+
+sys.path.insert(0, str(Path(__file__).parent))
+from rich_document import EVIL, picture, rich_document
+
+
+class Page(HTMLParser):
+    """Elements with their attributes, text outside scripts and styles, and the scripts."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.elements, self.scripts, self.words, self._in = [], [], [], ""
+        self.feed(page)
+        self.text = " ".join(" ".join(self.words).split())
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        self._in = tag if tag in ("script", "style") else self._in
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag):
+        self._in = "" if tag in ("script", "style") else self._in
+
+    def handle_data(self, data):
+        if self._in == "script":
+            self.scripts[-1] += data
+        elif not self._in:
+            self.words.append(data)
+
+    def all(self, tag):
+        return [attributes for name, attributes in self.elements if name == tag]
+
+
+@pytest.fixture(scope="module")
+def document():
+    return rich_document(EVIL, charts=3)
+
+
+@pytest.fixture(scope="module")
+def stills(document):
+    return draw_stills(document)
+
+
+@pytest.fixture(scope="module")
+def text(document, stills):
+    return document_page(document, stills=stills)
+
+
+@pytest.fixture(scope="module")
+def page(text):
+    return Page(text)
+
+
+def test_texts_from_outside_stay_texts(page):
+    assert "alert(1)" not in "".join(page.scripts[-2:])  # plotly and the page's own
+    assert "<script>alert(1)</script>" in page.text
+    # Every image is a picture of ours; nothing has a handler.
+    assert all(image["src"].startswith("data:image/svg+xml;base64,") for image in page.all("img"))
+    assert not [a for _, a in page.elements if any(name.startswith("on") for name in a)]
+    kinds = [a.get("type") for a in page.all("script")]
+    assert kinds == ["application/json"] * 6 + [None, None]
+    assert "[U+202E]right to left" in page.text
+    assert not re.search("[\u202e\u200b\x00\x07]", page.text)
+    assert "aaaa… (20000 characters)" in page.text
+
+
+def test_nothing_is_fetched_and_no_other_script_may_run(text, page):
+    for tag, attributes in page.elements:
+        for name in ("src", "href", "action", "data", "poster", "srcset"):
+            assert attributes.get(name, "#")[:1] == "#" or tag == "img", (tag, attributes)
+    own = re.sub(r"<script.*?</script>", "", text, flags=re.S)
+    assert not re.search(r"(?:https?:)?//\w+\.", re.sub(r"base64,[\w+/=]+", "", own))
+    style = re.search(r"<style>(.*?)</style>", text, re.S).group(1)
+    assert "url(" not in style
+    assert "@import" not in style
+    policy = page.all("meta")[1]["content"]
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe-inline" not in policy.split("style-src")[0]
+
+
+def test_the_policy_names_the_scripts_that_stand_in_the_page(page):
+    import hashlib
+
+    named = re.findall(r"'sha256-([\w+/=]+)'", page.all("meta")[1]["content"])
+    digests = [hashlib.sha256(script.encode()).digest() for script in page.scripts[-2:]]
+    assert named == [base64.b64encode(digest).decode() for digest in digests]
+
+
+def test_figures_are_alive_and_stand_as_pictures_for_paper(document, page):
+    sources = [a for a in page.all("script") if "data-target" in a]
+    figures = {a["id"] for a in page.all("figure") if "id" in a}
+    assert [a["data-target"] for a in sources] == sorted(
+        figures, key=lambda name: int(name.removeprefix("figure-"))
+    )
+    for script in page.scripts[:-2]:
+        figure = json.loads(script)
+        assert figure["data"]
+        assert "<script" not in script
+        assert "<a " not in json.dumps(figure["layout"])
+    assert len([a for a in page.all("img") if a.get("class") == "still"]) == len(figures)
+    assert all(image["alt"] for image in page.all("img"))
+
+
+def test_headings_are_numbered_and_listed(document, page):
+    anchors = [a["href"] for a in page.all("a")][1:]
+    heads = [a["id"] for a in page.all("h2")][1:]
+    assert anchors == [f"#{name}" for name in heads]
+    assert len(heads) == len(document.sections)
+    assert [tag for tag, _ in page.elements if tag in ("h1", "h2", "h3")] == ["h1"] + ["h2"] * (
+        len(heads) + 1
+    )
+    assert {a["scope"] for a in page.all("th")} == {"row", "col"}
+    assert page.all("html") == [{"lang": "en"}]
+
+
+def test_a_document_without_charts_has_no_script():
+    page = Page(document_page(Document("t", "", (), (picture(),), ())))
+    assert not page.scripts
+    assert "script-src 'none'" in page.all("meta")[1]["content"]
+
+
+def test_a_second_cleaning_does_nothing(document):
+    once = plain_document(document)
+    again = plain_document(once)
+    assert (again.title, again.facts) == (once.title, once.facts)
+    for a, b in zip(again.sections, once.sections, strict=True):
+        for one, other in zip(a.blocks, b.blocks, strict=True):
+            if not hasattr(one, "chart"):  # arrays have no single answer to ==
+                assert one == other
+    blocks = [block for section in once.sections for block in section.blocks]
+    slugs = [b.slug for b in blocks if isinstance(b, Picture | Animation)]
+    slugs += [b.chart.slug for b in blocks if hasattr(b, "chart") and isinstance(b.chart, Chart)]
+    assert all(re.fullmatch(r"[\w-]{1,80}", slug) for slug in slugs), slugs
+
+
+def test_what_is_no_svg_is_named():
+    broken = Picture("plan", "<svg><g></svg>", "The plan")
+    with pytest.raises(DataError, match="'plan' is no SVG: mismatched tag"):
+        document_page(Document("t", "", (), (broken,), ()))
