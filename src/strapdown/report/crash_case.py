@@ -14,7 +14,7 @@ from strapdown.report.crash_assumptions import CONVENTIONS
 from strapdown.report.crash_document import crash_document, drawings
 from strapdown.report.crash_figures import crash_figures
 from strapdown.report.crash_json import crash_json
-from strapdown.report.crash_signals import signals_table, trajectory_table, write_table
+from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
 from strapdown.report.document import Animation, ChartBlock, Document, Picture
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf

@@ -20,6 +20,7 @@ __all__ = ["Direction", "pdof_dial"]
 _WIDTH, _RADIUS, _TOP = 330.0, 118.0, 142.0
 _CAR = 0.53  # of the dial's radius that the farthest corner of the vehicle reaches
 _RING = 0.86  # of it, where the ring of the intervals begins
+Point = tuple[float, float]
 _SOFT = "#4a525c"
 # The least that is drawn of an interval, deg: a stroke that can be seen.
 _LEAST_WEDGE = 1.0
@@ -82,7 +83,7 @@ def pdof_dial(
     said = [_words(d) for d in directions]
     alt = "Direction of force on a clock about the vehicle: " + "; ".join(said or ["no event"])
     out = Drawing(_WIDTH, height, alt)
-    centre = np.array([0.5 * _WIDTH, _TOP])
+    centre = (0.5 * _WIDTH, _TOP)
     for d in sorted(directions, key=lambda d: d.main):
         _wedge(out, centre, d)
     _clock(out, centre)
@@ -108,17 +109,17 @@ def pdof_dial(
     return Picture("pdof", out.svg(), "Direction of force", caption, alt, width_mm=84.0)
 
 
-def _at(centre: np.ndarray, radius: float, angle_deg: float) -> tuple[float, float]:
+def _at(centre: Point, radius: float, angle_deg: float) -> tuple[float, float]:
     a = math.radians(angle_deg)
-    return float(centre[0] + radius * math.sin(a)), float(centre[1] - radius * math.cos(a))
+    return centre[0] + radius * math.sin(a), centre[1] - radius * math.cos(a)
 
 
-def _arc(centre: np.ndarray, radius: float, low: float, high: float) -> list[tuple[float, float]]:
+def _arc(centre: Point, radius: float, low: float, high: float) -> list[tuple[float, float]]:
     steps = max(2, math.ceil((high - low) / 3.0) + 1)
     return [_at(centre, radius, a) for a in np.linspace(low, high, steps).tolist()]
 
 
-def _wedge(out: Drawing, centre: np.ndarray, d: Direction) -> None:
+def _wedge(out: Drawing, centre: Point, d: Direction) -> None:
     if d.interval is None:
         return
     low, high = d.interval.low_deg, d.interval.high_deg
@@ -132,20 +133,18 @@ def _wedge(out: Drawing, centre: np.ndarray, d: Direction) -> None:
     short = 0.5 * max(_LEAST_WEDGE - (high - low), 0.0)
     low, high = low - short, high + short
     if strong:
-        out.shape(
-            [tuple(centre), *_arc(centre, _RADIUS, low, high)], None, fill=colour, opacity=0.16
-        )
+        out.shape([centre, *_arc(centre, _RADIUS, low, high)], None, fill=colour, opacity=0.16)
     ring = _arc(centre, _RADIUS, low, high) + _arc(centre, inner, low, high)[::-1]
     out.shape(ring, None, fill=colour, opacity=0.45 if strong else 0.35)
 
 
-def _clock(out: Drawing, centre: np.ndarray) -> None:
+def _clock(out: Drawing, centre: Point) -> None:
     out.circle(centre, _RADIUS, "#c3cad2", 1.0)
     for angle in range(0, 360, 10):
-        hour = angle % 30 == 0
-        length = 7.0 if hour else 3.5
+        at_hour = angle % 30 == 0
+        length = 7.0 if at_hour else 3.5
         ends = _at(centre, _RADIUS, angle), _at(centre, _RADIUS - length, angle)
-        out.line(*ends, _SOFT if hour else "#c3cad2", 1.2 if hour else 0.8)
+        out.line(*ends, _SOFT if at_hour else "#c3cad2", 1.2 if at_hour else 0.8)
     for hour in range(1, 13):
         at = _at(centre, _RADIUS + 11.0, 30.0 * hour)
         out.text(at, str(hour), 11.5, INK, anchor="middle", bold=hour % 3 == 0)
@@ -163,20 +162,21 @@ def _scale(outline: Outline, point: Sequence[float]) -> float:
     return _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
 
 
-def _vehicle(out: Drawing, centre: np.ndarray, outline: Outline, point: Sequence[float]) -> None:
+def _vehicle(out: Drawing, centre: Point, outline: Outline, point: Sequence[float]) -> None:
     scale = _scale(outline, point)
+    origin = np.array(centre)
     # Forward is up the page: a heading of -90 deg where x is to the right and y down.
     there = outline.placed((0.0, 0.0), -90.0, point)
     pixels = Outline(
-        centre + scale * there.body,
-        tuple(centre + scale * w for w in there.windows),
-        tuple(centre + scale * f for f in there.folds),
+        origin + scale * there.body,
+        tuple(origin + scale * w for w in there.windows),
+        tuple(origin + scale * f for f in there.folds),
     )
     draw_outline(out, pixels, "#3d5166", 1.4, fill="#e9edf2")
 
 
 def _arrow(
-    out: Drawing, centre: np.ndarray, outline: Outline, point: Sequence[float], d: Direction
+    out: Drawing, centre: Point, outline: Outline, point: Sequence[float], d: Direction
 ) -> None:
     if not math.isfinite(d.horizontal_deg):
         return

@@ -133,7 +133,7 @@ def vehicle_outline(vehicle: VehicleSpec) -> Outline:
     def whole(half: tuple[tuple[float, float], ...]) -> Array:
         right = np.array(half, dtype=np.float64)
         both = np.vstack([right, (right * [1.0, -1.0])[::-1]])
-        return both * scale + np.array([front - vehicle.length_m, 0.0])
+        return np.asarray(both * scale + np.array([front - vehicle.length_m, 0.0]))
 
     sides = [np.array(_BONNET) * [1.0, sign] for sign in (1.0, -1.0)]
     return Outline(

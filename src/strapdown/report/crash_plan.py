@@ -241,9 +241,9 @@ def _draw_path(out: Drawing, view: PlanView, plan: _Plan, faint: bool) -> None:
     if not faint:
         for at in (_EVERY * dots).tolist():
             place = [np.interp(at, time, plan.places[:, j]) for j in (0, 1)]
-            out.circle(view.pixels(place)[0], 1.9, "#ffffff", 0.7, fill=INK)
+            out.circle(view.pixels(place)[0].tolist(), 1.9, "#ffffff", 0.7, fill=INK)
     for moment in plan.moments:
-        at = view.pixels(moment.place)[0]
+        at = view.pixels(moment.place)[0].tolist()
         out.circle(at, 2.6 if faint else 4.2, "#ffffff", 1.0, fill=moment.colour)
 
 

@@ -1,77 +1,330 @@
-"""What came of a crash case, as tables in CSV: the path, and the signals at the reference point."""
+"""What each unit recorded: its ranges, what was merged of them, and where they were at an end."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
-from strapdown.crash.path import CrashPath
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.formats import csv
-from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
+from strapdown.report.chart import (
+    AXIS_COLOURS,
+    GREY,
+    SKY,
+    VERMILLION,
+    Band,
+    Chart,
+    Level,
+    Line,
+    Mark,
+    Panel,
+    curve,
+)
+from strapdown.report.crash_moments import crash_span, unit_look
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.synchronise import SynchronisedUnit
+from strapdown.tables import ACCEL, GYRO
 
-__all__ = ["signals_table", "trajectory_table", "write_table"]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
-UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
+__all__ = ["UnitSignals", "unit_signals"]
+
+_AXES = ("forward", "right", "down")
+_TURNS = ("roll", "pitch", "yaw")
+_RAW = ((GREY, "solid"), (SKY, "dash"), (GREY, "dot"))
+# A sensor's axis that is along one of the vehicle's within 18 deg has its limits there, too.
+_ALONG = 0.95
+_PART = 0.3
+# Limits are drawn from this part of the range on: others would only make the signal small.
+_NEAR = 0.5
+_BUCKETS = 700
 
 
-def trajectory_table(path: CrashPath) -> pd.DataFrame:
-    """Return the path with its standard deviations, each column with its unit.
+@dataclass(frozen=True)
+class UnitSignals:
+    """Charts of one unit.
 
-    Parameters
+    Attributes
     ----------
-    path : CrashPath
-
-    Returns
-    -------
-    DataFrame
-        ``time_s``, place, velocity, attitude, then the standard deviations of each.
+    name : str
+    crash : Chart
+        Specific force about the crash: as recorded and merged.
+    rates : Chart or None
+        Rates about the crash; None where the unit has no gyro of its own.
+    overview : Chart
+        The whole record.
     """
-    values = path.table.rename(columns={c: f"{c}_{u}" for c, u in UNITS.items()})
-    sd = path.sd.rename(columns={c: f"{c}_sd_{u}" for c, u in UNITS.items()})
-    table = pd.concat([values, sd], axis=1)
-    table.insert(0, "time_s", path.time)
-    return table.reset_index(drop=True)
+
+    name: str
+    crash: Chart
+    rates: Chart | None
+    overview: Chart
 
 
-def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
-    """Return what one recorder says at the reference point, gravity in it.
+def unit_signals(
+    recorded: CrashUnit,
+    synchronised: SynchronisedUnit,
+    unit: UnitReconstruction,
+    number: int,
+    events: Sequence[CrashEvent],
+) -> UnitSignals:
+    """Chart what a unit recorded.
 
     Parameters
     ----------
+    recorded : CrashUnit
+        On its own clock.
+    synchronised : SynchronisedUnit
     unit : UnitReconstruction
-
-    Returns
-    -------
-    DataFrame
-        Specific force forward, right, down in m/s² and rates in deg/s at the common stamps, and
-        for a recorder of several ranges which of them spoke (0 the lowest) and where it was at
-        its end, by sensor axis.
+    number : int
+        Of the unit, from 0: for its colour.
+    events : sequence of CrashEvent
+        Of the crash, as the mean of the units has them.
     """
-    imu = unit.at_point.imu
-    table = pd.DataFrame({"time_s": imu.index.to_numpy()})
-    for axis, column in zip(("forward", "right", "down"), ACCEL, strict=True):
-        table[f"force_{axis}_m_per_s2"] = imu[column].to_numpy()
-    for axis, column in zip(("roll", "pitch", "yaw"), GYRO, strict=True):
-        table[f"rate_{axis}_deg_per_s"] = np.degrees(imu[column].to_numpy())
+    if unit.at_point.prepared is None:
+        raise ValueError(f"{unit.name} is a mean of units, which recorded nothing")
+    imu = unit.at_point.prepared.imu
+    time = np.asarray(imu.index.to_numpy(), dtype=np.float64)
+    span = crash_span(events, float(time[0]), float(time[-1]))
+    crash = _about_the_crash(recorded, synchronised, unit, number, span)
+    rates = None
+    if synchronised.lender is None and recorded.gyro is not None:
+        rates = _rates(recorded.gyro, recorded, synchronised, unit, number, span)
+    marks = tuple(
+        mark
+        for e in events
+        for mark in (Mark(1e3 * e.time_zero, "time zero"), Mark(1e3 * e.end, "end of the event"))
+    )
+    bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events)
+    crash = replace(crash, marks=marks, bands=bands)
+    rates = None if rates is None else replace(rates, marks=marks, bands=bands)
+    return UnitSignals(unit.name, crash, rates, _overview(unit, number, events))
+
+
+def _in_vehicle_axes(values: Array, C: Array) -> Array:
+    """Turned; an axis that is missing spoils only what it has a part in."""
+    parts = np.where(np.abs(C) < 0.02, 0.0, C)[None] * np.where(
+        np.abs(C)[None] < 0.02, 0.0, values[:, None, :]
+    )
+    return np.asarray(parts.sum(axis=2))
+
+
+def _flags_in_vehicle_axes(flags: Flags, C: Array) -> Flags:
+    """Whether a sensor's axis that has a part in one of the vehicle's is at its end."""
+    return np.asarray((flags[:, None, :] & (np.abs(C)[None] > _PART)).any(axis=2))
+
+
+def _triad_lines(
+    triad: RecordedTriad,
+    flags: tuple[Array, Flags],
+    unit: CrashUnit,
+    offset: float,
+    scale: float,
+    span: tuple[float, float],
+    look: tuple[str, str],
+    legend: Callable[[int], bool],
+) -> list[list[Line]]:
+    """One triad as recorded, by vehicle axis, and a symbol where it is at its end."""
+    C = unit.mounting.C_vs
+    stamps = triad.table.index.to_numpy(dtype=np.float64) - offset
+    inside = (stamps >= span[0]) & (stamps <= span[1])
+    columns = ACCEL if ACCEL[0] in triad.table.columns else GYRO
+    values = _in_vehicle_axes(triad.table[columns].to_numpy(dtype=np.float64)[inside], C) / scale
+    at, ends = flags
+    ends = _flags_in_vehicle_axes(ends, C) & ((at >= span[0]) & (at <= span[1]))[:, None]
+    out = []
+    for k in range(3):
+        name = f"{triad.name}, as recorded"
+        line = curve(name, 1e3 * stamps[inside], values[:, k], look[0], look[1], 1.1, _BUCKETS)
+        lines = [replace(line, legend=legend(k))]
+        held = at[ends[:, k]]
+        if held.size and inside.any():
+            found = np.interp(held, stamps[inside], values[:, k])
+            lines.append(
+                Line(
+                    f"{triad.name} at the end of its range",
+                    1e3 * held,
+                    found,
+                    look[0],
+                    points=True,
+                    symbol="triangle-up",
+                    hollow=True,
+                    size=7.0,
+                )
+            )
+        out.append(lines)
+    return out
+
+
+def _levels(
+    triad: RecordedTriad, C: Array, lines: Sequence[Line], axis: int, scale: float, unit: str
+) -> list[Level]:
+    """Ends of the range that a signal comes near, where they are along one axis."""
+    own = int(np.argmax(np.abs(C[axis])))
+    if abs(C[axis, own]) < _ALONG:
+        return []
+    limit = triad.uncertainty.axis("full_scale")[own] / scale
+    values = np.concatenate([line.y for line in lines] or [np.empty(0)])
+    values = values[np.isfinite(values)]
+    if not math.isfinite(limit) or not values.size:
+        return []
+    reached = ((1.0, float(values.max())), (-1.0, -float(values.min())))
+    name = triad.name
+    return [
+        Level(sign * limit, f"{name}: {'+' if sign > 0 else '−'}{limit:.3g} {unit}")
+        for sign, most in reached
+        if most > _NEAR * limit
+    ]
+
+
+def _about_the_crash(
+    recorded: CrashUnit,
+    synchronised: SynchronisedUnit,
+    unit: UnitReconstruction,
+    number: int,
+    span: tuple[float, float],
+) -> Chart:
     prepared = unit.at_point.prepared
-    if prepared is not None:
-        for k, axis in enumerate("xyz"):
-            table[f"range_{axis}"] = prepared.range_spoken[:, k].astype(np.int64)
-            table[f"at_end_{axis}"] = prepared.clipped[:, k].astype(np.int64)
-    return table
+    assert prepared is not None
+    g = STANDARD_GRAVITY
+    rows: list[list[Line]] = [[], [], []]
+    levels: list[list[Level]] = [[], [], []]
+    C = recorded.mounting.C_vs
+    for j, triad in enumerate(recorded.accelerometers):
+        there = synchronised.accelerometers[j]
+        at = there.triad.table.index.to_numpy(dtype=np.float64)
+        lines = _triad_lines(
+            triad,
+            (at, np.asarray(there.clipped)),
+            recorded,
+            synchronised.offset,
+            g,
+            span,
+            _RAW[j % len(_RAW)],
+            lambda k: k == 0,
+        )
+        for k in range(3):
+            rows[k] += lines[k]
+            levels[k] += _levels(triad, C, lines[k][:1], k, g, "g")
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    force = prepared.imu[ACCEL].to_numpy(dtype=np.float64) / g
+    inside = (time >= span[0]) & (time <= span[1])
+    cut = _flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
+    look = unit_look(number)
+    name = (
+        "merged, biases taken off" if len(recorded.accelerometers) > 1 else "at the common stamps"
+    )
+    for k in range(3):
+        line = curve(name, 1e3 * time[inside], force[inside, k], look["colour"], width=2.0)
+        rows[k].append(replace(line, legend=k == 0))
+        if cut[:, k].any():
+            x, y = 1e3 * time[cut[:, k]], force[cut[:, k], k]
+            rows[k].append(
+                Line("cut off in every range", x, y, VERMILLION, points=True, symbol="x", size=10.0)
+            )
+    return Chart(
+        f"signals-{number + 1}",
+        f"{unit.name}: specific force about the crash",
+        "Specific force at the unit's own place, vehicle axes forward, right, down; 1 g = 9.80665 "
+        "m/s². It is what an accelerometer feels: −1 g downward at rest. Thin: the ranges as "
+        "recorded, at their own rate; strong: at the common stamps, merged, biases taken off. "
+        "Triangles: a range at its end. Dashed levels: ends of ranges that were come near. "
+        "Shaded: the event.",
+        "time from the trigger, ms",
+        tuple(
+            Panel(f"{axis}, g", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
+            for k, axis in enumerate(_AXES)
+        ),
+    )
 
 
-def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
-    """Write a table as CSV with shortest round-trip numbers.
+def _once(lines: list[Line]) -> list[Line]:
+    """Lines that hold something."""
+    return [line for line in lines if line.x.size]
 
-    Parameters
-    ----------
-    table : DataFrame
-    path : Path
-    comments : dict of str to str
-        At the top.
-    """
-    csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)
+
+def _rates(
+    gyro: RecordedTriad,
+    recorded: CrashUnit,
+    synchronised: SynchronisedUnit,
+    unit: UnitReconstruction,
+    number: int,
+    span: tuple[float, float],
+) -> Chart:
+    prepared = unit.at_point.prepared
+    assert prepared is not None
+    degree, there = math.radians(1.0), synchronised.gyro
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    flags = (time, np.asarray(prepared.gyro_clipped))
+    if there is not None:
+        flags = (there.triad.table.index.to_numpy(dtype=np.float64), np.asarray(there.clipped))
+    C = recorded.mounting.C_vs
+    rows = _triad_lines(
+        gyro, flags, recorded, synchronised.offset, degree, span, _RAW[0], lambda k: k == 0
+    )
+    levels = [_levels(gyro, C, rows[k][:1], k, degree, "deg/s") for k in range(3)]
+    inside = (time >= span[0]) & (time <= span[1])
+    rate = prepared.imu[GYRO].to_numpy(dtype=np.float64) / degree
+    for k in range(3):
+        line = curve(
+            "bias taken off", 1e3 * time[inside], rate[inside, k], unit_look(number)["colour"]
+        )
+        rows[k].append(replace(line, width=2.0, legend=k == 0))
+    return Chart(
+        f"rates-{number + 1}",
+        f"{unit.name}: rates about the crash",
+        "Rates about the vehicle's axes: roll about forward (right side down is positive), pitch "
+        "about right (nose up), yaw about down (clockwise from above). Shaded: the event.",
+        "time from the trigger, ms",
+        tuple(
+            Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
+            for k, turn in enumerate(_TURNS)
+        ),
+    )
+
+
+def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent]) -> Chart:
+    prepared = unit.at_point.prepared
+    assert prepared is not None
+    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    panels = []
+    for label, columns, scale in (
+        ("specific force, g", ACCEL, STANDARD_GRAVITY),
+        ("rate, deg/s", GYRO, math.radians(1.0)),
+    ):
+        values = prepared.imu[columns].to_numpy(dtype=np.float64) / scale
+        lines = [
+            replace(
+                curve(axis, time, values[:, k], AXIS_COLOURS[k], dash, buckets=_BUCKETS),
+                legend=columns is ACCEL,
+            )
+            for k, (axis, dash) in enumerate(zip(_AXES, ("solid", "dash", "dot"), strict=True))
+        ]
+        if np.isfinite(values).any():
+            panels.append(Panel(label, tuple(lines), height=0.9))
+    bands = [Band(e.time_zero, e.end, "event") for e in events]
+    rest = unit.at_point.rest
+    if rest is not None:
+        bands.append(Band(rest.start, rest.end, "rest"))
+    said = (
+        "no rest was found"
+        if rest is None
+        else f"rest before the crash, {rest.start:.3g} to {rest.end:.3g} s, from which biases and "
+        "attitude are"
+    )
+    return Chart(
+        f"overview-{number + 1}",
+        f"{unit.name}: the whole record",
+        "Merged specific force (−1 g downward at rest) and rates along and about the vehicle's "
+        f"axes. Shaded: the event; {said}.",
+        "time from the trigger, s",
+        tuple(panels),
+        marks=tuple(Mark(e.time_zero, "time zero") for e in events),
+        bands=tuple(bands),
+    )
