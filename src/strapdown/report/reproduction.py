@@ -16,6 +16,7 @@ from strapdown.report.plotly_chart import figure as plotly_figure
 from strapdown.report.reproduction_charts import chart
 from strapdown.report.svg_chart import draw
 from strapdown.systems.reproduce_alexiev import reproduce_alexiev
+from strapdown.systems.reproduce_tadic import reproduce_tadic
 from strapdown.systems.reproduction import (
     VERDICTS,
     Figure,
@@ -38,22 +39,10 @@ __all__ = [
 
 Progress = Callable[[str, float], None]
 
-REPRODUCTIONS: dict[str, Callable[[Progress], Reproduction]] = {"alexiev": reproduce_alexiev}
-
-CONVENTIONS = (
-    ("Motions", "simulated, with the exact attitude at every instant; no real recording is used"),
-    ("Error", "rotation angle |log(C_est^T C_ref)| in degrees, whatever the axis"),
-    ("Angles", "3-2-1: heading 0–360° clockwise from north, pitch ±90° nose up, roll ±180°"),
-    (
-        "Samples",
-        "rates at the stamp, increments by the trapezoid of Eq. (2), where nothing else is said",
-    ),
-    ("Body axes", "x forward, y right, z down; q_nb and C_nb turn from body to local level"),
-    (
-        "Curves",
-        "the paper's figures did not survive scanning; no curve of it is claimed to be matched",
-    ),
-)
+REPRODUCTIONS: dict[str, Callable[[Progress], Reproduction]] = {
+    "alexiev": reproduce_alexiev,
+    "tadic": reproduce_tadic,
+}
 
 
 def _silent(stage: str, share: float) -> None:
@@ -321,7 +310,7 @@ def reproduction_page(made: Reproduction) -> str:
             ],
             "tables": [_shown(t) for t in made.tables],
             "charts": [_embedded(f) for f in made.figures],
-            "conventions": CONVENTIONS,
+            "conventions": made.conventions,
             "version": __version__,
         },
     )

@@ -55,6 +55,21 @@ PAPER = (
 )
 
 
+CONVENTIONS = (
+    ("Motions", "simulated, with the exact attitude at every instant; no real recording is used"),
+    ("Error", "rotation angle |log(C_est^T C_ref)| in degrees, whatever the axis"),
+    ("Angles", "3-2-1: heading 0–360° clockwise from north, pitch ±90° nose up, roll ±180°"),
+    (
+        "Samples",
+        "rates at the stamp, increments by the trapezoid of Eq. (2), where nothing else is said",
+    ),
+    ("Body axes", "x forward, y right, z down; q_nb and C_nb turn from body to local level"),
+    (
+        "Curves",
+        "the paper's figures did not survive scanning; no curve of it is claimed to be matched",
+    ),
+)
+
 # As they stand in the paper.
 ORDER = (
     *("compromise", "gyros-lead", "growth-accel", "growth-attitude", "growth-gyro"),
@@ -104,7 +119,9 @@ def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
         tables += listed
         figures += drawn
     statements.sort(key=lambda s: ORDER.index(s.key))
-    made = Reproduction("alexiev", PAPER, "", tuple(statements), tuple(tables), tuple(figures))
+    made = Reproduction(
+        "alexiev", PAPER, "", tuple(statements), tuple(tables), tuple(figures), CONVENTIONS
+    )
     return replace(made, headline=headline(made))
 
 

@@ -190,6 +190,8 @@ class Reproduction:
     statements : tuple of Statement
     tables : tuple of Table
     figures : tuple of Figure
+    conventions : tuple of (str, str)
+        What it stands on: a word and what is meant by it.
     """
 
     name: str
@@ -198,6 +200,7 @@ class Reproduction:
     statements: tuple[Statement, ...]
     tables: tuple[Table, ...]
     figures: tuple[Figure, ...]
+    conventions: tuple[tuple[str, str], ...] = ()
 
     def count(self, verdict: str) -> int:
         """Return how many statements have this verdict."""
