@@ -14,12 +14,12 @@ from strapdown.config import (
     read_trajectory_spec,
     specify,
 )
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.stated_errors import stated_errors
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
-from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
+from strapdown.simulation import SCENARIOS, Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.simulation.crash_cases import CASES
 from strapdown.systems.attitude_source import scenario_errors, sensor_file, simulate_scenario
 
@@ -115,6 +115,12 @@ def simulate(
             formats=wanted,
         )
         return write_trajectory_simulation(trajectory, Path(out), force=force)
+    if name.lower() not in SCENARIOS:
+        raise ConfigError(
+            f"'{name}' is no scenario and no crash",
+            quantity="scenario",
+            remedy=nearest(name.lower(), [*SCENARIOS, *CASES]),
+        )
     scenario = specify(
         ScenarioSpec,
         name=name.lower(),
