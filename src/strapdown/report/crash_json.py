@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from strapdown import __version__
+from strapdown.bundle import names_file
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.crash_type import CrashType
@@ -52,27 +53,19 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "assumptions": _pairs(crash_assumptions.assumptions(result)),
         "limitations": _pairs(crash_limits.limitations(result)),
         "findings": [vars(f) for f in result.findings],
-        "case": result.spec.model_dump(mode="json", exclude_none=True)
-        | {
-            "units": [
-                _named(unit.model_dump(mode="json", exclude_none=True))
-                for unit in result.spec.units
-            ]
-        },
+        "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
 
 
-def _named(unit: dict[str, Any]) -> dict[str, Any]:
-    """A unit whose files are told by name: where they lie is no result."""
-    for triad in [*unit["accelerometers"], *([unit["gyro"]] if "gyro" in unit else [])]:
-        triad["path"] = _name(triad["path"])
-        if "sensor" in triad:
-            triad["sensor"] = _name(triad["sensor"])
-    return unit
-
-
-def _name(path: str) -> str:
-    return path.replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+def _named(value: Any, key: str = "") -> Any:
+    """The case with files told by name: where they lie is no result."""
+    if isinstance(value, dict):
+        return {k: _named(v, k) for k, v in value.items()}
+    if isinstance(value, list):
+        return [_named(v) for v in value]
+    if names_file(key, value):
+        return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
+    return value
 
 
 def _pairs(rows: tuple[tuple[str, str], ...]) -> list[dict[str, str]]:

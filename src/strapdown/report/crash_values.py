@@ -88,8 +88,7 @@ def speed_range(value: float, half: float) -> str:
 
 def instant(time: float) -> str:
     """Write an instant or a length of time in s, to a tenth of a millisecond."""
-    text = plain(time, 4).rstrip("0")
-    return f"{text}0 s" if text.endswith(".") else f"{text} s"
+    return f"{plain(time, 4).rstrip('0').rstrip('.')} s"
 
 
 def angle_range(interval: AngleInterval) -> str:

@@ -108,7 +108,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     place, half = _end(unit)
     figures.append(
         KeyFigure(
-            "Path",
+            "Place at the end",
             f"{plain(float(np.hypot(*place[:2])), 2)} m",
             ", ".join(
                 f"{name} {about(p, h, 'm')}"
