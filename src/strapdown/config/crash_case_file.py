@@ -18,12 +18,14 @@ from strapdown.config.toml_file import read_toml
 __all__ = ["read_case_spec"]
 
 
-def read_case_spec(path: str | Path) -> CaseSpec:
+def read_case_spec(path: str | Path, *, files: bool = True) -> CaseSpec:
     """Read the file of a crash case.
 
     Parameters
     ----------
     path : str or Path
+    files : bool
+        Whether the files that it names must be there, and become absolute paths.
 
     Returns
     -------
@@ -46,7 +48,8 @@ def read_case_spec(path: str | Path) -> CaseSpec:
     table, written = canonical(file, CaseSpec)
     try:
         spec = CaseSpec(**{**table, "name": path.stem})
-        spec = CaseSpec(**with_absolute_paths(file, spec.model_dump()))
+        if files:
+            spec = CaseSpec(**with_absolute_paths(file, spec.model_dump()))
     except ValidationError as error:
         raise explained(error.errors()[0], file, written=written, wanted=what_to_write) from None
     check_case(spec, Written(file, written))

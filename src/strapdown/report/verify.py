@@ -35,6 +35,7 @@ from strapdown.config import (
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.attitude import write_attitude
+from strapdown.report.changed_case import changed_case
 from strapdown.report.crash_case import rerun_crash
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.reproduction import make_reproduction, write_reproduction
@@ -127,7 +128,10 @@ def verify(bundle: str | Path) -> Verification:
     root = Path(bundle).absolute()
     manifest = read_manifest(root)
     digest = sha256(root / MANIFEST)
-    if changes := unsealed_changes(root, manifest):
+    changes = unsealed_changes(root, manifest)
+    if changes or manifest["command"] == "crash":
+        changes += changed_case(root, manifest)
+    if changes:
         return Verification("changed", math.inf, digest, tuple(changes))
     if manifest["command"] not in RERUNS:
         raise DataError(
