@@ -38,7 +38,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         Bounds hold 95 %. What is no number is null.
     """
     made = result.reconstruction
-    return {
+    found: dict[str, Any] = {
         "schema": "strapdown crash 1",
         "strapdown": __version__,
         "title": result.spec.title,
@@ -55,6 +55,18 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "findings": [vars(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
+    return {key: _numbers(value) for key, value in found.items()}
+
+
+def _numbers(value: Any) -> Any:
+    """With null for what is no number."""
+    if isinstance(value, dict):
+        return {key: _numbers(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_numbers(v) for v in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
 
 
 def _named(value: Any, key: str = "") -> Any:
@@ -72,12 +84,8 @@ def _pairs(rows: tuple[tuple[str, str], ...]) -> list[dict[str, str]]:
     return [{"what": head, "text": text} for head, text in rows]
 
 
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
-
-
-def _about(value: float, half: float) -> dict[str, float | None]:
-    return {"value": _number(value), "low": _number(value - half), "high": _number(value + half)}
+def _about(value: float, half: float) -> dict[str, float]:
+    return {"value": value, "low": value - half, "high": value + half}
 
 
 def _unit(unit: UnitReconstruction) -> dict[str, Any]:
@@ -208,8 +216,8 @@ def _reference(answer: ReferenceAnswer) -> dict[str, Any]:
         "recorder": answer.unit,
         "start_s": answer.span[0],
         "end_s": answer.span[1],
-        "delta_v_m_per_s": _number(answer.delta_v),
-        "sd_m_per_s": _number(answer.sd),
+        "delta_v_m_per_s": answer.delta_v,
+        "sd_m_per_s": answer.sd,
         "reference_delta_v_m_per_s": spec.delta_v_m_per_s,
         "rms_m": None if found is None else list(found.rms),
         "largest_m": None if found is None else list(found.largest),

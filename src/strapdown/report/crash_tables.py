@@ -274,6 +274,8 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
                 f"{pair.first} less {pair.second}",
                 *(
                     about(KMH * float(d), KMH * TWO_SIDED_95 * float(s), "")
+                    if math.isfinite(float(d))
+                    else "not measured"
                     for d, s in zip(difference, sd, strict=True)
                 ),
                 f"{pair.chi_square / max(pair.freedom, 1):.2f}",
