@@ -96,4 +96,4 @@ def what_to_write(path: KeyPath) -> str:
     if said.startswith("["):
         header, _, meaning = said.partition(": ")
         form, said = f"write {header} and its keys below it", meaning
-    return f"{form}: {said}" if said else form
+    return f"{form} ({said})" if said else form
