@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats import crash_nhtsa, crash_table
+from strapdown.formats import crash_json, crash_mme, crash_nhtsa, crash_table
 from strapdown.formats.crash_record import CrashRecord
 
 __all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
@@ -28,6 +28,12 @@ CRASH_READERS: dict[str, CrashReader] = {
         "test of the NHTSA vehicle database: .EV5 or its folder",
         crash_nhtsa.detect,
         crash_nhtsa.read,
+    ),
+    "mme": CrashReader(
+        "test in ISO MME (ISO/TS 13499): .mme or its folder", crash_mme.detect, crash_mme.read
+    ),
+    "json": CrashReader(
+        "crash record as JSON, as this package writes it", crash_json.detect, crash_json.read
     ),
     "table": CrashReader(
         "table with a column a channel: .csv .txt, also .npz .parquet .h5 .mat",
