@@ -17,7 +17,7 @@ from strapdown.crash.at_point import at_point
 from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
-from strapdown.sensors.assumed import Assumed
+from strapdown.sensors.assumed import Assumed, assumed_shapes
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
@@ -105,3 +105,28 @@ def path_of(unit):
 
 
 ASSUMED = Assumed(turn_sd_deg=4.0, delta_v_sd=0.8, over=OVER)
+
+
+def drawn_motion(count, seed, *, turn=ASSUMED.turn_sd_deg, slide=ASSUMED.delta_v_sd[1], walk=False):
+    """Vehicles whose turning and sideways velocity are drawn from what is assumed.
+
+    With `walk`, the turn is a random walk over `OVER` instead of the two shapes.
+    """
+    rng = np.random.default_rng(seed)
+    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 2))
+    slides = slide * rng.normal(size=(count, 2))
+    steps = 30
+    walks = np.radians(turn)[:, None] * rng.normal(size=(count, 3, steps)) / np.sqrt(steps)
+
+    def shapes(time):
+        return assumed_shapes(time, OVER, "instantaneous")
+
+    def rates(time):
+        if not walk:
+            return np.einsum("kas,sm->kma", turns, shapes(time))
+        number = np.floor((time - OVER[0]) / (OVER[1] - OVER[0]) * steps).astype(int)
+        within = (number >= 0) & (number < steps)
+        rate = walks[:, :, np.clip(number, 0, steps - 1)] * within * steps / (OVER[1] - OVER[0])
+        return rate.transpose(0, 2, 1)
+
+    return move(rates, lambda time: slides @ shapes(time))
