@@ -27,8 +27,7 @@ __all__ = ["COMBINATIONS", "combine_units"]
 COMBINATIONS = ("weighted", "median")
 # Near the impact: rates are weighed by how well they tell the turn over it.
 TURN_WINDOW = (-0.1, 0.75)
-# Information along what no unit measures, of the most there is along another axis.
-FAINT = 1e-9
+# Of squared cosines.
 ROUNDING = 1e-9
 
 
@@ -239,13 +238,11 @@ def _inverse_weights(units: Sequence[AtPoint]) -> Array:
         covariance = np.einsum("pni,pnj->nij", effects.force, effects.force, optimize=True)
         covariance += effects.force_noise[:, :, None] ** 2 * np.eye(3)
         information.append(_of_measured(floored(covariance), u.unmeasured))
-    if any(u.unmeasured is not None for u in units):
+    by_none = _by_none([u.unmeasured for u in units])
+    if by_none is not None:
         # Along what none measures all are as good as one another.
-        least = FAINT * float(np.max(np.trace(information, axis1=-2, axis2=-1)))
-        information = [
-            i if u.unmeasured is None else i + least * u.unmeasured
-            for i, u in zip(information, units, strict=True)
-        ]
+        size = float(np.mean(np.trace(information, axis1=-2, axis2=-1)))
+        information = [i + size * by_none for i in information]
     total = np.linalg.inv(np.sum(information, axis=0))
     return np.array([total @ i for i in information])
 

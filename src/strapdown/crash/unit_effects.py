@@ -9,24 +9,22 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.assumed_effects import assumed_effects
 from strapdown.crash.sample_effects import (
     GYRO_BIAS,
     LEVER_ARM,
     MISSING_AXIS,
     MOUNTING,
-    NO_TURNING,
     SampleEffects,
     level_turned_by,
 )
 from strapdown.crash.triad_curves import AXES, Curve, constant, triad_curves
 from strapdown.exceptions import DataError
-from strapdown.sensors.assumed import SHAPES, assumed_shapes
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.lever_arm import MovedImu
 from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
-from strapdown.sensors.unmeasured import AXES as FORWARD
 from strapdown.sensors.unmeasured import TURNS as ANGLES
-from strapdown.sensors.unmeasured import unmeasured_axes, unmeasured_turns
+from strapdown.sensors.unmeasured import unmeasured_axes
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -317,29 +315,16 @@ class _UnitEffects:
         return np.asarray(self.measured @ of_both @ self.measured)
 
     def _assumed(self) -> None:
-        unit, none = self.prepared.unit, np.zeros(3)
-        sampling = str(self.prepared.imu.attrs["sampling"])
-        turns = unmeasured_turns(unit)
-        for assumed, name, directions, contributor in (
-            (self.lender.assumed, "turn_sd_deg", turns, NO_TURNING),
-            (unit.assumed, "delta_v_sd", self.unmeasured, MISSING_AXIS),
-        ):
-            if assumed is None or not directions.any():
-                continue
-            shapes = assumed_shapes(self.time, assumed.over, sampling)
-            turning = contributor == NO_TURNING
-            sds = np.asarray(assumed.sd_of(name))
-            for axis, sd in enumerate(np.radians(sds) if turning else sds):
-                along = sd * directions[:, axis]
-                what = ANGLES[axis] if turning else f"velocity {FORWARD[axis]}"
-                for shape, how in zip(shapes, SHAPES, strict=True):
-                    if not along.any():
-                        continue
-                    added, called = np.outer(shape, along), f"assumed {what} {how}"
-                    if turning:
-                        self._add(called, contributor, None, added, none, VEHICLE)
-                    else:
-                        self._add(called, contributor, added, None, none, VEHICLE, of_all_axes=True)
+        for of in assumed_effects(self.prepared):
+            self._add(
+                of.name,
+                of.contributor,
+                of.force,
+                of.rate,
+                np.zeros(3),
+                VEHICLE,
+                of_all_axes=of.contributor == MISSING_AXIS,
+            )
 
     def _levelling(self) -> None:
         sd = np.radians(self.prepared.levelling.sd_deg)
