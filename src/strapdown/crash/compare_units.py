@@ -19,6 +19,7 @@ from strapdown.crash.mounting_rotation import (
 from strapdown.crash.unit_comparison import UnitAgainstAll, UnitComparison, UnitPair
 from strapdown.crash.unit_differences import (
     VelocityIncrements,
+    chi_square_tail,
     common_edges,
     difference_covariance,
     floored,
@@ -90,7 +91,7 @@ def compare_units(
     )
     combined, covariance, chi, against = _against_all(units, increments)
     freedom = combined.size * (len(units) - 1)
-    probability = _tail(chi, freedom)
+    probability = chi_square_tail(chi, freedom)
     findings = [f for p in pairs for f in p.findings]
     findings += _odd_one(units, pairs)
     return UnitComparison(
@@ -117,7 +118,7 @@ def _pair(
     edges = a.edges
     difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)
     chi, freedom = _square(difference, covariance), difference.size
-    probability = _tail(chi, freedom)
+    probability = chi_square_tail(chi, freedom)
     curve, sd = _curve(difference), _curve_sd(covariance)
     lengths = np.diff(edges)[:, None]
     force_sd = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths
@@ -177,19 +178,15 @@ def _against_all(
         own = joint[rows, rows] - covariance
         chi = _square(left[rows], own)
         against.append(
-            UnitAgainstAll(u.name, _curve(left[rows]), _curve_sd(own), chi, size, _tail(chi, size))
+            UnitAgainstAll(
+                u.name, _curve(left[rows]), _curve_sd(own), chi, size, chi_square_tail(chi, size)
+            )
         )
     return combined, np.asarray(covariance), _square(left, joint), tuple(against)
 
 
 def _square(difference: Array, covariance: Array) -> float:
     return float(difference @ np.linalg.solve(floored(covariance), difference))
-
-
-def _tail(chi_square: float, freedom: int) -> float:
-    from scipy.stats import chi2
-
-    return float(chi2.sf(chi_square, freedom))
 
 
 def _curve(increments: Array) -> Array:
