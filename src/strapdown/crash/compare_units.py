@@ -27,6 +27,7 @@ from strapdown.crash.mounting_rotation import (
 from strapdown.crash.unit_comparison import UnitAgainstAll, UnitComparison, UnitPair
 from strapdown.crash.unit_differences import (
     VelocityIncrements,
+    chi_square_tail,
     common_edges,
     difference_covariance,
     floored,
@@ -102,7 +103,7 @@ def compare_units(
     )
     together = _against_all(units, increments)
     chi, freedom = together.chi_square, together.freedom
-    probability = _tail(chi, freedom)
+    probability = chi_square_tail(chi, freedom)
     findings = [f for p in pairs for f in p.findings]
     findings += _odd_one(units, pairs)
     return UnitComparison(
@@ -131,7 +132,7 @@ def _pair(
     basis = measured_by_all((first, second))
     told = np.where(measured_axes(basis), 0.0, np.nan)
     chi, freedom = chi_square_along(basis, difference, covariance)
-    probability = _tail(chi, freedom)
+    probability = chi_square_tail(chi, freedom)
     curve, sd = _curve(difference) + told, _curve_sd(covariance) + told
     lengths = np.diff(edges)[:, None]
     force_sd = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths + told
@@ -222,7 +223,7 @@ def _against_all(units: Sequence[AtPoint], increments: Sequence[VelocityIncremen
                 _curve_sd(own) + told,
                 chi,
                 freedom,
-                _tail(chi, freedom),
+                chi_square_tail(chi, freedom),
             )
         )
     several = measured_by_any(units)
@@ -239,12 +240,6 @@ def _against_all(units: Sequence[AtPoint], increments: Sequence[VelocityIncremen
 
 def _square(difference: Array, covariance: Array) -> float:
     return float(difference @ np.linalg.solve(floored(covariance), difference))
-
-
-def _tail(chi_square: float, freedom: int) -> float:
-    from scipy.stats import chi2
-
-    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
 
 
 def _curve(increments: Array) -> Array:

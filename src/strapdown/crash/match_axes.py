@@ -9,7 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.unit_differences import VelocityIncrements, difference_covariance, floored
+from strapdown.crash.unit_differences import (
+    VelocityIncrements,
+    chi_square_tail,
+    difference_covariance,
+    floored,
+)
 from strapdown.exceptions import Finding
 
 Array = NDArray[np.float64]
@@ -19,6 +24,9 @@ __all__ = ["AxisMatch", "axis_findings", "match_axes", "signed_permutations"]
 # What the best is ahead of another by: of this much the other is still possible, of this much
 # it is not (differences of chi-square, 3 and 5 standard deviations).
 POSSIBLE, EXCLUDED = 9.0, 25.0
+# Where the stated axes fit this well, no others are looked for: where nothing turns, one of 48
+# fits noise better by chance.
+FITS = 1e-3
 AXES = ("forward", "right", "down")
 
 
@@ -94,7 +102,8 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
     Least squares over the pieces with the whole covariance of the difference, since a bias is the
     same in every piece. What the least residuals exceed it by is added to every piece alike: moved
     by wrong rates, or with forces that were wrong before they were moved, nothing fits. Among
-    permutations that cannot be told apart the one nearest to the identity is taken. Accelerometers
+    permutations that cannot be told apart the one nearest to the identity is taken, and the
+    identity where it fits with a probability of 1e-3 or more. Accelerometers
     and gyros are judged apart, since either may be wired wrong; a rigid body turns everywhere
     alike, and its forces agree after both are moved to one point, to which a wrong axis of the
     gyro does harm, too. A gyro that both share is not judged.
@@ -114,6 +123,9 @@ def _best(
     left = (a[None] - b @ candidates.transpose(0, 2, 1)).reshape(len(candidates), -1, 1)
     covariance = floored(difference_covariance(first, second, of=of, turn=candidates))
     stated = np.trace(covariance, axis1=1, axis2=2) / a.size
+    identity = int(np.flatnonzero((candidates == np.eye(3)).all(axis=(1, 2)))[0])
+    as_stated = left[identity, :, 0]
+    fit = float(as_stated @ np.linalg.solve(covariance[identity], as_stated))
     unstated = max(float(((left**2).mean(axis=(1, 2)) - stated).min()), 0.0)
     covariance = covariance + unstated * np.eye(a.size)
     cost = (left * np.linalg.solve(covariance, left)).sum(axis=(1, 2))
@@ -122,7 +134,8 @@ def _best(
     # Nearest to the identity: most ones on the diagonal.
     near = np.trace(candidates[possible], axis1=1, axis2=2)
     best = int(possible[np.lexsort((behind[possible], -near))[0]])
-    identity = int(np.flatnonzero((candidates == np.eye(3)).all(axis=(1, 2)))[0])
+    if chi_square_tail(fit, a.size) >= FITS:
+        best = identity
     weights = np.exp(-0.5 * behind)
     differs = (candidates[possible] != candidates[best]).any(axis=2).any(axis=0)
     return (

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 __all__ = [
     "TINY",
     "VelocityIncrements",
+    "chi_square_tail",
     "common_edges",
     "difference_covariance",
     "floored",
@@ -242,3 +243,10 @@ def velocity_increments(unit: AtPoint, edges: Array) -> VelocityIncrements:
         noise_of_sums(unit, weights),
         lever,
     )
+
+
+def chi_square_tail(chi_square: float, freedom: int) -> float:
+    """Probability of a chi-square of so many degrees of freedom, or none, to be this or more."""
+    from scipy.stats import chi2
+
+    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +15,12 @@ __all__ = ["RangeLimits", "find_limits"]
 
 # A crash holds a sensor at its end for tens of milliseconds; what is flat for longer is a rest.
 LONGEST_FLAT = 0.5  # s
-# Noise of a few steps puts three equal numbers on the crest of a pulse in one case of a hundred,
-# and a record has a dozen crests.
-LEAST_FLAT = 4  # samples
+LEAST_FLAT = 3  # samples
 # The top of a smooth pulse in coarse steps is flat, too, but is left by one step.
 LEAST_JUMP = 3.0  # steps
+# Readings that scatter over several steps repeat one now and then: the jump must also stand out of
+# the scatter from sample to sample, that of the middle of all.
+LEAST_STANDING_OUT = 5.0
 # So many cannot be where a fast rise meets a slow fall, unless there is no noise at all.
 SURE_FLAT = 10
 # A flat extreme below this part of the stated range, or of the largest reading, is an end only
@@ -81,10 +83,11 @@ def find_limits(
     Notes
     -----
     A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
-    an end where it stays on the very same extreme value of the record for four samples or
+    an end where it stays on the very same extreme value of the record for three samples or
     more, up to 0.5 s, and jumps by three steps or more on both sides (ten samples or more: on one
-    side): noise repeats no number, and the top of a smooth pulse is left by fewer steps. Below a
-    tenth of the range, or of the largest reading, it needs ten samples and jumps on both sides.
+    side): the top of a smooth pulse is left by fewer steps. Fewer than ten must also jump by five
+    times the record's scatter, for noise in steps repeats a number. Below a tenth of the range, or
+    of the largest reading, it needs ten samples and jumps on both sides.
     """
     lower, upper = -np.asarray(full_scale, dtype=np.float64), np.array(full_scale, dtype=np.float64)
     axes = values.shape[1]
@@ -123,7 +126,7 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
     at = y == top
     edges = np.diff(np.r_[False, at, False].astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    step = _least_step(y)
+    step, scatter = _least_step(y), _scatter(y)
     low = top <= floor
     if low and top - usual < OFF_REST * step:
         return None
@@ -134,6 +137,8 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
         # The top of a parabola that stays within a step for n samples is left by ((n + 2)/n)².
         n = b - a
         least = max(LEAST_JUMP - 0.5, (1.0 + 2.0 / n) ** 2 + 0.5) * step
+        if n < SURE_FLAT:
+            least = max(least, LEAST_STANDING_OUT * scatter)
         jump = max(jumps) if n >= SURE_FLAT and not low else min(jumps)
         enough = n >= SURE_FLAT and len(sides) == 2 if low else n >= LEAST_FLAT
         if enough and short and jump >= least:
@@ -145,3 +150,12 @@ def _least_step(y: Array) -> float:
     """Smallest difference of two values that occur: the converter's step, or rounding."""
     gaps = np.diff(np.unique(y))
     return float(gaps.min()) if gaps.size else 0.0
+
+
+def _scatter(y: Array) -> float:
+    """Standard deviation from sample to sample, by the median of second differences."""
+    if y.size < LEAST_FLAT:
+        return 0.0
+    # Of three independent samples the second difference has sqrt(6) times one's, and the median
+    # of its size is 0.6745 of that.
+    return float(np.median(np.abs(np.diff(y, 2)))) / (0.6745 * math.sqrt(6.0))

@@ -83,3 +83,14 @@ def test_any_number_of_axes():
     y[300:320] = 5.0
     found = find_limits(TIME, y, np.array([50.0]), np.array([0.1]))
     assert found.found.shape == found.upper.shape == (1,)
+
+
+def test_noise_in_steps_that_repeats_its_extreme_is_no_end_of_a_range():
+    # The slow top of a slide, 3.4 m/s² of ±19.6, noise of three steps: three in a row are equal
+    # in one record of some hundred.
+    rng = np.random.Generator(np.random.PCG64(5))
+    time = np.arange(400) / 200.0
+    top = 3.4 * np.sin(np.pi * time / time[-1]) ** 2
+    for _ in range(600):
+        y = np.round((top + 0.03 * rng.standard_normal(time.size)) / 0.01) * 0.01
+        assert not find_limits(time, y[:, None], np.array([19.6]), np.array([0.01])).found.any()
