@@ -12,7 +12,7 @@ from typing import NoReturn
 import typer
 
 from strapdown import __version__
-from strapdown.cli import attitude, demo, modules, reproduce, simulate, verify
+from strapdown.cli import attitude, demo, init, modules, reproduce, simulate, verify
 from strapdown.exceptions import Finding, StrapdownError
 
 EXIT_CODES = """
@@ -49,6 +49,7 @@ def main(
 
 
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
+app.add_typer(init.app, name="init")
 app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
 app.command("reproduce", epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
