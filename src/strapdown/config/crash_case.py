@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, StrictBool, StrictInt
 
-from strapdown.config.spec import TableSpec
+from strapdown.config.shown import shown
+from strapdown.config.spec import TableSpec, refuse
 from strapdown.config.words import file_name, word, words
 
 # A number in quotation marks, or true for 1, is a slip and not a number.
@@ -30,6 +32,39 @@ def _text(value: Any) -> Any:
     return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
+def _one_or_three(value: Any) -> Any:
+    several = value if isinstance(value, list | tuple) and len(value) == 3 else [value]
+    if not all(_is_number(part) for part in several):
+        what = f"{shown(value)} is neither one finite number nor three"
+        raise refuse("", what, "write one number, or one for each axis: [x, y, z]")
+    return tuple(float(v) for v in several) if len(several) == 3 else float(several[0])
+
+
+def _sizes(value: float | Triple) -> float | Triple:
+    if min(value if isinstance(value, tuple) else (value,)) < 0.0:
+        raise refuse("", f"{shown(value)} is negative", "give its size, zero or more")
+    return value
+
+
+def _number_or_words(value: Any) -> Any:
+    if isinstance(value, str):
+        return words(value)
+    if not _is_number(value):
+        raise refuse("", f"{shown(value)} is neither a finite number nor text", "write one of them")
+    return float(value)
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        return number and math.isfinite(float(value))
+    except OverflowError:
+        return False
+
+
+#: Of a model of injury risk.
+Input = Annotated[float | str, BeforeValidator(_number_or_words)]
+OneOrThree = Annotated[float | Triple, BeforeValidator(_one_or_three)]
 Listed = BeforeValidator(_listed)
 Channel = Annotated[Word, BeforeValidator(_text)]
 
@@ -92,14 +127,14 @@ class TriadSpec(TableSpec):
     sampling: Literal["instantaneous", "mean"] | None = None
     sensor: FileName | None = None
     #: Replaces the sensor's: keys of the catalogue of sensors, each with its unit.
-    uncertainty: dict[Word, Number | Triple] = Field(default_factory=dict)
+    uncertainty: dict[Word, OneOrThree] = Field(default_factory=dict)
 
 
 class AssumedSpec(TableSpec):
     """What is taken for axes and gyros that are not there, with its standard deviation."""
 
-    turn_sd_deg: NotNegative | None = None
-    delta_v_sd_m_per_s: NotNegative | None = None
+    turn_sd_deg: Annotated[OneOrThree, AfterValidator(_sizes)] | None = None
+    delta_v_sd_m_per_s: Annotated[OneOrThree, AfterValidator(_sizes)] | None = None
     over_s: Pair = (0.0, 0.15)
     because: str = ""
 
@@ -131,11 +166,11 @@ class ReferenceSpec(TableSpec):
     source: str = ""
     #: Of a path: time, north, east, down of the reference point, with or without their sd.
     path: FileName | None = None
-    #: Of a change of velocity: of the axis, from time zero to `at_s`.
+    #: Of a change of velocity: along the axis, over the span; over the event, if not given.
     delta_v_m_per_s: Number | None = None
     delta_v_sd_m_per_s: NotNegative = 0.0
     axis: Literal["forward", "right", "resultant"] = "forward"
-    at_s: Number | None = None
+    over_s: Pair | None = None
 
 
 class OptionsSpec(TableSpec):
@@ -153,7 +188,7 @@ class OptionsSpec(TableSpec):
     seed: StrictInt = Field(default=0, ge=0)
     #: Names of severity models; None takes those that fit the type of the crash.
     severity: Annotated[tuple[Word, ...] | None, Listed] = None
-    severity_inputs: dict[Word, Number | Words] = Field(default_factory=dict)
+    severity_inputs: dict[Word, Input] = Field(default_factory=dict)
     formats: Annotated[tuple[Literal["csv", "mme"], ...], Listed] = ("csv",)
 
 

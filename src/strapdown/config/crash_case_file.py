@@ -10,6 +10,7 @@ from strapdown.config.case_keys import canonical
 from strapdown.config.case_paths import with_absolute_paths
 from strapdown.config.case_wanted import what_to_write
 from strapdown.config.crash_case import CaseSpec
+from strapdown.config.crash_checks import Written, check_case
 from strapdown.config.explain import explained
 from strapdown.config.placeholders import refuse_placeholders
 from strapdown.config.toml_file import read_toml
@@ -45,6 +46,8 @@ def read_case_spec(path: str | Path) -> CaseSpec:
     table, written = canonical(file, CaseSpec)
     try:
         spec = CaseSpec(**{**table, "name": path.stem})
-        return CaseSpec(**with_absolute_paths(file, spec.model_dump()))
+        spec = CaseSpec(**with_absolute_paths(file, spec.model_dump()))
     except ValidationError as error:
         raise explained(error.errors()[0], file, written=written, wanted=what_to_write) from None
+    check_case(spec, Written(file, written))
+    return spec

@@ -1,0 +1,37 @@
+"""What a crash case says twice, or against itself: refused with the lines of both."""
+
+from __future__ import annotations
+
+from strapdown.config.crash_case import CaseSpec
+from strapdown.config.crash_checks.entry import check_entry
+from strapdown.config.crash_checks.options import check_options
+from strapdown.config.crash_checks.places import check_places
+from strapdown.config.crash_checks.references import check_references
+from strapdown.config.crash_checks.triads import check_triads
+from strapdown.config.crash_checks.units import check_units
+from strapdown.config.crash_checks.written import Written
+
+__all__ = ["Written", "check_case"]
+
+
+def check_case(spec: CaseSpec, written: Written) -> None:
+    """Refuse what cannot be meant.
+
+    Parameters
+    ----------
+    spec : CaseSpec
+        With the files that it names as absolute paths.
+    written : Written
+
+    Raises
+    ------
+    ConfigError
+        Something is missing for what is asked, out of all proportion, or contradicts something
+        else; the message names the line, or both lines, and the values.
+    """
+    check_places(spec, written)
+    check_entry(spec, written)
+    check_units(spec, written)
+    check_triads(spec, written)
+    check_references(spec, written)
+    check_options(spec, written)

@@ -1,0 +1,129 @@
+"""What is assumed of a recorder: for all that is missing, and for nothing that is there."""
+
+from __future__ import annotations
+
+from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec
+from strapdown.config.crash_checks.written import Written
+from strapdown.config.toml_lines import KeyPath
+from strapdown.exceptions import ConfigError
+
+__all__ = ["check_assumed"]
+
+AXES = ("x", "y", "z")
+MOST_TURN = 45.0  # deg
+MOST_CHANGE = 60.0  # m/s
+LONGEST = 10.0  # s
+
+
+def check_assumed(k: int, spec: CaseSpec, written: Written) -> None:
+    """Check a unit for axes that are missing.
+
+    Raises
+    ------
+    ConfigError
+        Something is missing and nothing is assumed for it, or the other way round.
+    """
+    unit = spec.units[k]
+    no_force, no_turn = _forces_missing(k, unit, written), _turns_missing(unit)
+    assumed = unit.assumed or AssumedSpec()
+    if no_force and assumed.delta_v_sd_m_per_s is None:
+        raise _not_assumed(
+            ("units", k, "accelerometers", 0, "channels"),
+            f"there is no channel for {_listed(no_force)}, and nothing says what it may have felt",
+            "delta_v_sd_m_per_s",
+            written,
+        )
+    if no_turn and assumed.turn_sd_deg is None:
+        no_gyro = unit.gyro is None
+        raise _not_assumed(
+            ("units", k) if no_gyro else ("units", k, "gyro", "channels"),
+            ("there is no gyro" if no_gyro else f"there is no channel for {_listed(no_turn)}")
+            + ", and nothing says how far the vehicle may have turned",
+            "turn_sd_deg",
+            written,
+            ", or gyro_from of another unit" if no_gyro else "",
+        )
+    if unit.assumed is not None:
+        _check_table(k, unit, assumed, written, bool(no_force), bool(no_turn))
+
+
+def _check_table(
+    k: int, unit: UnitSpec, assumed: AssumedSpec, written: Written, force: bool, turn: bool
+) -> None:
+    at = ("units", k, "assumed")
+    measured = "gyro" if unit.gyro is not None else "gyro_from"
+    for name, missing, other, most in (
+        ("turn_sd_deg", turn, measured, MOST_TURN),
+        ("delta_v_sd_m_per_s", force, "accelerometers", MOST_CHANGE),
+    ):
+        given = getattr(assumed, name)
+        if given is None:
+            continue
+        if not missing:
+            raise written.contradiction(
+                (*at, name),
+                ("units", k, other),
+                "nothing is missing there that could be assumed",
+                "take it away, or the channel that is not to be trusted",
+            )
+        sizes = given if isinstance(given, tuple) else (given,)
+        if max(sizes) > most:
+            raise written.refuse(
+                (*at, name),
+                f"it is more than {most:g}, and nothing would be known",
+                "give what one of three crashes like this one goes beyond",
+            )
+    if not force and not turn:
+        raise written.contradiction(
+            at,
+            ("units", k, measured),
+            "nothing is missing of this unit",
+            "take away [units.assumed]",
+        )
+    if not assumed.because.strip():
+        raise written.missing((*at, "because"), "a report must say why it may be assumed")
+    start, end = assumed.over_s
+    if not 0.0 < end - start <= LONGEST:
+        raise written.refuse(
+            (*at, "over_s"),
+            f"it lasts {end - start:.4g} s",
+            "write over_s = [start, end], from the trigger; if it is in ms, over_ms",
+        )
+
+
+def _forces_missing(k: int, unit: UnitSpec, written: Written) -> list[str]:
+    first = _missing(unit.accelerometers[0])
+    for n, triad in enumerate(unit.accelerometers[1:], start=1):
+        if _missing(triad) != first:
+            raise written.contradiction(
+                ("units", k, "accelerometers", n, "channels"),
+                ("units", k, "accelerometers", 0, "channels"),
+                "one range has an axis that the other has not",
+                "give the axis in all ranges, or leave out the range that lacks it",
+            )
+    return first
+
+
+def _turns_missing(unit: UnitSpec) -> list[str]:
+    if unit.gyro is not None:
+        return _missing(unit.gyro)
+    return [] if unit.gyro_from is not None else list(AXES)
+
+
+def _missing(triad: TriadSpec) -> list[str]:
+    return [axis for axis in AXES if axis not in triad.channels]
+
+
+def _listed(axes: list[str]) -> str:
+    return " and ".join(axes)
+
+
+def _not_assumed(
+    path: KeyPath, why: str, name: str, written: Written, more: str = ""
+) -> ConfigError:
+    return written.file.refuse(
+        path,
+        why,
+        f"name its channel{more}; or write [units.assumed] with {name} = …, a standard "
+        "deviation, and because = …",
+    )

@@ -1,0 +1,137 @@
+"""The entry of a case: each kind with what it needs, and nothing else."""
+
+from __future__ import annotations
+
+import math
+
+from strapdown.config.crash_case import CaseSpec, EntrySpec
+from strapdown.config.crash_checks.written import Written
+
+__all__ = ["check_entry"]
+
+# Faster than any car on a road, and slower than most speeds in km/h that were taken for m/s.
+FASTEST = 90.0  # m/s
+MOST_ANGLE = 360.0  # deg
+# What each kind has no use for; a value of zero says nothing.
+_NO_USE = {
+    "speed": ("path", "antenna_m", "antenna_sd_m"),
+    "standstill": (
+        "speed_m_per_s",
+        "speed_sd_m_per_s",
+        "time_s",
+        "heading_deg",
+        "heading_sd_deg",
+        "slip_deg",
+        "slip_sd_deg",
+        "climb_sd_m_per_s",
+        "path",
+        "antenna_m",
+        "antenna_sd_m",
+    ),
+    "gnss": (
+        "speed_m_per_s",
+        "speed_sd_m_per_s",
+        "heading_deg",
+        "heading_sd_deg",
+        "slip_deg",
+        "slip_sd_deg",
+        "climb_sd_m_per_s",
+    ),
+}
+_WHY = {
+    "speed": "the speed is stated, and no fixes are read",
+    "standstill": "a vehicle that stood when the record began has none",
+    "gnss": "speed and heading are found from the fixes",
+}
+_NEEDED = {
+    "speed": {
+        "speed_m_per_s": "kind is speed",
+        "speed_sd_m_per_s": "without it nothing tells how well the speed is known",
+        "source": "a report must say where the speed is from",
+    },
+    "standstill": {},
+    "gnss": {"path": "kind is gnss, and the fixes must be read"},
+}
+
+
+def check_entry(spec: CaseSpec, written: Written) -> None:
+    """Check the entry.
+
+    Raises
+    ------
+    ConfigError
+        It lacks something, says what its kind has no use for, or a number is out of proportion.
+    """
+    entry = spec.entry
+    for name in _NO_USE[entry.kind]:
+        given = getattr(entry, name)
+        if written.has("entry", name) and given not in (None, 0.0):
+            raise written.contradiction(
+                ("entry", name),
+                ("entry", "kind"),
+                _WHY[entry.kind],
+                f'take away {written.key("entry", name)}, or write kind = "{_kind_for(name)}"',
+                default=entry.kind,
+            )
+    for name, why in _NEEDED[entry.kind].items():
+        given = getattr(entry, name)
+        if given is None or (isinstance(given, str) and not given.strip()):
+            raise written.missing(("entry", name), why)
+    _sizes(entry, written)
+    _instant(spec, written)
+
+
+def _kind_for(name: str) -> str:
+    return "gnss" if name.startswith(("path", "antenna")) else "speed"
+
+
+def _sizes(entry: EntrySpec, written: Written) -> None:
+    speed, sd = entry.speed_m_per_s, entry.speed_sd_m_per_s
+    if speed is not None and abs(speed) > FASTEST:
+        raise written.refuse(
+            ("entry", "speed_m_per_s"),
+            f"that is {3.6 * speed:.4g} km/h",
+            "if it is in km/h, write speed_km_per_h",
+        )
+    if entry.kind == "speed" and sd == 0.0:
+        raise written.refuse(
+            ("entry", "speed_sd_m_per_s"),
+            "no speed is known without error, and every bound of the path rests on it",
+            "give the standard deviation: half of what you would bet two to one on",
+        )
+    if sd is not None and sd > FASTEST / 3.0:
+        raise written.refuse(
+            ("entry", "speed_sd_m_per_s"),
+            f"the speed would be known to {3.6 * sd:.4g} km/h",
+            "if it is in km/h, write speed_sd_km_per_h",
+        )
+    for name in ("heading_deg", "slip_deg"):
+        if abs(getattr(entry, name)) > MOST_ANGLE:
+            raise written.refuse(
+                ("entry", name), "an angle is between -360 and 360 deg", "give it in degrees"
+            )
+    for name in ("heading_sd_deg", "slip_sd_deg"):
+        if getattr(entry, name) > MOST_ANGLE / 2.0:
+            raise written.refuse(
+                ("entry", name), "more than half a turn is not known at all", "give it in degrees"
+            )
+
+
+def _instant(spec: CaseSpec, written: Written) -> None:
+    window, time = spec.options.window_s, spec.entry.time_s
+    at, over = ("entry", "time_s"), ("options", "window_s")
+    if spec.entry.kind == "standstill":
+        return
+    if window is not None and window[0] < window[1] and not window[0] <= time <= window[1]:
+        first, second = (at, over) if written.has(*at) else (over, at)
+        raise written.contradiction(
+            first,
+            second,
+            "the path runs from the entry, which is not in its window",
+            "widen window_s until it holds the entry, or correct time_s",
+            default=time,
+        )
+    if not math.isclose(time, 0.0) and abs(time) > 600.0:
+        raise written.refuse(
+            at, "the entry is minutes away from the trigger", "if it is in ms, write time_ms"
+        )

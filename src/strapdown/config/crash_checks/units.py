@@ -1,0 +1,153 @@
+"""The recorders of a case: told apart, placed, each with a gyro or what is assumed for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from strapdown.config.crash_case import CaseSpec, UnitSpec
+from strapdown.config.crash_checks.assumed import check_assumed
+from strapdown.config.crash_checks.written import Written
+from strapdown.exceptions import nearest
+
+__all__ = ["check_names", "check_units"]
+
+MOST_ANGLE = 360.0  # deg
+STEEPEST = 90.0  # deg
+#: A common trigger that is known no better ties no clocks together.
+MOST_TRIGGER_SD = 0.5  # s
+
+
+def check_units(spec: CaseSpec, written: Written) -> None:
+    """Check the units, but for their triads.
+
+    Raises
+    ------
+    ConfigError
+        One lacks its place, or says two things at once, or borrows a gyro that is not there.
+    """
+    check_names("units", [unit.name for unit in spec.units], written)
+    for k, unit in enumerate(spec.units):
+        _placed(k, unit, written)
+        _gyro(k, spec, written)
+        _levelled(k, unit, written)
+        _rest(k, spec, written)
+        if spec.options.clock == "trigger" and unit.trigger_sd_s > MOST_TRIGGER_SD:
+            raise written.refuse(
+                ("units", k, "trigger_sd_s"),
+                f"a trigger that is known to {unit.trigger_sd_s:g} s ties no clocks together",
+                "if it is in ms, write trigger_sd_ms; or tie the clocks by what was felt: "
+                'clock = "correlation" in [options]',
+            )
+        check_assumed(k, spec, written)
+
+
+def check_names(several: str, names: Sequence[str], written: Written) -> None:
+    """Refuse two of one name.
+
+    Parameters
+    ----------
+    several : str
+        Key of the tables.
+    names : sequence of str
+    written : Written
+    """
+    seen: dict[str, int] = {}
+    for k, name in enumerate(names):
+        same = " ".join(name.split()).casefold()
+        if same in seen:
+            raise written.contradiction(
+                (several, k, "name"),
+                (several, seen[same], "name"),
+                "two of one name cannot be told apart",
+                "name one of them otherwise",
+            )
+        seen[same] = k
+
+
+def _placed(k: int, unit: UnitSpec, written: Written) -> None:
+    for name, why in (
+        ("position_m", "delta-V and the direction of force move with the lever arm"),
+        ("position_sd_m", "the bound of delta-V widens with the error of the lever arm"),
+    ):
+        if not written.has("units", k, name):
+            raise written.missing(("units", k, name), why)
+    if any(abs(angle) > MOST_ANGLE for angle in unit.angles_deg):
+        raise written.refuse(
+            ("units", k, "angles_deg"),
+            "angles are between -360 and 360 deg",
+            "give roll, pitch, heading in degrees",
+        )
+    if unit.angles_sd_deg > STEEPEST:
+        raise written.refuse(
+            ("units", k, "angles_sd_deg"),
+            "with more than 90 deg nothing is known of how it sits",
+            "give the standard deviation in degrees",
+        )
+
+
+def _gyro(k: int, spec: CaseSpec, written: Written) -> None:
+    unit, at = spec.units[k], ("units", k, "gyro_from")
+    lender = unit.gyro_from
+    if lender is None:
+        return
+    if unit.gyro is not None:
+        raise written.contradiction(
+            at,
+            ("units", k, "gyro"),
+            "a unit with a gyro borrows none",
+            "take away one of the two",
+        )
+    if lender == unit.name:
+        raise written.contradiction(
+            at,
+            ("units", k, "name"),
+            "a unit lends itself nothing",
+            "name another unit, one that has a gyro",
+        )
+    lenders = [n for n, other in enumerate(spec.units) if other.name == lender]
+    with_gyro = [other.name for other in spec.units if other.gyro is not None]
+    known = nearest(lender, with_gyro) if with_gyro else "no unit of this case has a gyro"
+    if not lenders:
+        raise written.refuse(at, "there is no such unit", known)
+    if spec.units[lenders[0]].gyro is None:
+        raise written.contradiction(
+            at, ("units", lenders[0], "name"), "that unit has no gyro itself", known
+        )
+
+
+def _levelled(k: int, unit: UnitSpec, written: Written) -> None:
+    level, sd = ("units", k, "levelling_deg"), ("units", k, "levelling_sd_deg")
+    if unit.levelling_deg is not None and unit.levelling_sd_deg is None:
+        raise written.missing(sd, f"{written.said(*level)} says not how well it is known")
+    if unit.levelling_deg is None and unit.levelling_sd_deg is not None:
+        raise written.missing(level, f"{written.said(*sd)} is of nothing")
+    if unit.levelling_deg is not None and max(abs(a) for a in unit.levelling_deg) > STEEPEST:
+        raise written.refuse(
+            level, "roll and pitch before a crash are within 90 deg", "give them in degrees"
+        )
+    if unit.levelling_sd_deg is not None and unit.levelling_sd_deg > STEEPEST:
+        raise written.refuse(sd, "with more than 90 deg nothing is known", "give it in degrees")
+
+
+def _rest(k: int, spec: CaseSpec, written: Written) -> None:
+    unit, at = spec.units[k], ("units", k, "rest_s")
+    if unit.rest_s is None:
+        return
+    start, end = unit.rest_s
+    if not start < end:
+        raise written.refuse(at, "it ends before it begins", "write rest_s = [start, end]")
+    if end > 0.0:
+        raise written.refuse(
+            at,
+            f"it ends {end:g} s after the trigger, and the vehicle is struck there",
+            "give a time before the crash in which the vehicle stood, from the trigger: negative",
+        )
+    entry, speed = spec.entry, ("entry", "speed_m_per_s")
+    if entry.kind == "speed" and entry.speed_m_per_s and end > entry.time_s:
+        raise written.contradiction(
+            at,
+            ("entry", "time_s"),
+            f"the vehicle is said to stand when it drives: {written.said(*speed)}",
+            "give a rest that ends before the entry, or take it away",
+            default=entry.time_s,
+        )

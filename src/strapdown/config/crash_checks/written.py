@@ -1,0 +1,93 @@
+"""A value of a case as its file has it, with its line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from strapdown.config.case_wanted import what_to_write
+from strapdown.config.shown import shown, shown_key
+from strapdown.config.toml_file import TomlFile
+from strapdown.config.toml_lines import KeyPath
+from strapdown.exceptions import ConfigError
+
+__all__ = ["Written"]
+
+
+@dataclass(frozen=True)
+class Written:
+    """The file of a case, asked by the names of fields.
+
+    Attributes
+    ----------
+    file : TomlFile
+    names : dict
+        By the path of a field, its path in the file, where the file has another unit.
+    """
+
+    file: TomlFile
+    names: Mapping[KeyPath, KeyPath]
+
+    def has(self, *path: str | int) -> bool:
+        """Whether the file has this field."""
+        return self._value(path) is not None
+
+    def said(self, *path: str | int, default: Any = None) -> str:
+        """The key, its value and its line: ``speed_km_per_h = 25.6 (line 14)``."""
+        value = self._value(path)
+        if value is None:
+            return f"{path[-1]} = {shown(default)} (as nothing else is written)"
+        return f"{self._equation(path, value)} (line {self.file.line(self._at(path))})"
+
+    def refuse(self, path: KeyPath, why: str, remedy: str) -> ConfigError:
+        """An error about one value."""
+        value = self._value(path)
+        what = f"{shown(value)}: {why}" if value is not None and not _big(value) else why
+        return self.file.refuse(self._at(path), what, remedy)
+
+    def missing(self, path: KeyPath, why: str) -> ConfigError:
+        """An error about a field that is not written, though it is needed."""
+        return self.file.refuse(path, f"it is missing: {why}", what_to_write(path))
+
+    def contradiction(
+        self, path: KeyPath, other: KeyPath, why: str, remedy: str, default: Any = None
+    ) -> ConfigError:
+        """An error about two values that cannot both be meant."""
+        mine = self._equation(path, self._value(path))
+        what = f"{mine} contradicts {self.said(*other, default=default)}: {why}"
+        return self.file.refuse(self._at(path), what, remedy)
+
+    def key(self, *path: str | int) -> str:
+        """The name of the key as the file has it."""
+        return shown_key(str(self._at(path)[-1]))
+
+    def _at(self, path: KeyPath) -> KeyPath:
+        for end in range(len(path), 0, -1):
+            if path[:end] in self.names:
+                return (*self.names[path[:end]], *path[end:])
+        return path
+
+    def _value(self, path: KeyPath) -> Any:
+        node: Any = self.file.table
+        for part in self._at(path):
+            if isinstance(node, str):
+                # One where several may be.
+                break
+            try:
+                node = node[part]
+            except (KeyError, IndexError, TypeError):
+                return None
+        return node
+
+    def _equation(self, path: KeyPath, value: Any) -> str:
+        at = self._at(path)
+        name = next((shown_key(part) for part in reversed(at) if isinstance(part, str)), "")
+        return name if _big(value) else f"{name} = {shown(value)}"
+
+
+def _big(value: Any) -> bool:
+    """A table, or several."""
+    return isinstance(value, dict) or (
+        isinstance(value, list) and any(isinstance(part, dict) for part in value)
+    )
