@@ -12,7 +12,7 @@ from typing import NoReturn
 import typer
 
 from strapdown import __version__
-from strapdown.cli import attitude, crash, demo, modules, reproduce, simulate, verify
+from strapdown.cli import attitude, crash, demo, init, modules, reproduce, simulate, verify
 from strapdown.exceptions import Finding, StrapdownError
 
 EXIT_CODES = """
@@ -49,8 +49,9 @@ def main(
 
 
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
+app.add_typer(init.app, name="init")
 app.command("crash", epilog=crash.EPILOG)(crash.crash)
-app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
+
 app.command("reproduce", epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
 app.command("modules", epilog=modules.EPILOG)(modules.modules)

@@ -10,7 +10,8 @@ from strapdown.exceptions import Finding
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing, facings
 from strapdown.systems.crash_draft.parts import Part, Skipped
-from strapdown.systems.crash_draft.range_ends import in_words
+from strapdown.systems.crash_draft.range_ends import RangeEnds, in_words
+from strapdown.systems.crash_draft.stated_errors import stated_of
 from strapdown.systems.crash_draft.toml_text import (
     ASK,
     Asked,
@@ -267,19 +268,23 @@ def _trigger(page: Page, unit: Unit) -> None:
         + (f"; {impact.more} more events follow" if impact.more else "")
     )
     if impact.rest is None:
-        page.say("found: no rest before the impact; roll and pitch must then be stated: levelling_deg")
+        page.say(
+            "found: no rest before the impact, so that it does not tell roll and pitch of the "
+            "vehicle there, deg"
+        )
+        page.key("levelling_deg", "[0.0, 0.0]", "assumed: a level road")
+        page.key("levelling_sd_deg", "2.0", "assumed, deg")
     else:
         kind = {"still": "at rest", "steady": "steady, though perhaps moving"}[impact.grade]
         length = impact.rest[1] - impact.rest[0]
         page.say(
             f"found: it was {kind} from {impact.rest[0]:.6g} to {impact.rest[1]:.6g} s, "
-            f"{length:.3g} s; to name another stretch: rest_s = [from, to]"
+            f"{length:.3g} s; to name another stretch, counted from the trigger: rest_s = [from, to]"
         )
 
 
 def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) -> None:
     ends = unit.ends[k]
-    gyro = part.kind == "rate"
     page.table(header)
     if words:
         page.say(f"{words}")
@@ -299,7 +304,7 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
                 f"only you know: {part.clock.candidates}",
                 what=f"unit of the time of {plain(part.path)}",
             )
-    elif part.clock.rate != part.clock.rate:
+    elif not part.clock.unit:
         page.key(
             "rate_hz",
             ASK,
@@ -329,27 +334,34 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
             if e is not None
         ]
         page.say(f"found: it stood at the end of its range in {ends.samples} samples: {', '.join(stood)}")
-    kind = "gyro" if gyro else "accelerometer"
-    shown = ", ".join(ends.sensors[:SHOWN_SENSORS]) + (" …" if len(ends.sensors) > SHOWN_SENSORS else "")
-    if ends.saturated and len(ends.sensors) == 1:
+    _sensor(page, part, ends, unit)
+
+
+def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
+    """What is not known of the part: of the catalogue where its range tells it, else assumed."""
+    if ends.saturated and len(ends.sensors) == 1 and not part.uncertainty:
         page.key(
             "sensor",
             string(ends.sensors[0]),
             "assumed: of the catalogue it alone ends there; look at `strapdown modules`",
         )
         return
-    fits = f"those that reach so far: {shown}" if shown else "none of the catalogue ends there"
-    page.say(
-        f"the {kind}'s data sheet, from which the bounds are computed: a name of the catalogue, "
-        f"or a file in its form; {fits}"
-    )
+    numbers, why = (part.uncertainty, part.basis)
+    if not numbers:
+        numbers, why = stated_of(part, ends, unit.impact, unit.accelerometers[0])
+    page.say(f"assumed: {why}")
     page.key(
-        "sensor",
-        ASK,
-        "only you know",
-        what=f"which {kind} wrote {plain(', '.join(part.channels.values()))} "
-        f"(fits: {shown or 'none known'})",
+        "uncertainty",
+        "{ " + ", ".join(f"{k} = {number(v, 4)}" for k, v in numbers.items()) + " }",
     )
+    if not part.uncertainty:
+        shown = ", ".join(ends.sensors[:SHOWN_SENSORS])
+        more = " and more" if len(ends.sensors) > SHOWN_SENSORS else ""
+        page.say(
+            "If you know the part, write instead of that line: sensor = and its name in quotation "
+            f"marks. Of the catalogue these reach so far: {shown or 'none'}{more}; a file of your "
+            "own in its form will do, too"
+        )
 
 
 def _assumed(page: Page, unit: Unit) -> None:

@@ -134,7 +134,7 @@ def _one_recorder(group: Sequence[Part], part: Part) -> str:
             continue
         low, high = sorted((other, part), key=_reach)
         apart = abs(_instant(low, _reach(low)) - _instant(high, _reach(low)))
-        if apart > max(SAME_INSTANT, STEPS * max(_step(other), _step(part))):
+        if apart > max(SAME_INSTANT, STEPS * max(other.step, part.step)):
             continue
         ends = range_ends(low)
         reached = float(np.nanmax(np.abs(high.values)))
@@ -168,7 +168,7 @@ def _text(part: Part) -> str:
 
 def _agreement(low: Part, high: Part) -> tuple[float, float]:
     start, end = max(low.time[0], high.time[0]), min(low.time[-1], high.time[-1])
-    slow, fast = (low, high) if _step(low) >= _step(high) else (high, low)
+    slow, fast = (low, high) if low.step >= high.step else (high, low)
     rows = (slow.time >= start) & (slow.time <= end)
     at = slow.time[rows]
     has = low.axes
@@ -186,10 +186,9 @@ def _overlap(a: Part, b: Part) -> bool:
 
 def _instant(part: Part, reach: float) -> float:
     """When it felt most, on its clock, within a range."""
-    free = np.clip(part.values - np.nanmedian(part.values, axis=0), -reach, reach)
-    size = np.nansum(free**2, axis=1)
+    size = (np.clip(part.free, -reach, reach) ** 2).sum(axis=1)
     # The middle of what is near the largest: an end of the range is reached for a while.
-    return float(np.average(part.time, weights=size**2))
+    return float(np.average(part.time, weights=size**2)) if size.any() else 0.0
 
 
 def _owner(
@@ -245,9 +244,10 @@ def _names(groups: Sequence[Sequence[Part]], gyros: Sequence[Part | None]) -> li
     names: list[str] = []
     for k, stem in enumerate(stems):
         label = groups[k][0].label
+        place = groups[k][0].place
         name = f"{stem} {label}".strip() if stems.count(stem) > 1 else stem
         n = 2
-        base = name or "unit"
+        base = place or name or "unit"
         name = base
         while name in names:
             name, n = f"{base} {n}", n + 1
@@ -263,7 +263,3 @@ def _of(part: Part) -> str:
     names = list(part.channels.values())
     shown = ", ".join(names)
     return f"{shown} of {PurePath(part.path).name}"
-
-
-def _step(part: Part) -> float:
-    return float(np.median(np.diff(part.time))) if part.time.size > 1 else 0.0

@@ -26,10 +26,12 @@ _AXES = {
     "y": "y lateral quer right transv pitch nick".split(),
     "z": "z vertical vertikal vert hoch down yaw gier".split(),
 }
+# Words of a turn that others are made with: Gierrate, Nickwinkel.
+_TURNS = {"wank": "x", "roll": "x", "nick": "y", "pitch": "y", "gier": "z", "yaw": "z"}
+_NO_AXIS = ("hz", "khz", "mhz", "max", "idx", "index", "mux", "aux", "fix")
 _UNITS = {"grad/s": "deg/s", "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "mph": "mph"}
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 _WORD = re.compile(r"[^\W\d_]+|\d+")
-_NUMBERED = re.compile(r"(.*?)[ _\-]?(\d+)$")
 
 
 @dataclass(frozen=True)
@@ -47,15 +49,15 @@ class Heading:
         In this package's spelling, ``km/h`` or ``mph``; empty where it says none.
     stem : str
         What is left without axis and unit: channels of one triad share it.
-    number : int or None
-        With which it ends: of channels that are counted.
+    reversed : bool
+        The axis points the other way: left, rearward, up.
     """
 
     quantity: str
     axis: str
     unit: str
     stem: str
-    number: int | None = None
+    reversed: bool = False
 
 
 def read_heading(name: str) -> Heading:
@@ -94,13 +96,11 @@ def read_heading(name: str) -> Heading:
         pass
     elif unit in ("s", "ms", "us", "ns") and quantity not in ("other", "counter"):
         quantity = "time"
-    number = _NUMBERED.match(plain.strip())
     return Heading(
         quantity,
         axis if quantity in ("", "acceleration", "rate", "velocity") else "",
         unit,
         " ".join(stem_words),
-        int(number.group(2)) if number and len(number.group(2)) < 6 else None,
     )
 
 
@@ -146,6 +146,9 @@ def _axis(words: list[str]) -> tuple[str, list[str]]:
                 return axis, words[:k] + words[k + 1 :]
     for k in range(len(words) - 1, -1, -1):
         word = words[k]
-        if 1 < len(word) <= 5 and word[-1] in _AXES:
+        turn = next((t for t in _TURNS if word.startswith(t)), "")
+        if turn:
+            return _TURNS[turn], [*words[:k], word[len(turn) :], *words[k + 1 :]]
+        if 1 < len(word) <= 5 and word[-1] in _AXES and word not in _NO_AXIS:
             return word[-1], [*words[:k], word[:-1], *words[k + 1 :]]
     return "", words

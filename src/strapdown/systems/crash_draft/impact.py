@@ -127,8 +127,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
 
 def _struck(part: Part) -> float:
     """When it felt most, less what a pulse lasts."""
-    free = part.values - np.nanmedian(part.values, axis=0)
-    return float(part.time[int(np.argmax(np.nansum(free**2, axis=1)))]) - BEFORE
+    return float(part.time[int(np.argmax((part.free**2).sum(axis=1)))]) - BEFORE
 
 
 def _base(part: Part, rest: tuple[float, float, str] | None) -> Array:

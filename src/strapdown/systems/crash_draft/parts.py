@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -77,6 +78,10 @@ class Part:
         Where the sensor sits, as far as the record tells.
     sensor : str
         What the record says of the part.
+    uncertainty : dict of str to float
+        What is known or assumed of the part, by keys of the catalogue of sensors.
+    basis : str
+        Why.
     notes : tuple of str
         What else belongs in a comment.
     """
@@ -97,12 +102,27 @@ class Part:
     named: bool = False
     place: str = ""
     sensor: str = ""
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+    basis: str = ""
     notes: tuple[str, ...] = ()
 
     @property
     def axes(self) -> list[int]:
         """Which of the three there are."""
         return [k for k, axis in enumerate("xyz") if axis in self.channels]
+
+    @property
+    def free(self) -> Array:
+        """Values less the median of each axis, (n, 3); zero along axes that are missing."""
+        out = np.zeros_like(self.values)
+        has = self.axes
+        out[:, has] = self.values[:, has] - np.median(self.values[:, has], axis=0)
+        return out
+
+    @property
+    def step(self) -> float:
+        """Median step, s; zero for a single sample."""
+        return float(np.median(np.diff(self.time))) if self.time.size > 1 else 0.0
 
 
 @dataclass(frozen=True)

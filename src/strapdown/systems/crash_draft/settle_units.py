@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, STANDARD_GRAVITY, TIME_UNITS
+from strapdown.formats.crash_units import FACTORS
 from strapdown.formats.inference.conclusion import THRESHOLD
 from strapdown.systems.crash_draft.parts import Part
 from strapdown.systems.crash_draft.triad_kind import (
@@ -24,7 +25,6 @@ Array = NDArray[np.float64]
 
 __all__ = ["settle_units"]
 
-VELOCITY_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 # Of the shorter record: so much must lie within the other for the two to be held together.
 OVERLAP = 0.5
 # Without gravity a rest is below this part of the peak.
@@ -75,7 +75,7 @@ def _by_heading(part: Part) -> Part | None:
     for kind, table in (
         ("acceleration", ACCEL_UNITS),
         ("rate", GYRO_UNITS),
-        ("velocity", VELOCITY_UNITS),
+        ("velocity", FACTORS["velocity"]),
     ):
         if part.kind == kind and part.unit in table:
             return _scaled(part, kind, part.unit, table[part.unit], "unit by the heading")
@@ -85,7 +85,7 @@ def _by_heading(part: Part) -> Part | None:
 def _by_gravity(part: Part, known: Sequence[Part]) -> Part | None:
     if part.kind not in ("", "acceleration") or len(part.axes) < 3:
         return None
-    said = accel_unit(part.values, _step(part), quiet_part(part.values))
+    said = accel_unit(part.values, part.step, quiet_part(part.values))
     if not said.settled:
         return None
     return _scaled(part, "acceleration", said.unit, ACCEL_UNITS[said.unit], said.why)
@@ -95,7 +95,7 @@ def _by_gravity_alone(part: Part, known: Sequence[Part]) -> Part | None:
     """An accelerometer, as it weighs something at rest, in a unit that is not settled."""
     if part.kind not in ("", "acceleration") or len(part.axes) < 3:
         return None
-    said = accel_unit(part.values, _step(part), quiet_part(part.values))
+    said = accel_unit(part.values, part.step, quiet_part(part.values))
     if said.gravity < THRESHOLD:
         return None
     return _asked(part, "acceleration", said.unit, ACCEL_UNITS, _accelerations)
@@ -124,14 +124,14 @@ def _by_elimination(part: Part, known: Sequence[Part]) -> Part | None:
     values = part.values[:, part.axes]
     quiet = quiet_part(values)
     if part.kind == "velocity":
-        return _asked(part, "velocity", "km/h", VELOCITY_UNITS, _speeds)
+        return _asked(part, "velocity", "km/h", FACTORS["velocity"], _speeds)
     if part.kind == "rate" or (not part.kind and known and len(part.axes) == 3):
         said = gyro_unit(part.time, values, quiet)
         why = "" if part.kind else "it does not follow the accelerations, and rests near zero; "
         if said.settled:
             return _scaled(part, "rate", said.unit, GYRO_UNITS[said.unit], why + said.why)
         return _asked(part, "rate", said.unit, GYRO_UNITS, _rates, why)
-    said = accel_unit(part.values, _step(part), quiet) if len(part.axes) == 3 else _likeliest(part)
+    said = accel_unit(part.values, part.step, quiet) if len(part.axes) == 3 else _likeliest(part)
     zeroed = bool(np.abs(quiet.mean).max() < ZEROED * np.abs(values).max())
     return replace(
         _asked(part, "acceleration", said.unit, ACCEL_UNITS, _accelerations),
@@ -180,7 +180,7 @@ def _peak_change(part: Part, factor: float) -> tuple[float, float]:
     """Largest value, and largest change of its integral, of any axis."""
     values = part.values[:, part.axes]
     values = (values - quiet_part(values).mean) * factor
-    step = _step(part)
+    step = part.step
     sums = np.abs(np.cumsum(values, axis=0) * step)
     return float(np.abs(values).max()), float(sums.max())
 
@@ -205,7 +205,7 @@ def _together(known: Part, other: Part) -> tuple[Array, Array] | None:
     shorter = min(np.ptp(known.time), np.ptp(other.time))
     if end - start < OVERLAP * shorter:
         return None
-    slow, fast = (known, other) if _step(known) >= _step(other) else (other, known)
+    slow, fast = (known, other) if known.step >= other.step else (other, known)
     rows = (slow.time >= start) & (slow.time <= end)
     at = slow.time[rows]
     moved = np.column_stack([np.interp(at, fast.time, fast.values[:, k]) for k in range(3)])
@@ -216,7 +216,3 @@ def _together(known: Part, other: Part) -> tuple[Array, Array] | None:
 def _named(other: Part, part: Part) -> str:
     names = ", ".join(other.channels.values())
     return names if other.path == part.path else f"{other.path}: {names}"
-
-
-def _step(part: Part) -> float:
-    return float(np.median(np.diff(part.time))) if part.time.size > 1 else 0.0

@@ -1,13 +1,18 @@
-"""Triads of a text table of unknown layout, with their clock, as far as headings tell."""
+"""Triads of a table of unknown layout, with their clock, as far as headings tell."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
-from strapdown.formats.recording import RawLog
-from strapdown.systems.crash_draft.header_words import read_heading
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_units import factor_of
+from strapdown.formats.stamps import EPOCH
+from strapdown.systems.crash_draft.header_words import Heading, read_heading
 from strapdown.systems.crash_draft.parts import Part, Skipped
 from strapdown.systems.crash_draft.table_clock import find_clock
 from strapdown.systems.crash_draft.table_triads import group_columns
@@ -18,84 +23,132 @@ __all__ = ["LEAST_SAMPLES", "table_parts"]
 
 #: A crash of a tenth of a second, at the slowest rate that shows it.
 LEAST_SAMPLES = 8
+# Ticks beyond this are counted from the first, before they become floats.
+FAR = 2.0**40
+_KINDS = ("acceleration", "rate", "velocity", "time")
 
 
-def table_parts(path: str, raw: RawLog) -> tuple[list[Part], list[Skipped]]:
+@dataclass(frozen=True)
+class _Table:
+    columns: Mapping[str, Array]
+    headings: Mapping[str, Heading]
+    origins: Mapping[str, float]
+
+
+def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
     """Find the triads of a table.
 
     Parameters
     ----------
     path : str
         As a case names it.
-    raw : RawLog
+    record : CrashRecord
+        Whose channels are columns.
 
     Returns
     -------
     parts : list of Part
+        Values as recorded; kind and unit as far as headings tell.
     skipped : list of Skipped
 
     Raises
     ------
     DataError
-        It holds fewer than eight samples, or no numbers.
+        It holds fewer than eight samples.
     """
-    rows = max((len(v) for v in raw.columns.values()), default=0)
+    table, skipped = _columns(path, record)
+    rows = max((len(v) for v in table.columns.values()), default=0)
     if rows < LEAST_SAMPLES:
         raise DataError(
             f"{rows} sample{'' if rows == 1 else 's'}, too few for a crash",
-            file=raw.name,
+            file=record.path.name,
             remedy=f"give the whole record: at least {LEAST_SAMPLES} samples",
         )
-    columns: dict[str, Array] = {}
-    skipped: list[Skipped] = []
-    for name, values in raw.columns.items():
-        if values.dtype.kind in "iuf":
-            columns[name] = values.astype(np.float64)
-        elif values.dtype.kind == "M":
-            columns[name] = values.astype("datetime64[ns]").astype(np.int64) * 1e-9
-        else:
-            skipped.append(Skipped(path, f"column '{name}'", "it holds text", (name,)))
-    if not columns:
-        raise DataError(
-            "no column holds numbers",
-            file=raw.name,
-            remedy="check that it is a record, and that its decimal sign is one for all columns",
-        )
-    headings = {
-        name: read_heading(f"{name} [{raw.units[name]}]" if name in raw.units else name)
-        for name in columns
-    }
-    clock, time = find_clock(columns, headings)
-    others = {n: v for n, v in columns.items() if n != clock.column}
-    groups, left = group_columns(others, headings)
+    clock, time = find_clock(table.columns, table.headings)
+    if time is None:
+        stamps = np.arange(rows, dtype=np.float64)
+    else:
+        factor = 1.0 / (clock.rate * clock.step)
+        origin = table.origins.get(clock.column, 0.0) * factor
+        # As those are read who read the case: what counts from far away counts from its first.
+        stamps = time - time[0] if abs(origin + time[0]) > EPOCH else time + origin
+    others = {n: v for n, v in table.columns.items() if n != clock.column}
+    groups, left = group_columns(others, table.headings)
     skipped += [Skipped(path, f"column '{name}'", why, (name,)) for name, why in left]
-    stamps = np.arange(rows, dtype=np.float64) if time is None else time
     parts = []
     for group in groups:
-        values = np.full((rows, 3), np.nan)
+        values, channels = np.full((rows, 3), np.nan), {}
         has = [k for k, axis in enumerate("xyz") if axis in group.columns]
         for k in has:
-            values[:, k] = columns[group.columns["xyz"[k]]]
+            name = group.columns["xyz"[k]]
+            turned = table.headings[name].reversed
+            values[:, k] = -table.columns[name] if turned else table.columns[name]
+            channels["xyz"[k]] = f"-{name}" if turned else name
         kept = np.isfinite(values[:, has]).all(axis=1)
         lost = rows - int(kept.sum())
-        if int(kept.sum()) < LEAST_SAMPLES:
+        if rows - lost < LEAST_SAMPLES:
             names = tuple(group.columns.values())
             skipped.append(Skipped(path, ", ".join(names), "hardly a row of it is whole", names))
             continue
-        parts.append(
-            Part(
-                path,
-                group.quantity,
-                group.columns,
-                clock,
-                group.unit,
-                "axes by the headings" if group.by_heading else "axes in the order of the columns",
-                stamps[kept],
-                values[kept],
-                label=group.label,
-                named=group.by_heading,
-                sampling=raw.sampling or "",
-                notes=(f"{lost} rows without a value are left out",) if lost else (),
-            )
+        part = Part(
+            path,
+            group.quantity,
+            channels,
+            clock,
+            group.unit,
+            "axes by the headings" if group.by_heading else "axes in the order of the columns",
+            stamps[kept],
+            values[kept],
+            label=group.label,
+            named=group.by_heading,
+            notes=(f"{lost} of {rows} rows have no value of it",) if lost else (),
         )
+        parts.append(replace(part, sampling=_sampling(record, group.columns.values())))
     return parts, skipped
+
+
+def _sampling(record: CrashRecord, names: object) -> str:
+    kinds = {c.sampling for c in record.channels if c.name in set(names)}  # type: ignore[call-overload]
+    only = kinds.pop() if len(kinds) == 1 else None
+    return only or ""
+
+
+def _columns(path: str, record: CrashRecord) -> tuple[_Table, list[Skipped]]:
+    """Columns as recorded: those that cannot be read are left out with what was wrong."""
+    columns: dict[str, Array] = {}
+    headings: dict[str, Heading] = {}
+    origins: dict[str, float] = {}
+    skipped: list[Skipped] = []
+    for channel in record.channels:
+        try:
+            raw = channel.samples() if channel.samples is not None else channel.load()[1]
+        except DataError as error:
+            what = str(error.finding.what)
+            row = f" in row {error.finding.row}" if error.finding.row is not None else ""
+            skipped.append(Skipped(path, f"column '{channel.name}'", what + row, (channel.name,)))
+            continue
+        headings[channel.name] = _heading(channel)
+        if raw.dtype.kind in "iu" and raw.size and abs(int(raw[0])) > FAR:
+            origins[channel.name] = float(raw[0])
+            raw = raw.astype(np.int64) - np.int64(raw[0])
+        values = raw.astype(np.float64)
+        factor = factor_of(channel.quantity, channel.unit)
+        if factor is not None and channel.quantity != "time":
+            values = values / factor
+        columns[channel.name] = values
+    return _Table(columns, headings, origins), skipped
+
+
+def _heading(channel: CrashChannel) -> Heading:
+    """What the heading says: the reader's word where it has a unit, ours in other languages."""
+    own = read_heading(channel.name)
+    axis, turned = channel.axis.lstrip("-"), channel.axis.startswith("-")
+    if axis:
+        own = replace(own, axis=axis, reversed=turned)
+    if channel.quantity in _KINDS and (channel.unit or not own.quantity):
+        # One letter g is an acceleration to one maker and a gyro to another.
+        if channel.unit or own.stem != "g":
+            own = replace(own, quantity=channel.quantity, unit=channel.unit)
+    elif channel.quantity in ("displacement", "force"):
+        own = replace(own, quantity="other")
+    return own

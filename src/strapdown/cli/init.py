@@ -1,0 +1,71 @@
+"""``strapdown init``: a file to begin with, from records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = "Example: strapdown init crash recorder.csv"
+CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
+
+app = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback(epilog=EPILOG)
+def init() -> None:
+    """Write a file to begin with, from your records: what they tell, and what only you know."""
+
+
+@app.command("crash", epilog=CRASH_EPILOG)
+def crash(
+    records: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RECORD...",
+            help="Records of one crash: CSV or text tables of any layout, tables of an event data "
+            "recorder, the folder of a test (NHTSA, ISO MME).",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="The case file to write.")
+    ] = Path("case.toml"),
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Write the case file of a crash: records are looked through, and what is not in them is asked.
+
+    Each line says whether it was found, is assumed, or is yours to fill in ("?"). Then:
+    strapdown crash case.toml
+    """
+    from strapdown.cli.console import console, print_findings, progress
+    from strapdown.systems.crash_draft import draft_case, read_records
+    from strapdown.systems.crash_draft.file import check_free, write_file
+
+    check_free(out, force)
+    with progress(quiet) as report:
+        report("reading", 0.1)
+        there = read_records(records)
+        report("looking through", 0.5)
+        draft = draft_case(there, folder=out.absolute().parent)
+        write_file(out, draft.text, force=force)
+    if quiet:
+        return
+    print_findings(draft.findings)
+    page = console()
+    page.print("Found", style="bold")
+    for line in draft.found:
+        page.print(f"  {line}")
+    page.print(f"\nWrote {out}")
+    if draft.asked:
+        page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
+        for one in draft.asked:
+            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+        page.print("Look at the lines that say 'assumed', too.")
+    page.print(f"\nThen   strapdown crash {out}")

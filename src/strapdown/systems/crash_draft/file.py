@@ -1,0 +1,77 @@
+"""Write a file whole or not at all, and never over another unasked."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+from strapdown.exceptions import ConfigError
+
+__all__ = ["check_free", "write_file"]
+
+
+def check_free(path: Path, force: bool) -> None:
+    """Refuse a place where something stands.
+
+    Raises
+    ------
+    ConfigError
+        A file is there and may not be replaced, or a folder is.
+    """
+    if path.is_dir():
+        raise ConfigError(
+            "it is a folder",
+            file=str(path),
+            quantity="--out",
+            remedy=f"name a file in it: --out {path / 'case.toml'}",
+        )
+    if path.exists() and not force:
+        raise ConfigError(
+            "the file exists, and may hold what you wrote",
+            file=str(path),
+            quantity="--out",
+            remedy="name another with --out, or add --force to replace it",
+        )
+
+
+def write_file(path: Path, text: str, *, force: bool) -> None:
+    """Write a text file.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+    force : bool
+        Replace a file that is there.
+
+    Raises
+    ------
+    ConfigError
+        As `check_free`, also for a file that came in the meantime.
+    """
+    check_free(path, force)
+    path = path.absolute()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent)
+    staged = Path(name)
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as stream:
+            stream.write(text)
+        staged.chmod(0o644)
+        if force:
+            staged.replace(path)
+            return
+        try:
+            # A link is refused where something stands, in one step with making it.
+            path.hardlink_to(staged)
+        except FileExistsError:
+            check_free(path, force)
+        except OSError:
+            # A file system without links.
+            check_free(path, force)
+            staged.replace(path)
+    finally:
+        with suppress(FileNotFoundError):
+            staged.unlink()

@@ -1,0 +1,145 @@
+"""Units of a crash test of a laboratory: which channels of which place, and what is left out."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
+from strapdown.exceptions import DataError
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.systems.crash_draft.parts import Clock, Part, Skipped
+
+Array = NDArray[np.float64]
+
+__all__ = ["laboratory_parts"]
+
+_AXIS_WORD = re.compile(r"(?<![A-Za-z])([XYZ])[RGL]?(?![A-Za-z])(?:[ -]?AXIS)?", re.I)
+_FAILED = ("failed", "no data", "questionable", "meaningless")
+# Of the accelerometers of crash laboratories, after their calibration by SAE J211.
+LABORATORY = {"bias_sd_mg": 100.0, "scale_sd_percent": 1.0, "misalignment_sd_deg": 1.0}
+
+
+def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
+    """Find the triads of a test: one a place on the vehicle, of its primary channels.
+
+    Parameters
+    ----------
+    path : str
+        As a case names it.
+    record : CrashRecord
+        Whose channels say quantity, axis, place and body.
+
+    Returns
+    -------
+    parts : list of Part
+    skipped : list of Skipped
+        Failed and redundant channels, and those of other bodies.
+    """
+    places: dict[tuple[str, str], list[CrashChannel]] = {}
+    skipped: list[Skipped] = []
+    elsewhere: dict[str, list[str]] = {}
+    for channel in record.channels:
+        if channel.quantity not in ("acceleration", "rate") or not channel.axis:
+            what = channel.quantity if channel.quantity not in ("acceleration", "rate") else "no axis"
+            elsewhere.setdefault(f"no sensor of a vehicle's motion ({what})", []).append(channel.name)
+        elif channel.body != "vehicle":
+            elsewhere.setdefault(f"it moves with the {channel.body}", []).append(channel.name)
+        elif failure := _failure(channel):
+            skipped.append(Skipped(path, f"channel {channel.name}", failure, (channel.name,)))
+        else:
+            places.setdefault((channel.quantity, _place(channel)), []).append(channel)
+    for why, names in elsewhere.items():
+        skipped.append(Skipped(path, f"channels {', '.join(names)}", why, tuple(names)))
+    parts = []
+    for (quantity, place), channels in places.items():
+        part, unread = _part(path, quantity, place, channels)
+        skipped += unread
+        if part is not None:
+            parts.append(part)
+    return parts, skipped
+
+
+def _place(channel: CrashChannel) -> str:
+    """The place without its axis: channels of one block share it."""
+    return " ".join(_AXIS_WORD.sub(" ", channel.place).split()).strip(" ,-") or "vehicle"
+
+
+def _failure(channel: CrashChannel) -> str:
+    told = next((r for r in channel.remarks if any(f in r.lower() for f in _FAILED)), "")
+    return f"the laboratory says so: {told}" if told else ""
+
+
+def _is_primary(channel: CrashChannel) -> bool:
+    return "redundant" not in channel.remarks
+
+
+def _part(
+    path: str, quantity: str, place: str, channels: Sequence[CrashChannel]
+) -> tuple[Part | None, list[Skipped]]:
+    skipped: list[Skipped] = []
+    chosen: dict[str, CrashChannel] = {}
+    curves: dict[str, tuple[Array, Array]] = {}
+    spare: list[str] = []
+    for channel in sorted(channels, key=lambda c: not _is_primary(c)):
+        axis = channel.axis.lstrip("-")
+        if axis in chosen:
+            spare.append(channel.name)
+            continue
+        try:
+            curves[axis] = channel.load()
+        except DataError as error:
+            what = error.finding.what
+            skipped.append(Skipped(path, f"channel {channel.name}", what, (channel.name,)))
+            continue
+        chosen[axis] = channel
+    if spare:
+        why = f"redundant at '{place}'; to use it, write it in place of the primary one"
+        skipped.append(Skipped(path, f"channels {', '.join(spare)}", why, tuple(spare)))
+    if not chosen:
+        return None, skipped
+    axes = [a for a in "xyz" if a in chosen]
+    time = curves[axes[0]][0]
+    values = np.full((time.size, 3), np.nan)
+    for axis in axes:
+        sign = -1.0 if chosen[axis].axis.startswith("-") else 1.0
+        values[:, "xyz".index(axis)] = sign * np.interp(time, *curves[axis])
+    step = float(np.median(np.diff(time))) if time.size > 1 else math.nan
+    first = chosen[axes[0]]
+    scales = [c.full_scale for c in chosen.values() if c.full_scale]
+    kind = STANDARD_GRAVITY if quantity == "acceleration" else GYRO_UNITS["deg/s"]
+    name = "full_scale_g" if quantity == "acceleration" else "full_scale_deg_per_s"
+    uncertainty = dict(LABORATORY)
+    if scales:
+        uncertainty[name] = round(min(scales) / kind, 6)
+    notes = [
+        f"{a} is channel {chosen[a].name}: {'; '.join(chosen[a].remarks)}"
+        + (f"; {chosen[a].low_pass}" if chosen[a].low_pass else "")
+        for a in axes
+    ]
+    return (
+        Part(
+            path,
+            quantity,
+            {a: ("-" if chosen[a].axis.startswith("-") else "") + chosen[a].name for a in axes},
+            Clock("", "s", "the record has its own", step, 1.0 / step),
+            first.unit,
+            "axes and unit by the record",
+            time,
+            values,
+            label=place,
+            zeroed=quantity == "acceleration",
+            sampling="",
+            named=True,
+            place=place,
+            uncertainty=uncertainty,
+            basis="of an accelerometer of a crash laboratory, calibrated by SAE J211; the full scale "
+            "is the record's",
+            notes=tuple(notes),
+        ),
+        skipped,
+    )
