@@ -51,7 +51,7 @@ def main(
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
 app.add_typer(init.app, name="init")
 app.command("crash", epilog=crash.EPILOG)(crash.crash)
-
+app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
 app.command("reproduce", epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
 app.command("modules", epilog=modules.EPILOG)(modules.modules)
