@@ -19,7 +19,6 @@ Array = NDArray[np.float64]
 __all__ = [
     "AROUND",
     "angle_words",
-    "axis_names",
     "crash_span",
     "interval_words",
     "main_event",
@@ -96,11 +95,6 @@ def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[st
         else:
             out.append((name, at))
     return out
-
-
-def axis_names(path: CrashPath) -> tuple[str, str]:
-    """What the first two axes of a path are: north and east, or forward and right at the entry."""
-    return ("north", "east") if path.entry.heading_deg else ("forward", "right")
 
 
 def signed(value: float, digits: int) -> str:

@@ -63,7 +63,7 @@ def place_chart(
     reference_name : str
     """
     labels = [f"{name}, m" for name in (*names, "down")]
-    panels = _panels(path, NED, labels, _sampled(path, samples, 6))
+    panels = _panels(path, NED, labels, _sampled(samples, 6))
     if reference is not None:
         at = 1e3 * reference.index.to_numpy(dtype=np.float64)
         for k, column in enumerate(NED):
@@ -95,7 +95,7 @@ def velocity_chart(
         "Velocity over time",
         f"Velocity of the reference point over ground, {names[0]}, {names[1]}, down, in axes that "
         "do not turn with the vehicle; 1 m/s = 3.6 km/h.",
-        _panels(path, VELOCITY, labels, _sampled(path, samples, 3)),
+        _panels(path, VELOCITY, labels, _sampled(samples, 3)),
         (path, events),
         samples,
     )
@@ -160,7 +160,7 @@ def reference_chart(
     )
 
 
-def _sampled(path: CrashPath, samples: PathSamples | None, first: int) -> list[Array] | None:
+def _sampled(samples: PathSamples | None, first: int) -> list[Array] | None:
     """Low and high ends of the Monte Carlo's 95 % for three columns of its errors."""
     if samples is None:
         return None

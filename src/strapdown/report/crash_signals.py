@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,24 +26,23 @@ from strapdown.report.chart import (
     curve,
 )
 from strapdown.report.crash_moments import crash_span, unit_look
+from strapdown.report.recorded_lines import (
+    BUCKETS,
+    flags_in_vehicle_axes,
+    near_levels,
+    triad_lines,
+)
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.synchronise import SynchronisedUnit
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 __all__ = ["UnitSignals", "unit_signals"]
 
 _AXES = ("forward", "right", "down")
 _TURNS = ("roll", "pitch", "yaw")
 _RAW = ((GREY, "solid"), (SKY, "dash"), (GREY, "dot"))
-# A sensor's axis that is along one of the vehicle's within 18 deg has its limits there, too.
-_ALONG = 0.95
-_PART = 0.3
-# Limits are drawn from this part of the range on: others would only make the signal small.
-_NEAR = 0.5
-_BUCKETS = 700
 
 
 @dataclass(frozen=True)
@@ -107,82 +106,6 @@ def unit_signals(
     return UnitSignals(unit.name, crash, rates, _overview(unit, number, events))
 
 
-def _in_vehicle_axes(values: Array, C: Array) -> Array:
-    """Turned; an axis that is missing spoils only what it has a part in."""
-    parts = np.where(np.abs(C) < 0.02, 0.0, C)[None] * np.where(
-        np.abs(C)[None] < 0.02, 0.0, values[:, None, :]
-    )
-    return np.asarray(parts.sum(axis=2))
-
-
-def _flags_in_vehicle_axes(flags: Flags, C: Array) -> Flags:
-    """Whether a sensor's axis that has a part in one of the vehicle's is at its end."""
-    return np.asarray((flags[:, None, :] & (np.abs(C)[None] > _PART)).any(axis=2))
-
-
-def _triad_lines(
-    triad: RecordedTriad,
-    flags: tuple[Array, Flags],
-    unit: CrashUnit,
-    offset: float,
-    scale: float,
-    span: tuple[float, float],
-    look: tuple[str, str],
-    legend: Callable[[int], bool],
-) -> list[list[Line]]:
-    """One triad as recorded, by vehicle axis, and a symbol where it is at its end."""
-    C = unit.mounting.C_vs
-    stamps = triad.table.index.to_numpy(dtype=np.float64) - offset
-    inside = (stamps >= span[0]) & (stamps <= span[1])
-    columns = ACCEL if ACCEL[0] in triad.table.columns else GYRO
-    values = _in_vehicle_axes(triad.table[columns].to_numpy(dtype=np.float64)[inside], C) / scale
-    at, ends = flags
-    ends = _flags_in_vehicle_axes(ends, C) & ((at >= span[0]) & (at <= span[1]))[:, None]
-    out = []
-    for k in range(3):
-        name = f"{triad.name}, as recorded"
-        line = curve(name, 1e3 * stamps[inside], values[:, k], look[0], look[1], 1.1, _BUCKETS)
-        lines = [replace(line, legend=legend(k))]
-        held = at[ends[:, k]]
-        if held.size and inside.any():
-            found = np.interp(held, stamps[inside], values[:, k])
-            lines.append(
-                Line(
-                    f"{triad.name} at the end of its range",
-                    1e3 * held,
-                    found,
-                    look[0],
-                    points=True,
-                    symbol="triangle-up",
-                    hollow=True,
-                    size=7.0,
-                )
-            )
-        out.append(lines)
-    return out
-
-
-def _levels(
-    triad: RecordedTriad, C: Array, lines: Sequence[Line], axis: int, scale: float, unit: str
-) -> list[Level]:
-    """Ends of the range that a signal comes near, where they are along one axis."""
-    own = int(np.argmax(np.abs(C[axis])))
-    if abs(C[axis, own]) < _ALONG:
-        return []
-    limit = triad.uncertainty.axis("full_scale")[own] / scale
-    values = np.concatenate([line.y for line in lines] or [np.empty(0)])
-    values = values[np.isfinite(values)]
-    if not math.isfinite(limit) or not values.size:
-        return []
-    reached = ((1.0, float(values.max())), (-1.0, -float(values.min())))
-    name = triad.name
-    return [
-        Level(sign * limit, f"{name}: {'+' if sign > 0 else '−'}{limit:.3g} {unit}")
-        for sign, most in reached
-        if most > _NEAR * limit
-    ]
-
-
 def _about_the_crash(
     recorded: CrashUnit,
     synchronised: SynchronisedUnit,
@@ -199,7 +122,7 @@ def _about_the_crash(
     for j, triad in enumerate(recorded.accelerometers):
         there = synchronised.accelerometers[j]
         at = there.triad.table.index.to_numpy(dtype=np.float64)
-        lines = _triad_lines(
+        lines = triad_lines(
             triad,
             (at, np.asarray(there.clipped)),
             recorded,
@@ -211,11 +134,11 @@ def _about_the_crash(
         )
         for k in range(3):
             rows[k] += lines[k]
-            levels[k] += _levels(triad, C, lines[k][:1], k, g, "g")
+            levels[k] += near_levels(triad, C, lines[k][:1], k, g, "g")
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     force = prepared.imu[ACCEL].to_numpy(dtype=np.float64) / g
     inside = (time >= span[0]) & (time <= span[1])
-    cut = _flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
+    cut = flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
     look = unit_look(number)
     name = (
         "merged, biases taken off" if len(recorded.accelerometers) > 1 else "at the common stamps"
@@ -265,10 +188,10 @@ def _rates(
     if there is not None:
         flags = (there.triad.table.index.to_numpy(dtype=np.float64), np.asarray(there.clipped))
     C = recorded.mounting.C_vs
-    rows = _triad_lines(
+    rows = triad_lines(
         gyro, flags, recorded, synchronised.offset, degree, span, _RAW[0], lambda k: k == 0
     )
-    levels = [_levels(gyro, C, rows[k][:1], k, degree, "deg/s") for k in range(3)]
+    levels = [near_levels(gyro, C, rows[k][:1], k, degree, "deg/s") for k in range(3)]
     inside = (time >= span[0]) & (time <= span[1])
     rate = prepared.imu[GYRO].to_numpy(dtype=np.float64) / degree
     for k in range(3):
@@ -301,7 +224,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         values = prepared.imu[columns].to_numpy(dtype=np.float64) / scale
         lines = [
             replace(
-                curve(axis, time, values[:, k], AXIS_COLOURS[k], dash, buckets=_BUCKETS),
+                curve(axis, time, values[:, k], AXIS_COLOURS[k], dash, buckets=BUCKETS),
                 legend=columns is ACCEL,
             )
             for k, (axis, dash) in enumerate(zip(_AXES, ("solid", "dash", "dot"), strict=True))

@@ -54,8 +54,9 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
         "units",
         "Units against each other",
         "Change of velocity at the common point by each unit less that of their best weighted "
-        "mean, vehicle axes, since the first instant shown. Dotted, in its colour: what holds 95 % of such a "
-        "difference, as the units state it, what each shares with the mean taken into account. "
+        "mean, vehicle axes, since the first instant shown. Dotted, in its colour: what holds 95 % "
+        "of such a difference, as the units state it; what a unit shares with the mean is taken "
+        "into account. "
         f"Together they {said} their bounds (chi-square {comparison.chi_square:.4g} of "
         f"{comparison.freedom} degrees of freedom, probability {comparison.probability:.2g}).",
         _X,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -86,6 +87,17 @@ class Drawing:
             f'<rect width="{number(self.width)}" height="{number(self.height)}" fill="#ffffff"/>'
         )
         return "\n".join([head + title, paper, *self._parts, "</svg>\n"])
+
+    @contextmanager
+    def within(self, box: Box) -> Iterator[None]:
+        """Cut what is drawn inside of this at a box (left, top, right, bottom)."""
+        left, top, right, bottom = box
+        size = f"{number(left)} {number(top)} {number(right - left)} {number(bottom - top)}"
+        x, y, width, height = size.split()
+        place = f'x="{x}" y="{y}" width="{width}" height="{height}" viewBox="{size}"'
+        self._parts.append(f'<svg {place} overflow="hidden">')
+        yield
+        self._parts.append("</svg>")
 
     def line(
         self,

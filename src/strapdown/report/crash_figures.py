@@ -1,0 +1,302 @@
+"""Every chart and picture of the report of a crash."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.path import CrashPath
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.report.chart import Chart
+from strapdown.report.crash_animation import path_animation
+from strapdown.report.crash_budget import delta_v_budget_chart, place_budget_chart
+from strapdown.report.crash_conventions import MountingPoint, conventions_picture
+from strapdown.report.crash_delta_v import StatedDeltaV, delta_v_chart
+from strapdown.report.crash_dial import Direction, pdof_dial
+from strapdown.report.crash_direction import pdof_by_shift_chart, pdof_by_window_chart
+from strapdown.report.crash_moments import main_event
+from strapdown.report.crash_motion import (
+    attitude_chart,
+    place_chart,
+    reference_chart,
+    velocity_chart,
+)
+from strapdown.report.crash_outline import vehicle_outline
+from strapdown.report.crash_plan import path_plan
+from strapdown.report.crash_risk import risk_chart
+from strapdown.report.crash_signals import UnitSignals, unit_signals
+from strapdown.report.crash_units import accelerations_chart, differences_chart
+from strapdown.report.document import Animation, Picture
+from strapdown.systems.crash_case import CaseResult, ReferenceAnswer
+from strapdown.tables import NED
+
+__all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]
+
+
+@dataclass(frozen=True)
+class CrashFigures:
+    """Charts and pictures of one case, each with its own caption; None where there is none.
+
+    Time is from the trigger, in ms (of the overviews in s). Every bound holds 95 %. Along the
+    turning axes of the vehicle: forward, right, down positive. Of the path: north, east, down, or
+    forward, right, down as the vehicle stood at the entry, where no heading was stated.
+
+    Attributes
+    ----------
+    pdof : Picture
+        Direction of force of every event on a clock about the vehicle: where it came from, 0 the
+        front, positive clockwise; 95 % as a wedge. Says so where there is no event.
+    path : Picture
+        From above, m; ellipses of 95 %; outlines at the entry, time zero, event ends and end.
+    signals : tuple of UnitSignals
+        Of every unit, in the order of the case: specific force, g, and rates, deg/s, about the
+        crash, and the whole record.
+    delta_v : tuple of Chart
+        One an event: forward, right, down, resultant, km/h, of every unit and the mean.
+    pdof_by_window, pdof_by_time_zero : Chart or None
+        Direction of force of the main event, deg, against the choices it hangs on.
+    motion : Animation
+        The vehicle on its path in space, m; on paper six instants.
+    place, velocity, attitude : Chart
+        Of the path over time: m, m/s, deg; linear and Monte Carlo's bounds.
+    references : tuple of Chart
+        Path less each reference path, m, with the bound of both.
+    units : Chart or None
+        Change of velocity of each unit less that of all, m/s; None for a single unit.
+    accelerations : Chart or None
+        All units at the reference point, g; None for a single unit.
+    delta_v_budget : Chart or None
+        Standard deviation by contributor, m/s, of the main event.
+    place_budget : Chart
+        The same of the end of the path, m.
+    severity : Chart or None
+        Risk, %, against the change of velocity, km/h; None where no model answered.
+    conventions : Picture
+        Axes, signs, origin, units and reference point on this vehicle.
+    """
+
+    pdof: Picture
+    path: Picture
+    signals: tuple[UnitSignals, ...]
+    delta_v: tuple[Chart, ...]
+    pdof_by_window: Chart | None
+    pdof_by_time_zero: Chart | None
+    motion: Animation
+    place: Chart
+    velocity: Chart
+    attitude: Chart
+    references: tuple[Chart, ...]
+    units: Chart | None
+    accelerations: Chart | None
+    delta_v_budget: Chart | None
+    place_budget: Chart
+    severity: Chart | None
+    conventions: Picture
+
+    @property
+    def charts(self) -> tuple[Chart, ...]:
+        """All charts in the order of the report; each has a slug of its own."""
+        found = [
+            *self.delta_v,
+            self.pdof_by_window,
+            self.pdof_by_time_zero,
+            self.place,
+            self.velocity,
+            self.attitude,
+            *self.references,
+            self.units,
+            self.accelerations,
+            self.delta_v_budget,
+            self.place_budget,
+            self.severity,
+        ]
+        for unit in self.signals:
+            found += [unit.crash, unit.rates, unit.overview]
+        return tuple(chart for chart in found if chart is not None)
+
+    @property
+    def pictures(self) -> tuple[Picture, ...]:
+        """All pictures, those of the animation on paper with them."""
+        return (self.pdof, self.path, self.motion.stills, self.conventions)
+
+
+def crash_figures(result: CaseResult) -> CrashFigures:
+    """Draw everything that the report of a case shows.
+
+    Parameters
+    ----------
+    result : CaseResult
+
+    Returns
+    -------
+    CrashFigures
+        The same for the same result, to the last byte.
+    """
+    found, spec = result.reconstruction, result.spec
+    main, events = found.main, found.main.events.events
+    path, which = main.path, main_event(main)
+    names = _axis_names(result)
+    outline, point = vehicle_outline(spec.vehicle), found.point
+    gravity = spec.options.gravity_m_per_s2
+    paths = [r for r in result.references if r.path is not None]
+    first = paths[0] if paths else None
+    reference = None if first is None else reference_in_path_axes(path, first)
+    shown = "reference" if first is None else first.spec.name
+    several = len(found.units) > 1
+    stated = _stated(result, main)
+    charts = [
+        delta_v_chart(
+            found.units,
+            found.combined,
+            k,
+            gravity=gravity,
+            stated=[s for s in stated if _belongs(main, k, s.time)],
+        )
+        for k in range(len(events))
+    ]
+    by_name = {unit.name: unit for unit in result.units}
+    return CrashFigures(
+        pdof=pdof_dial(outline, _directions(main, which), point=point, point_name=spec.point.name),
+        path=path_plan(
+            path,
+            outline,
+            events=events,
+            point=point,
+            names=names,
+            reference=reference,
+            reference_name=shown,
+        ),
+        signals=tuple(
+            unit_signals(by_name[u.name], found.synchronised.unit(u.name), u, k, events)
+            for k, u in enumerate(found.units)
+        ),
+        delta_v=tuple(chart for chart in charts if chart is not None),
+        pdof_by_window=None
+        if which is None
+        else pdof_by_window_chart(found.units, found.combined, which),
+        pdof_by_time_zero=None
+        if which is None
+        else pdof_by_shift_chart(found.units, found.combined, which),
+        motion=path_animation(
+            path,
+            outline,
+            events=events,
+            point=point,
+            names=names,
+            reference=reference,
+            reference_name=shown,
+        ),
+        place=place_chart(
+            path,
+            names,
+            samples=result.samples,
+            events=events,
+            reference=reference,
+            reference_name=shown,
+        ),
+        velocity=velocity_chart(path, names, samples=result.samples, events=events),
+        attitude=attitude_chart(path, samples=result.samples, events=events),
+        references=tuple(
+            reference_chart(r.path, r.spec.name, names, k)
+            for k, r in enumerate(paths, start=1)
+            if r.path is not None
+        ),
+        units=None
+        if found.comparison is None
+        else differences_chart(found.comparison, [u.name for u in found.units]),
+        accelerations=accelerations_chart(found.units, found.combined, events) if several else None,
+        delta_v_budget=None if which is None else delta_v_budget_chart(main.body[which].event),
+        place_budget=place_budget_chart(path, names),
+        severity=_severity(result, which),
+        conventions=conventions_picture(
+            outline,
+            [MountingPoint(u.name, u.mounting.position, k) for k, u in enumerate(result.units)],
+            point=point,
+            point_name=spec.point.name,
+        ),
+    )
+
+
+def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataFrame:
+    """Places of a reference path, moved so that it agrees with the reconstructed at the entry.
+
+    Parameters
+    ----------
+    path : CrashPath
+        That it was compared with.
+    answer : ReferenceAnswer
+        Of a path.
+
+    Returns
+    -------
+    DataFrame
+        ``north east down``, m, indexed by time, s: what the comparison of both has compared.
+    """
+    assert answer.path is not None
+    from scipy.interpolate import CubicHermiteSpline
+
+    errors = answer.path.errors
+    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
+    at = errors.index.to_numpy(dtype=np.float64)
+    return pd.DataFrame(own(at) - errors[NED].to_numpy(), index=errors.index, columns=NED)
+
+
+def _axis_names(result: CaseResult) -> tuple[str, str]:
+    """North and east where a heading was stated or found; else forward and right at the entry."""
+    heading = result.reconstruction.main.path.entry.heading_deg
+    if result.spec.entry.kind == "gnss" or heading:
+        return "north", "east"
+    return "forward", "right"
+
+
+def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:
+    return [
+        Direction(
+            f"event {k + 1}",
+            kind.direction.horizontal_deg,
+            changes.event.interval.horizontal,
+            kind.direction.clock,
+            changes.event.resultant,
+            k == which,
+        )
+        for k, (changes, kind) in enumerate(zip(main.body, main.types, strict=True))
+    ]
+
+
+def _stated(result: CaseResult, main: UnitReconstruction) -> list[StatedDeltaV]:
+    """Changes of velocity that others state, at the end of the main event if not told when."""
+    which = main_event(main)
+    found = []
+    for answer in result.references:
+        spec = answer.spec
+        if spec.kind != "delta_v" or spec.delta_v_m_per_s is None or which is None:
+            continue
+        event = main.events.events[which]
+        at = event.end if spec.at_s is None else spec.at_s
+        sd = spec.delta_v_sd_m_per_s
+        found.append(StatedDeltaV(at, spec.delta_v_m_per_s, sd, spec.name, spec.axis))
+    return found
+
+
+def _belongs(main: UnitReconstruction, event: int, at: float) -> bool:
+    """Whether an instant is told from the time zero of this event."""
+    zeros = [e.time_zero for e in main.events.events]
+    return event == max((k for k, zero in enumerate(zeros) if zero <= at), default=0)
+
+
+def _severity(result: CaseResult, which: int | None) -> Chart | None:
+    risks = [answer.risk for answer in result.severity if answer.risk is not None]
+    if which is None or not risks:
+        return None
+    main = result.reconstruction.main
+    change = main.body[which].event
+    inputs: dict[str, float | str] = {"crash_type": main.types[which].name}
+    return risk_chart(
+        risks,
+        change.resultant,
+        change.resultant_bound / TWO_SIDED_95,
+        inputs | dict(result.spec.options.severity_inputs),
+    )
