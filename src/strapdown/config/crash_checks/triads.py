@@ -64,9 +64,7 @@ def _channels(
             raise written.contradiction(
                 path,
                 before,
-                f"one channel of {triad.name or 'a record'} is along one axis"
-                if before[:-1] == path[:-1]
-                else "one channel of a record is one axis of one triad",
+                "a channel lies along one axis of one triad",
                 'name the other channel; a gyro is lent to another unit by gyro_from = "…"'
                 if gyro
                 else "name the channel that was recorded along this axis",
