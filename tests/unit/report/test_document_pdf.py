@@ -103,6 +103,21 @@ def test_nothing_in_a_block_is_no_reason_to_fail(tmp_path):
         write_pdf(short(TableBlock(("a",), (("1", "2"),), caption="units")), tmp_path / "a.pdf")
 
 
+def test_a_picture_higher_than_a_page_is_made_to_fit(tmp_path):
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="100" height="{}"/>'
+    sizes = []
+    for height in (100, 400):
+        write_pdf(short(Picture("p", svg.format(height), "p", alt="alt")), tmp_path / "a.pdf")
+        inside = streams((tmp_path / "a.pdf").read_bytes())
+        box = re.search(rb"BBox ?\[([^]]*)\]", inside)
+        left, bottom, right, top = map(float, box.group(1).split())
+        sizes.append((right - left, top - bottom))
+    point = 25.4 / 72.0  # mm
+    # As wide as the column, 170 mm; not 680 mm high, but 215 mm. The file has seven digits.
+    assert sizes[0] == pytest.approx((170.0 / point, 170.0 / point), abs=1e-3)
+    assert sizes[1] == pytest.approx((215.0 / 4 / point, 215.0 / point), abs=1e-3)
+
+
 def test_the_bytes_depend_on_nothing_around(tmp_path):
     """Folder, time zone, language, home, mask, date of the build: none is in the file."""
     code = (
