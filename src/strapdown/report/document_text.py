@@ -58,8 +58,8 @@ def plain_document(document: Document) -> Document:
     Document
         By `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
         1000, titles and what stands under a key figure to 300, its value to 40, other words to
-        160; slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF do this themselves; whoever writes charts to files beside them
-        does it first. A second pass does nothing.
+        160; slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF do this themselves;
+        whoever writes charts to files beside them does it first. A second pass does nothing.
     """
     return _plain(document, _LABEL)
 
