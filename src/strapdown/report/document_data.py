@@ -82,6 +82,8 @@ def document_data(
     ------
     DataError
         If a picture is no XML.
+    ValueError
+        If a row of a table has not as many cells as there are columns.
     """
     plain = plain_document(document)
     writer = _Writer(iter(stills), place, alive)
@@ -133,6 +135,10 @@ class _Writer:
         return self._key_figures(block)
 
     def _table(self, table: TableBlock) -> dict[str, Any]:
+        if any(len(row) != len(table.columns) for row in table.rows):
+            raise ValueError(
+                f"a row of the table {table.caption!r} has not as many cells as columns"
+            )
         return {
             "kind": "table",
             "title": "",
@@ -195,7 +201,10 @@ class _Writer:
             "still_caption": animation.stills.caption,
         }
         if self._alive:
-            data["figure"] = dict(animation.figure)
+            from strapdown.report.plotly_chart import LOOK
+
+            layout = LOOK | dict(animation.figure["layout"])
+            data["figure"] = dict(animation.figure) | {"layout": layout}
             data["interval_ms"] = int(animation.figure.get("interval_ms", _INTERVAL_MS))
         return data
 

@@ -25,14 +25,14 @@ __all__ = ["plain_document"]
 
 # Characters, by what holds them: there is less room in a heading, a cell or a chart than in a
 # paragraph.
-_TITLE, _LABEL, _WORDS = 300, 160, 4000
+_TITLE, _LABEL, _CELL, _WORDS = 300, 160, 1000, 4000
 _LIMITS: dict[type, dict[str, int]] = {
     Chart: {"caption": _WORDS, "title": _TITLE},
-    TableBlock: {"caption": _WORDS},
-    KeyFigure: {"value": 40},
-    Document: {"facts": 800, "subtitle": _TITLE, "title": _TITLE},
+    TableBlock: {"caption": _WORDS, "rows": _CELL},
+    KeyFigure: {"value": 40, "bound": _TITLE, "note": _TITLE},
+    Document: {"facts": _CELL, "subtitle": _TITLE, "title": _TITLE},
     Section: {"title": _TITLE},
-    Facts: {"rows": 800},
+    Facts: {"rows": _CELL},
     Items: {"rows": _WORDS},
     Paragraph: {"text": _WORDS},
     Picture: {"caption": _WORDS, "alt": _WORDS, "title": _TITLE},
@@ -56,10 +56,10 @@ def plain_document(document: Document) -> Document:
     Returns
     -------
     Document
-        By `plain_text`: paragraphs and captions to 4000 characters, facts to 800, titles to 300,
-        the value of a key figure to 40, other words to 160; slugs to 80 letters, digits, ``_`` and
-        ``-``. The page and the PDF do this themselves; whoever writes charts to files beside them
-        does it first. A second pass does nothing.
+        By `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
+        1000, titles and what stands under a key figure to 300, its value to 40, other words to
+        160; slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF do this themselves;
+        whoever writes charts to files beside them does it first. A second pass does nothing.
     """
     return _plain(document, _LABEL)
 

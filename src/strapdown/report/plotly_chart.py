@@ -14,6 +14,7 @@ from strapdown.report.plotly_numbers import numbers
 
 _GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
 FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
+LOOK = {"font": FONT, "paper_bgcolor": "#ffffff", "plot_bgcolor": "#ffffff"}
 _ROW = 30  # pixels a category
 _UNDER_PLANE = 58  # pixels
 _SPACE = {False: 0.06, True: 0.09}  # between panels, above or beside each other
@@ -35,9 +36,7 @@ def figure(chart: Chart) -> dict[str, Any]:
     # Planes, which come first, have a horizontal axis of their own; the others share one.
     planes = sum(bool(panel.x_label) for panel in chart.panels)
     layout: dict[str, Any] = {
-        "font": FONT,
-        "paper_bgcolor": "#ffffff",
-        "plot_bgcolor": "#ffffff",
+        **LOOK,
         "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
         "height": _height(chart),
         "hovermode": "closest" if chart.log_x or planes else "x unified",

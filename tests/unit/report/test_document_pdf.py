@@ -15,8 +15,17 @@ import pytest
 
 import strapdown
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.report.document import Document, Paragraph, Picture
+from strapdown.report.document import (
+    Document,
+    Facts,
+    Items,
+    KeyFigures,
+    Paragraph,
+    Picture,
+    TableBlock,
+)
 from strapdown.report.document_data import draw_stills
+from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.pdf_letters import shown
 
@@ -66,7 +75,7 @@ def test_its_text_can_be_searched_and_copied(tmp_path):
     write_pdf(short(Paragraph(f"sha256 {word}"), Paragraph('#eval("1") $x$ ±')), tmp_path / "a.pdf")
     command = ["pdftotext", str(tmp_path / "a.pdf"), "-"]
     text = subprocess.run(command, capture_output=True, check=True, encoding="utf-8").stdout
-    for words in ("Title", "name", "text", f"sha256 {word}", '#eval("1") $x$ ±', "1 of 2"):
+    for words in ("Title", "name", "text", f"sha256 {word}", '#eval("1") $x$ ±', "1 of 1"):
         assert words in text
 
 
@@ -76,6 +85,37 @@ def test_no_date_and_no_one_to_run(evil_pdf):
         assert word not in inside
     assert b"/Launch" not in inside
     assert b"/URI" not in inside
+
+
+def test_nothing_in_a_block_is_no_reason_to_fail(tmp_path):
+    empty = (
+        Paragraph(""),
+        Items(()),
+        Facts(()),
+        TableBlock((), ()),
+        TableBlock(("a",), ()),
+        KeyFigures(()),
+    )
+    for document in (Document("", "", (), (), ()), short(*empty)):
+        write_pdf(document, tmp_path / "a.pdf")
+        assert "<h1>" in document_page(document)
+    with pytest.raises(ValueError, match="'units' has not as many cells"):
+        write_pdf(short(TableBlock(("a",), (("1", "2"),), caption="units")), tmp_path / "a.pdf")
+
+
+def test_a_picture_higher_than_a_page_is_made_to_fit(tmp_path):
+    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="100" height="{}"/>'
+    sizes = []
+    for height in (100, 400):
+        write_pdf(short(Picture("p", svg.format(height), "p", alt="alt")), tmp_path / "a.pdf")
+        inside = streams((tmp_path / "a.pdf").read_bytes())
+        box = re.search(rb"BBox ?\[([^]]*)\]", inside)
+        left, bottom, right, top = map(float, box.group(1).split())
+        sizes.append((right - left, top - bottom))
+    point = 25.4 / 72.0  # mm
+    # As wide as the column, 170 mm; not 680 mm high, but 215 mm. The file has seven digits.
+    assert sizes[0] == pytest.approx((170.0 / point, 170.0 / point), abs=1e-3)
+    assert sizes[1] == pytest.approx((215.0 / 4 / point, 215.0 / point), abs=1e-3)
 
 
 def test_the_bytes_depend_on_nothing_around(tmp_path):
