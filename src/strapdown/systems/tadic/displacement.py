@@ -118,7 +118,8 @@ def budget_table(made: Experiments) -> Table:
         cells: list[float | None] = []
         for part in (labs, imus):
             have = name in part.index
-            cells += [1e3 * float(np.sqrt(part.at[name, a])) if have else None for a in NED]
+            own = part.loc[name].to_numpy(dtype=np.float64) if have else None
+            cells += [None] * 3 if own is None else (1e3 * np.sqrt(own)).tolist()
         rows.append((str(name), tuple(cells)))
     sums = [1e3 * float(np.sqrt(v)) for part in (labs, imus) for v in part.sum().tolist()]
     rows.append(("all", tuple(sums)))
