@@ -29,8 +29,8 @@ from strapdown.tables import NED
 
 Array = NDArray[np.float64]
 
-#: An error is of decimetres as long as it is nearer to 0.1 m than to 1 m, on a scale of powers.
-DECIMETRES = float(np.sqrt(0.1))  # m
+#: An error is of decimetres as long as it is not half a metre.
+DECIMETRES = 0.5  # m
 AXES = ("longitudinal", "lateral", "vertical")
 LABS, IMUS = ("LAB1", "LAB2"), ("IMU1", "IMU2")
 SCALE_SD = 2.0  # %, of the MEMS triads of the experiment
@@ -203,8 +203,7 @@ def decimetre_from(
         verdict,
         condition,
         "RMS over all experiments of the worst axis of each platform, against the cameras; "
-        f"decimetres end at {amount(limit, 'm')}, nearer to 1 m than to 0.1 m on a scale of "
-        "powers. What scale factors of ±10 % (one sigma 5.8 %) make follows from the budget. The "
+        f"decimetres end at {amount(limit, 'm')}. What scale factors of ±10 % (one sigma 5.8 %) make follows from the budget. The "
         "ringing is felt by perfect sensors at 200 Hz.",
         (
             *(Evidence(f"{n}, worst axis", v, "m") for n, v in worst.items()),

@@ -64,8 +64,8 @@ def table(found: dict[str, dict[str, float]], sensors: dict[str, float]) -> Tabl
         "What the paper leaves out",
         "Largest error of the place in m with perfect sensors: in 750 ms of the crash, measured; "
         "in 10 and 60 s of driving at 20 m/s to the north-east, predicted. Below 10 µm a dash. "
-        "Last, the paper's sensors: in the crash the RMS of all platforms and experiments, later what "
-        "biases of 0.2 m/s² and 0.3°/s make.",
+        "Last, the paper's sensors: in the crash the RMS of all platforms and experiments, later "
+        "what biases of 0.2 m/s² and 0.3°/s make.",
         ("left out", "750 ms of the crash, m", "10 s, m", "60 s, m"),
         tuple(rows),
     )

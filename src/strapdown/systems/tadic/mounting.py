@@ -138,7 +138,8 @@ class Candidates:
 
     def most(self, group: str, window: int) -> float:
         """Largest turn of a group over a window, deg."""
-        return max(t.most(window, self.base) for t in getattr(self, group))
+        of: tuple[Turned, ...] = getattr(self, group)
+        return max(t.most(window, self.base) for t in of)
 
 
 def candidates() -> Candidates:
