@@ -139,9 +139,9 @@ def table(made: Experiment) -> Table:
         "Degrees; where the force came from, 0 the front, positive from the right and from above, "
         "with the 95 % bounds of each. The paper gives no convention of signs and no window other "
         "than the moment of detection and 30 ms; its REF and LCEDR are LAB and IMU here. First "
-        "sign: the 30 ms up to where the speed has changed by 0.8 km/h within 20 ms; detection: those up "
-        "to where it has changed by 8 km/h. Body: along the turning "
-        "axes of the vehicle; over ground: north-east-down, from the heading at the impact. The "
+        "sign: the 30 ms up to where the speed has changed by 0.8 km/h within 20 ms; detection: "
+        "those up to where it has changed by 8 km/h. Body: along the turning axes of the vehicle; "
+        "over ground: north-east-down, from the heading at the impact. The "
         "truth is that of the simulated crash, which is not the paper's.",
         (
             *("platform, window", "paper, horizontal", "paper, vertical"),

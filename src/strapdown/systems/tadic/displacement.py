@@ -29,8 +29,8 @@ from strapdown.tables import NED
 
 Array = NDArray[np.float64]
 
-#: An error is of decimetres as long as it is nearer to 0.1 m than to 1 m, on a scale of powers.
-DECIMETRES = float(np.sqrt(0.1))  # m
+#: An error is of decimetres as long as it is not half a metre.
+DECIMETRES = 0.5  # m
 AXES = ("longitudinal", "lateral", "vertical")
 LABS, IMUS = ("LAB1", "LAB2"), ("IMU1", "IMU2")
 SCALE_SD = 2.0  # %, of the MEMS triads of the experiment
@@ -118,7 +118,8 @@ def budget_table(made: Experiments) -> Table:
         cells: list[float | None] = []
         for part in (labs, imus):
             have = name in part.index
-            cells += [1e3 * float(np.sqrt(part.at[name, a])) if have else None for a in NED]
+            own = part.loc[name].to_numpy(dtype=np.float64) if have else None
+            cells += [None] * 3 if own is None else (1e3 * np.sqrt(own)).tolist()
         rows.append((str(name), tuple(cells)))
     sums = [1e3 * float(np.sqrt(v)) for part in (labs, imus) for v in part.sum().tolist()]
     rows.append(("all", tuple(sums)))
@@ -202,8 +203,7 @@ def decimetre_from(
         verdict,
         condition,
         "RMS over all experiments of the worst axis of each platform, against the cameras; "
-        f"decimetres end at {amount(limit, 'm')}, nearer to 1 m than to 0.1 m on a scale of "
-        "powers. What scale factors of ±10 % (one sigma 5.8 %) make follows from the budget. The "
+        f"decimetres end at {amount(limit, 'm')}. What scale factors of ±10 % (one sigma 5.8 %) make follows from the budget. The "
         "ringing is felt by perfect sensors at 200 Hz.",
         (
             *(Evidence(f"{n}, worst axis", v, "m") for n, v in worst.items()),

@@ -35,7 +35,7 @@ RECORDED = 0.85  # s
 # Chosen: how well the laboratory knows its entry speed of 7.1 m/s.
 SPEED_SD = 0.05  # m/s
 #: Experiments that are made: with the first the figures are drawn.
-RUNS = 8
+RUNS = 6
 MARKER = "reference point"
 # Places below the seed of an experiment.
 _SPEED, _RECORDERS, _CAMERAS = range(3)

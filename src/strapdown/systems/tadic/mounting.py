@@ -70,14 +70,15 @@ def felt(
     *,
     phase: float = 0.0,
     rate: float = RATE,
+    direction: Triple = (0.0, 1.0, 0.0),
     crash: CrashScenario | None = None,
 ) -> Acceleration:
-    """What perfect sensors on a mounting say, the rest taken off, with a lateral ringing.
+    """What perfect sensors on a mounting say, the rest taken off, with a ringing.
 
     The ringing begins with the impact, and the samples `phase` of their interval later.
     """
     scenario = crash or CRASHES["pole"]
-    rings = () if ringing is None else (Ringing(scenario.start, *ringing, (0.0, 1.0, 0.0)),)
+    rings = () if ringing is None else (Ringing(scenario.start, *ringing, direction),)
     unit = MountedMotion(scenario.motion, mounting, rings)
     time = np.arange(round((SPAN[1] - SPAN[0]) * rate) + 1) / rate + SPAN[0] + phase / rate
     force = unit.specific_force(time + scenario.start)
@@ -137,7 +138,8 @@ class Candidates:
 
     def most(self, group: str, window: int) -> float:
         """Largest turn of a group over a window, deg."""
-        return max(t.most(window, self.base) for t in getattr(self, group))
+        of: tuple[Turned, ...] = getattr(self, group)
+        return max(t.most(window, self.base) for t in of)
 
 
 def candidates() -> Candidates:
