@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from strapdown import __version__
 from strapdown.report import crash_tables as tables
+from strapdown.report.chart import Chart
 from strapdown.report.crash_assumptions import CONVENTIONS, assumptions, how_to_verify, method
 from strapdown.report.crash_figures import CrashFigures
 from strapdown.report.crash_limits import limitations
@@ -50,14 +51,29 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
     ]
     sections = (
         Section("case", "The case", _case(result)),
-        Section("signals", "Signals", _blocks(*figures.signals)),
-        Section("delta-v", "Delta-V", _blocks(tables.answers_table(result), *figures.delta_v)),
+        Section("signals", "Signals", _signals(result, figures)),
+        Section(
+            "delta-v",
+            "Delta-V",
+            _blocks(tables.answers_table(result), *_charts(*figures.delta_v)),
+        ),
         Section(
             "direction",
             "Direction of force",
-            _blocks(tables.direction_table(result), *figures.direction),
+            _blocks(
+                tables.direction_table(result),
+                *_charts(figures.pdof_by_window, figures.pdof_by_time_zero),
+            ),
         ),
-        Section("path", "Path", _blocks(*figures.path, tables.path_table(result))),
+        Section(
+            "path",
+            "Path",
+            _blocks(
+                figures.motion,
+                tables.path_table(result),
+                *_charts(figures.place, figures.velocity, figures.attitude),
+            ),
+        ),
         Section("agreement", "Sensors against each other", _agreement(result, figures)),
         Section(
             "budget",
@@ -67,7 +83,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
                     "What makes the bounds: every unknown was carried through the whole "
                     "computation, and those of one kind are added up here."
                 ),
-                *figures.budget,
+                *_charts(figures.delta_v_budget, figures.place_budget),
                 tables.budget_table(result),
             ),
         ),
@@ -85,7 +101,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         Section(
             "sensors", "Sensors", _blocks(tables.units_table(result), tables.sensors_table(result))
         ),
-        Section("conventions", "Conventions", _blocks(*figures.conventions, Facts(CONVENTIONS))),
+        Section("conventions", "Conventions", _blocks(figures.conventions, Facts(CONVENTIONS))),
         Section("limitations", "Limitations", _limitations(result)),
         Section("findings", "Notes on the records", _findings(result)),
         Section("verify", "How to verify", _verify(result, name)),
@@ -95,7 +111,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         subtitle="Crash reconstruction from inertial records",
         facts=tuple((head, text) for head, text in facts if text),
         front=(
-            KeyFigures(key_figures(result), tuple(figures.front)),
+            KeyFigures(key_figures(result), (figures.pdof, figures.path)),
             Paragraph(lead(result), "lead"),
             *((Paragraph(f"Mind: {_worst(result)}", "warning"),) if _worst(result) else ()),
         ),
@@ -106,6 +122,16 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
 
 def _blocks(*found: Block | None) -> tuple[Block, ...]:
     return tuple(block for block in found if block is not None)
+
+
+def _charts(*found: Chart | None) -> tuple[ChartBlock, ...]:
+    return tuple(ChartBlock(chart) for chart in found if chart is not None)
+
+
+def _signals(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
+    return _charts(
+        *(c for unit in figures.signals for c in (unit.crash, unit.rates, unit.overview))
+    )
 
 
 def _place(position: tuple[float, float, float]) -> str:
@@ -158,7 +184,11 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
     words = tuple(
         (f"{f.file or ''} {f.quantity or ''}".strip(), f.what) for f in comparison.findings
     )
-    return _blocks(table, *figures.agreement, Items(words) if words else None)
+    return _blocks(
+        table,
+        *_charts(figures.units, figures.accelerations),
+        Items(words) if words else None,
+    )
 
 
 def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
@@ -166,7 +196,7 @@ def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
     if table is None:
         return (Paragraph("Without an event there is no severity to tell."),)
     notes = dict.fromkeys(a.model.note for a in result.severity if a.model.note)
-    return _blocks(table, *figures.severity, *(Paragraph(note, "note") for note in notes))
+    return _blocks(table, *_charts(figures.severity), *(Paragraph(note, "note") for note in notes))
 
 
 def _references(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
@@ -174,7 +204,7 @@ def _references(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
     if table is None:
         return (Paragraph("No reference was given."),)
     sources = tuple((r.name, r.source) for r in result.spec.references if r.source)
-    return _blocks(table, *figures.references, Facts(sources) if sources else None)
+    return _blocks(table, *_charts(*figures.references), Facts(sources) if sources else None)
 
 
 def _limitations(result: CaseResult) -> tuple[Block, ...]:

@@ -30,7 +30,8 @@ from strapdown.report.crash_risk import risk_chart
 from strapdown.report.crash_signals import UnitSignals, unit_signals
 from strapdown.report.crash_units import accelerations_chart, differences_chart
 from strapdown.report.document import Animation, Picture
-from strapdown.systems.crash_case import CaseResult, ReferenceAnswer
+from strapdown.systems.case_references import ReferenceAnswer
+from strapdown.systems.crash_case import CaseResult
 from strapdown.tables import NED
 
 __all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]
@@ -141,7 +142,7 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     names = _axis_names(result)
     outline, point = vehicle_outline(spec.vehicle), found.point
     gravity = spec.options.gravity_m_per_s2
-    paths = [r for r in result.references if r.path is not None]
+    paths = [r for r in result.references if r.path is not None and r.unit == main.name]
     first = paths[0] if paths else None
     reference = None if first is None else reference_in_path_axes(path, first)
     shown = "reference" if first is None else first.spec.name
@@ -272,10 +273,9 @@ def _stated(result: CaseResult, main: UnitReconstruction) -> list[StatedDeltaV]:
     found = []
     for answer in result.references:
         spec = answer.spec
-        if spec.kind != "delta_v" or spec.delta_v_m_per_s is None or which is None:
+        if answer.unit != main.name or spec.delta_v_m_per_s is None or which is None:
             continue
-        event = main.events.events[which]
-        at = event.end if spec.at_s is None else spec.at_s
+        at = answer.span[1]
         sd = spec.delta_v_sd_m_per_s
         found.append(StatedDeltaV(at, spec.delta_v_m_per_s, sd, spec.name, spec.axis))
     return found

@@ -114,7 +114,9 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
             f"it has no {' and no '.join(missing)}; it has {', '.join(map(str, table.columns))}",
             file=source,
             quantity=missing[0],
-            remedy="give all three axes, leave this part out, or state what is taken of the "
+            remedy="give all three axes, or leave this part out"
+            if len(missing) == 3
+            else "give all three axes, leave this part out, or state what is taken of the "
             f"missing one, CrashUnit(assumed=Assumed({_ASSUMED[columns[0]]}=...))",
         )
     sampling = table.attrs.get("sampling")

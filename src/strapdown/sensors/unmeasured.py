@@ -150,7 +150,7 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
             Finding(
                 f"it has no {' and no '.join(names)}: it is taken that the vehicle changed its "
                 f"velocity by 0 ± {_said(assumed.sd_of('delta_v_sd'), kept, AXES)} m/s (1 sd) "
-                f"{_listed(kept)} {over}, and that gravity's part stayed that at rest{why}",
+                f"along {_listed(kept)} {over}, and that gravity's part stayed that at rest{why}",
                 file=unit.name,
                 quantity=names[0],
                 remedy="a change of velocity that was not recorded is in no resultant and in no "

@@ -104,29 +104,32 @@ def path_of(unit):
     return at, path
 
 
-ASSUMED = Assumed(turn_sd_deg=4.0, delta_v_sd=0.8, over=OVER)
+TURN_SD = (4.0, 4.0, 4.0)
+ASSUMED = Assumed(turn_sd_deg=TURN_SD, delta_v_sd=0.8, over=OVER)
 
 
-def drawn_motion(count, seed, *, turn=ASSUMED.turn_sd_deg, slide=ASSUMED.delta_v_sd[1], walk=False):
+def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     """Vehicles whose turning and sideways velocity are drawn from what is assumed.
 
-    With `walk`, the turn is a random walk over `OVER` instead of the two shapes.
+    With `spun`, each turns as an eccentric impact makes it: at a rate that grows with the velocity
+    that is lost, and stays to the end of `OVER`; the turn by then is as assumed.
     """
     rng = np.random.default_rng(seed)
     turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 2))
     slides = slide * rng.normal(size=(count, 2))
-    steps = 30
-    walks = np.radians(turn)[:, None] * rng.normal(size=(count, 3, steps)) / np.sqrt(steps)
 
     def shapes(time):
         return assumed_shapes(time, OVER, "instantaneous")
 
+    def spinning(time):
+        u = np.clip((time - OVER[0]) / PULSE, 0.0, 1.0)
+        lost = (u - np.sin(2.0 * np.pi * u) / (2.0 * np.pi)) * (time < OVER[1])
+        # Half of the pulse, and what follows it.
+        return lost / (OVER[1] - OVER[0] - 0.5 * PULSE)
+
     def rates(time):
-        if not walk:
-            return np.einsum("kas,sm->kma", turns, shapes(time))
-        number = np.floor((time - OVER[0]) / (OVER[1] - OVER[0]) * steps).astype(int)
-        within = (number >= 0) & (number < steps)
-        rate = walks[:, :, np.clip(number, 0, steps - 1)] * within * steps / (OVER[1] - OVER[0])
-        return rate.transpose(0, 2, 1)
+        if spun:
+            return turns[:, None, :, 0] * spinning(time)[:, None]
+        return np.einsum("kas,sm->kma", turns, shapes(time))
 
     return move(rates, lambda time: slides @ shapes(time))

@@ -191,7 +191,7 @@ class TestWords:
         assert "rolled over cannot be told" in turn.remedy
         assert axis.what == (
             "it has no accel_y: it is taken that the vehicle changed its velocity by 0 ± 1.5 m/s "
-            "(1 sd) right between 0 and 0.15 s, and that gravity's part stayed that at rest, "
+            "(1 sd) along right between 0 and 0.15 s, and that gravity's part stayed that at rest, "
             "because both marks agree"
         )
         assert (turn.file, turn.quantity, axis.quantity) == ("EDR", "gyro", "accel_y")
