@@ -39,6 +39,8 @@ FULL_SCALES = (
 ROUND = 0.003
 # Four fifths of the power of a crash are within so long.
 PULSE = (0.008, 0.8)  # s
+# A pulse stands so far above the noise.
+LEAST_PULSE = 8.0
 # Of a reading: where a low range stands at its end, the two have nothing to agree on.
 NEAR_END = 0.98
 
@@ -142,9 +144,9 @@ def accel_unit(values: Array, step: float, quiet: Quiet) -> Answer:
 
 
 def _round_end(values: Array, unit: str) -> float | None:
-    """Full scale in g, where values stand at an end that is round in this unit and no power of two."""
+    """Full scale in g, where values end at a number that is round in g and no power of two."""
     limits = find_limits(
-        np.arange(len(values)) * 1e-3, values, np.full(3, np.inf), np.zeros(3)
+        np.arange(len(values), dtype=np.float64) * 1e-3, values, np.full(3, np.inf), np.zeros(3)
     )
     ends = [abs(e) for e in (*limits.lower, *limits.upper) if np.isfinite(e)]
     if not ends:
@@ -156,6 +158,33 @@ def _round_end(values: Array, unit: str) -> float | None:
     if abs(in_g / near - 1.0) > ROUND or abs(end / power - 1.0) <= ROUND:
         return None
     return near
+
+
+def pulse_samples(values: Array) -> int:
+    """How many samples hold the middle four fifths of the power of the shortest pulse.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+        In any units; what grows evenly, as a clock does, and what feels nothing is not counted. A
+        gyro that turns long after the blow does not make it longer.
+
+    Returns
+    -------
+    int
+        0 where there is no pulse.
+    """
+    lengths = []
+    for column in values.T:
+        free = np.abs(column - np.median(column))
+        noise = max(float(np.median(free)), float(np.sort(free)[int(0.7 * free.size)]))
+        if np.ptp(np.diff(column)) == 0.0 or not free.max() > LEAST_PULSE * noise:
+            continue
+        # Without the noise, which a long record has more of than the pulse has power.
+        power = np.cumsum(np.where(free > 3.0 * noise, free, 0.0) ** 2)
+        edges = np.searchsorted(power, np.array([0.1, 0.9]) * power[-1])
+        lengths.append(int(edges[1] - edges[0]))
+    return min(lengths, default=0)
 
 
 def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
@@ -173,10 +202,7 @@ def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
     (unit, why) or None
         None where more than one unit, or none, makes a crash of it.
     """
-    free = values - np.median(values, axis=0)
-    power = np.cumsum((free**2).sum(axis=1))
-    edges = np.searchsorted(power, np.array([0.1, 0.9]) * power[-1])
-    samples = int(edges[1] - edges[0])
+    samples = pulse_samples(values)
     if samples < 3:
         return None
     lasts = {u: samples * f * clock.step for u, f in TIME_UNITS.items()}
@@ -233,9 +259,7 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     return Answer(unit, found[unit], told, tuple(found.items()))
 
 
-def same_quantity(
-    known: Array, other: Array
-) -> tuple[str, float, float] | None:
+def same_quantity(known: Array, other: Array) -> tuple[str, float, float] | None:
     """Unit of a triad by one that felt the same and is known.
 
     Parameters
