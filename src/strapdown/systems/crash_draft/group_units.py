@@ -132,7 +132,8 @@ def _one_recorder(group: Sequence[Part], part: Part) -> str:
             continue
         low, high = sorted((other, part), key=_reach)
         apart = abs(_instant(low, _reach(low)) - _instant(high, _reach(low)))
-        if apart > max(SAME_INSTANT, STEPS * max(other.step, part.step)):
+        one_file = other.path == part.path
+        if not one_file and apart > max(SAME_INSTANT, STEPS * max(other.step, part.step)):
             continue
         ends = range_ends(low)
         reached = float(np.nanmax(np.abs(high.values)))
@@ -183,10 +184,10 @@ def _overlap(a: Part, b: Part) -> bool:
 
 
 def _instant(part: Part, reach: float) -> float:
-    """When it felt most, on its clock, within a range."""
-    size = (np.clip(part.free, -reach, reach) ** 2).sum(axis=1)
-    # The middle of what is near the largest: an end of the range is reached for a while.
-    return float(np.average(part.time, weights=size**2)) if size.any() else 0.0
+    """When it first felt half of what the lower range reaches, on its clock."""
+    size = np.abs(part.free).max(axis=1)
+    over = size > 0.5 * min(reach, float(size.max()))
+    return float(part.time[int(np.argmax(over))])
 
 
 def _owner(

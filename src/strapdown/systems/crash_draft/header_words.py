@@ -191,6 +191,10 @@ def _unit(name: str) -> str:
 def _quantity(words: list[str], joined: str) -> str:
     if any(joined.startswith(v.replace("-", "")) for v in _VELOCITY):
         return "velocity"
+    if words and words[-1] in ("ax", "ay", "az"):
+        return "acceleration"
+    if words and words[-1] in ("wx", "wy", "wz"):
+        return "rate"
     for word in words:
         if any(word.startswith(o) for o in _OTHER):
             return "other"

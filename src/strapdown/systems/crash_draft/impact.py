@@ -90,7 +90,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     base, fine_base = _base(strong, rest), _base(fine, rest)
     free = np.nan_to_num(strong.values - base)
     sitting = sitting_at_rest(fine_base) if len(fine.axes) == 3 else None
-    level = sitting.into_vehicle(free) if sitting else free
+    level = _ahead(sitting.into_vehicle(free) if sitting else free)
     step = float(np.median(np.diff(time)))
     before = time < time[int(np.argmax(np.linalg.norm(free, axis=1)))] - BEFORE
     noise = free[before].std(axis=0) if before.sum() > LEAST_BASE else np.zeros(3)
@@ -125,6 +125,12 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
         sitting,
         max(len(events) - 1, 0),
     )
+
+
+def _ahead(level: Array) -> Array:
+    """With the larger of the two horizontal components first: which is ahead is not known yet."""
+    size = (level[:, :2] ** 2).sum(axis=0)
+    return level if size[0] >= size[1] else np.asarray(level[:, [1, 0, 2]])
 
 
 def _onset(time: Array, size: Array, peak_at: int) -> float:

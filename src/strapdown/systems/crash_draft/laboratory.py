@@ -141,8 +141,8 @@ def _part(
             named=True,
             place=place,
             uncertainty=uncertainty,
-            basis="of a sensor of a crash laboratory, calibrated by SAE J211; its full scale is that "
-            "of the record",
+            basis="of a sensor of a crash laboratory, calibrated by SAE J211; its full scale is "
+            "that of the record",
             notes=tuple(notes),
         ),
         skipped,

@@ -29,7 +29,8 @@ USUAL_NOISE, USUAL_OFFSET, DECADES = math.radians(0.1), math.radians(1.0), 0.7
 USUAL_PEAK, PEAK_DECADES = math.radians(120.0), 0.6
 # Two ranges of one sensor, or two recorders, agree so far.
 LEAST_CORRELATION = 0.8
-SCALE_TOLERANCE = 0.2
+# Of the logarithm: noise flattens the slope, and the next unit is a factor of 9.8 away.
+SCALE_TOLERANCE = 0.35
 # Ends of the ranges of accelerometers, in g, and how exactly they are met.
 FULL_SCALES = (
     *(1.2, 1.5, 1.7, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 18.0, 20.0, 24.0, 25.0, 30.0),
@@ -43,6 +44,8 @@ PULSE = (0.008, 0.8)  # s
 LEAST_PULSE = 8.0
 # Of a reading: where a low range stands at its end, the two have nothing to agree on.
 NEAR_END = 0.98
+# What is below this part of the largest is mostly noise.
+MOVES = 0.15
 
 
 @dataclass(frozen=True)
@@ -231,7 +234,7 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     the rest's offset and noise, and the peak, each as a broad normal distribution of the
     logarithm.
     """
-    crash = slice(max(quiet.count - 1, 0), None)
+    crash = slice(max(quiet.count - 1, 0) if quiet.count < len(values) - LEAST_QUIET else 0, None)
     said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
     prior = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     peak = float(np.abs(values - quiet.mean).max())
@@ -279,33 +282,40 @@ def same_quantity(known: Array, other: Array) -> tuple[str, float, float] | None
     scales = {u: s for u, s in ACCEL_UNITS.items() if s > 0.0}
     unit = min(scales, key=lambda u: abs(math.log(slope / scales[u])))
     ratio = slope / scales[unit]
-    if abs(ratio - 1.0) > SCALE_TOLERANCE:
+    if abs(math.log(ratio)) > SCALE_TOLERANCE:
         return None
     return unit, ratio, correlation
 
 
 def regress(known: Array, other: Array) -> tuple[float, float]:
-    """Scale of `other` to `known` where neither is at its end, and how well they correlate."""
-    ends = NEAR_END * np.nanmax(np.abs(known), axis=0)
-    inside = np.abs(known) < ends
-    x, y = [], []
-    for k in range(known.shape[1]):
-        rows = inside[:, k] & np.isfinite(known[:, k]) & np.isfinite(other[:, k])
-        if rows.sum() < 3:
-            continue
-        x.append(other[rows, k] - np.median(other[rows, k]))
-        y.append(known[rows, k] - np.median(known[rows, k]))
-    if not x:
-        return 0.0, 0.0
-    a, b = np.concatenate(x), np.concatenate(y)
-    power, own = float(a @ a), float(b @ b)
+    """How one triad follows another that may have a shorter range.
+
+    Parameters
+    ----------
+    known, other : ndarray, (n, k)
+        At the same instants.
+
+    Returns
+    -------
+    scale : float
+        Of `other` to `known`, from where `known` moves and is not at its end; 0 where it cannot
+        be told.
+    correlation : float
+        Of all axes together, `other` being cut where `known` ends.
+    """
+    x, y = (v - np.median(v, axis=0) for v in (known, other))
+    largest = np.abs(x).max(axis=0)
+    margin = (1.0 - NEAR_END) * np.ptp(x, axis=0)
+    inside = (x > x.min(axis=0) + margin) & (x < x.max(axis=0) - margin)
+    moves = inside & (np.abs(x) > MOVES * largest.max())
+    x_in, y_in = x[moves], y[moves]
+    power, own = float(y_in @ y_in), float(x_in @ x_in)
     if power <= 0.0 or own <= 0.0:
         return 0.0, 0.0
     # Both are noisy: the slope between the two regressions is not drawn to zero.
-    correlation = float(a @ b) / math.sqrt(power * own)
-    return math.copysign(math.sqrt(own / power), correlation), correlation
-
-
-def gravity_in(unit: str) -> float:
-    """Length of gravity in a unit."""
-    return STANDARD_GRAVITY / ACCEL_UNITS[unit]
+    scale = math.copysign(math.sqrt(own / power), float(x_in @ y_in))
+    cut = np.clip(scale * y, x.min(axis=0), x.max(axis=0))
+    power, own = float((cut * cut).sum()), float((x * x).sum())
+    if power <= 0.0:
+        return 0.0, 0.0
+    return scale, float((cut * x).sum()) / math.sqrt(power * own)
