@@ -33,9 +33,9 @@ def crash(
             show_default=False,
         ),
     ],
-    out: Annotated[
-        Path, typer.Option(metavar="FILE", help="The case file to write.")
-    ] = Path("case.toml"),
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The case file to write.")] = Path(
+        "case.toml"
+    ),
     force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -95,13 +95,13 @@ def group_units(parts: Sequence[Part]) -> tuple[list[Unit], list[Skipped]]:
     gyros: dict[int, Part] = {}
     skipped: list[Skipped] = []
     for gyro in (p for p in parts if p.kind == "rate"):
-        k, told = _owner(gyro, drafts, gyros)
-        if k is None:
+        owner, told = _owner(gyro, drafts, gyros)
+        if owner is None:
             skipped.append(Skipped(gyro.path, _of(gyro), told, tuple(gyro.channels.values())))
             continue
-        gyros[k] = gyro
+        gyros[owner] = gyro
         if told:
-            drafts[k][2].append(told)
+            drafts[owner][2].append(told)
     names = _names([d[0] for d in drafts], [gyros.get(k) for k in range(len(drafts))])
     units = []
     lenders = [names[k] for k in gyros]
@@ -113,9 +113,7 @@ def group_units(parts: Sequence[Part]) -> tuple[list[Unit], list[Skipped]]:
         if own is not None:
             ends[-1] = range_ends(own)
         lender = "" if own is not None or not lenders else lenders[0]
-        units.append(
-            Unit(names[k], tuple(accelerometers), own, lender, impact, ends, tuple(why))
-        )
+        units.append(Unit(names[k], tuple(accelerometers), own, lender, impact, ends, tuple(why)))
     return units, skipped
 
 
@@ -134,7 +132,8 @@ def _one_recorder(group: Sequence[Part], part: Part) -> str:
             continue
         low, high = sorted((other, part), key=_reach)
         apart = abs(_instant(low, _reach(low)) - _instant(high, _reach(low)))
-        if apart > max(SAME_INSTANT, STEPS * max(other.step, part.step)):
+        one_file = other.path == part.path
+        if not one_file and apart > max(SAME_INSTANT, STEPS * max(other.step, part.step)):
             continue
         ends = range_ends(low)
         reached = float(np.nanmax(np.abs(high.values)))
@@ -185,10 +184,10 @@ def _overlap(a: Part, b: Part) -> bool:
 
 
 def _instant(part: Part, reach: float) -> float:
-    """When it felt most, on its clock, within a range."""
-    size = (np.clip(part.free, -reach, reach) ** 2).sum(axis=1)
-    # The middle of what is near the largest: an end of the range is reached for a while.
-    return float(np.average(part.time, weights=size**2)) if size.any() else 0.0
+    """When it first felt half of what the lower range reaches, on its clock."""
+    size = np.abs(part.free).max(axis=1)
+    over = size > 0.5 * min(reach, float(size.max()))
+    return float(part.time[int(np.argmax(over))])
 
 
 def _owner(
@@ -212,7 +211,7 @@ def _owner(
             "belongs to a unit, bring it to the clock of that unit's file"
         )
     stem = _stem(gyro)
-    near.sort(key=lambda k: -len(os.path.commonprefix([stem, _stem(drafts[k][0][0])])))
+    near.sort(key=lambda k: -len(_shared([stem, _stem(drafts[k][0][0])])))
     k = near[0]
     told = (
         f"{_of(gyro)} is its gyro: it is on the same clock, and begins to turn when "
@@ -239,7 +238,7 @@ def _names(groups: Sequence[Sequence[Part]], gyros: Sequence[Part | None]) -> li
     stems = []
     for group, gyro in zip(groups, gyros, strict=True):
         files = dict.fromkeys(PurePath(p.path).stem for p in (*group, *((gyro,) if gyro else ())))
-        common = os.path.commonprefix(list(files)).strip(" _-.")
+        common = _shared(list(files)).strip(" _-.")
         stems.append(common if len(common) >= 2 else next(iter(files)))
     names: list[str] = []
     for k, stem in enumerate(stems):
@@ -253,6 +252,12 @@ def _names(groups: Sequence[Sequence[Part]], gyros: Sequence[Part | None]) -> li
             name, n = f"{base} {n}", n + 1
         names.append(name)
     return names
+
+
+def _shared(names: Sequence[str]) -> str:
+    """With what all names begin."""
+    together = itertools.takewhile(lambda chars: len(set(chars)) == 1, zip(*names, strict=False))
+    return "".join(chars[0] for chars in together)
 
 
 def _stem(part: Part) -> str:

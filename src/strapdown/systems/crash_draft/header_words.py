@@ -13,18 +13,84 @@ __all__ = ["Heading", "read_heading"]
 _TIME = ("zeit", "temps", "tiempo", "tempo", "vrijeme", "vreme", "czas", "stamp", "clock", "time")
 _COUNTER = ("n", "nr", "no", "num", "number", "index", "idx", "sample", "count", "counter", "row")
 _OTHER = (
-    "temp tmp batt volt spannung druck press humid feucht mag magn kompass compass lat lon alt "
-    "satell status flag valid quality speed geschw vitesse brems brake throttle engine rpm"
-).split()
+    "temp",
+    "tmp",
+    "batt",
+    "volt",
+    "spannung",
+    "druck",
+    "press",
+    "humid",
+    "feucht",
+    "mag",
+    "magn",
+    "kompass",
+    "compass",
+    "lat",
+    "lon",
+    "alt",
+    "satell",
+    "status",
+    "flag",
+    "valid",
+    "quality",
+    "speed",
+    "geschw",
+    "vitesse",
+    "brems",
+    "brake",
+    "throttle",
+    "engine",
+    "rpm",
+)
 _ACCEL = (
-    "acc accel beschl accél aceler przysp ubrz versnell specificforce lowg highg gforce nd hd"
-).split()
-_RATE = "gyro gyr rate omega angular drehrate winkelg gier wank nick yaw roll pitch rot".split()
-_VELOCITY = "deltav dv delta-v".split()
+    "acc",
+    "accel",
+    "beschl",
+    "accél",
+    "aceler",
+    "przysp",
+    "ubrz",
+    "versnell",
+    "specificforce",
+    "lowg",
+    "highg",
+    "gforce",
+    "nd",
+    "hd",
+)
+_RATE = (
+    "gyro",
+    "gyr",
+    "rate",
+    "omega",
+    "angular",
+    "drehrate",
+    "winkelg",
+    "gier",
+    "wank",
+    "nick",
+    "yaw",
+    "roll",
+    "pitch",
+    "rot",
+)
+_VELOCITY = ("deltav", "dv", "delta-v")
 _AXES = {
-    "x": "x longitudinal longit long laengs längs forward fwd roll wank".split(),
-    "y": "y lateral quer right transv pitch nick".split(),
-    "z": "z vertical vertikal vert hoch down yaw gier".split(),
+    "x": (
+        "x",
+        "longitudinal",
+        "longit",
+        "long",
+        "laengs",
+        "längs",
+        "forward",
+        "fwd",
+        "roll",
+        "wank",
+    ),
+    "y": ("y", "lateral", "quer", "right", "transv", "pitch", "nick"),
+    "z": ("z", "vertical", "vertikal", "vert", "hoch", "down", "yaw", "gier"),
 }
 # Words of a turn that others are made with: Gierrate, Nickwinkel.
 _TURNS = {"wank": "x", "roll": "x", "nick": "y", "pitch": "y", "gier": "z", "yaw": "z"}
@@ -125,6 +191,10 @@ def _unit(name: str) -> str:
 def _quantity(words: list[str], joined: str) -> str:
     if any(joined.startswith(v.replace("-", "")) for v in _VELOCITY):
         return "velocity"
+    if words and words[-1] in ("ax", "ay", "az"):
+        return "acceleration"
+    if words and words[-1] in ("wx", "wy", "wz"):
+        return "rate"
     for word in words:
         if any(word.startswith(o) for o in _OTHER):
             return "other"

@@ -107,7 +107,8 @@ def _like(unit: Unit, goal: float | None, name: str) -> Facing | None:
     if off[best] > SAME_DIRECTION:
         return None
     return Facing(
-        best, f"assumed: with it the blow comes from where '{name}' has it, within {off[best]:.0f} deg"
+        best,
+        f"assumed: with it the blow comes from where '{name}' has it, within {off[best]:.0f} deg",
     )
 
 
@@ -120,5 +121,5 @@ def _meanings(unit: Unit) -> str:
         side = SIDES[round(came / 90.0) % 4]
         told.append(f"{turn:g} makes it a blow from {side}")
     if not told:
-        return "only you know which way it faces"
+        return "only you know which way it faces: the record does not tell it"
     return "only you know which way it faces: " + ", ".join(told)

@@ -26,6 +26,8 @@ LEAST_BASE = 5  # samples
 # A record that counts from its trigger has it at zero, this near to where the event begins.
 AT_ZERO = 0.05  # s
 CHANGE_OVER = 0.15  # s
+# A pulse without an event begins where it is this part of its peak, after so long below it.
+BEGUN, QUIET = 0.2, 0.02  # s
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class Impact:
     Attributes
     ----------
     trigger : float, s
-        On their clock.
+        On their clock; without an event, where the largest pulse begins.
     trigger_sd : float, s
     at_zero : bool
         The record counts from its trigger.
@@ -88,7 +90,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     base, fine_base = _base(strong, rest), _base(fine, rest)
     free = np.nan_to_num(strong.values - base)
     sitting = sitting_at_rest(fine_base) if len(fine.axes) == 3 else None
-    level = sitting.into_vehicle(free) if sitting else free
+    level = _ahead(sitting.into_vehicle(free) if sitting else free)
     step = float(np.median(np.diff(time)))
     before = time < time[int(np.argmax(np.linalg.norm(free, axis=1)))] - BEFORE
     noise = free[before].std(axis=0) if before.sum() > LEAST_BASE else np.zeros(3)
@@ -102,11 +104,11 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
         during = (time >= first.time_zero) & (time <= first.end)
         largest = float(np.linalg.norm(level[during, :2].sum(axis=0)) * step)
     else:
-        trigger, sd = float(time[peak_at]), math.nan
+        trigger, sd = _onset(time, np.linalg.norm(free, axis=1), peak_at), math.nan
         largest = detector.largest_change[0]
     # Time zero is known no better than the interval that it is looked for with lets it.
     sd = max(sd if math.isfinite(sd) else 0.0, step, 0.25 * PART_563.wake_window)
-    at_zero = bool(time[0] <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
+    at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
     after = (time >= trigger) & (time <= trigger + CHANGE_OVER)
     change = free[after].sum(axis=0) * step
     return Impact(
@@ -125,6 +127,20 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     )
 
 
+def _ahead(level: Array) -> Array:
+    """With the larger of the two horizontal components first: which is ahead is not known yet."""
+    size = (level[:, :2] ** 2).sum(axis=0)
+    return level if size[0] >= size[1] else np.asarray(level[:, [1, 0, 2]])
+
+
+def _onset(time: Array, size: Array, peak_at: int) -> float:
+    """Where the largest pulse begins: the last quiet instant before it, quiet for 5 ms."""
+    above = np.flatnonzero(size[: peak_at + 1] > BEGUN * size[peak_at])
+    gaps = np.flatnonzero(np.diff(time[above]) > QUIET)
+    first = above[gaps[-1] + 1] if gaps.size else above[0]
+    return float(time[max(int(first) - 1, 0)])
+
+
 def _struck(part: Part) -> float:
     """When it felt most, less what a pulse lasts."""
     return float(part.time[int(np.argmax((part.free**2).sum(axis=1)))]) - BEFORE
@@ -134,6 +150,9 @@ def _base(part: Part, rest: tuple[float, float, str] | None) -> Array:
     """Resting value: the mean over the rest; else over what is before the largest pulse."""
     time, values, has = part.time, part.values, part.axes
     out = np.full(3, np.nan)
+    if part.zeroed:
+        out[has] = 0.0
+        return out
     struck = _struck(part)
     windows = [(rest[0], rest[1])] if rest else []
     windows += [(struck - REACH, struck), (float(time[0]), 0.5 * float(time[0] + struck))]
@@ -148,15 +167,18 @@ def _base(part: Part, rest: tuple[float, float, str] | None) -> Array:
 
 
 def _rest(fine: Part, gyro: Part | None, impact: float) -> tuple[float, float, str] | None:
-    if len(fine.axes) < 3:
+    if len(fine.axes) < 3 or fine.zeroed:
         return None
+    noise = float(np.sqrt(np.mean(np.diff(fine.values, axis=0) ** 2, axis=0) / 2.0).max())
     rates = np.zeros_like(fine.values)
     if gyro is not None and len(gyro.axes) == 3:
-        rates = np.column_stack([np.interp(fine.time, gyro.time, gyro.values[:, k]) for k in range(3)])
+        rates = np.column_stack(
+            [np.interp(fine.time, gyro.time, gyro.values[:, k]) for k in range(3)]
+        )
     imu = pd.DataFrame(
         np.column_stack([rates, fine.values]),
         index=pd.Index(fine.time, name="time"),
         columns=[*GYRO, *ACCEL],
     )
-    found = find_pre_crash_rest(imu, impact=impact)
+    found = find_pre_crash_rest(imu, impact=impact, accel_noise=noise)
     return None if found is None else (found.start, found.end, found.grade)

@@ -45,8 +45,12 @@ def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[S
     elsewhere: dict[str, list[str]] = {}
     for channel in record.channels:
         if channel.quantity not in ("acceleration", "rate") or not channel.axis:
-            what = channel.quantity if channel.quantity not in ("acceleration", "rate") else "no axis"
-            elsewhere.setdefault(f"no sensor of a vehicle's motion ({what})", []).append(channel.name)
+            what = (
+                channel.quantity if channel.quantity not in ("acceleration", "rate") else "no axis"
+            )
+            elsewhere.setdefault(f"no sensor of a vehicle's motion ({what})", []).append(
+                channel.name
+            )
         elif channel.body != "vehicle":
             elsewhere.setdefault(f"it moves with the {channel.body}", []).append(channel.name)
         elif failure := _failure(channel):
@@ -137,8 +141,8 @@ def _part(
             named=True,
             place=place,
             uncertainty=uncertainty,
-            basis="of an accelerometer of a crash laboratory, calibrated by SAE J211; the full scale "
-            "is the record's",
+            basis="of a sensor of a crash laboratory, calibrated by SAE J211; its full scale is "
+            "that of the record",
             notes=tuple(notes),
         ),
         skipped,

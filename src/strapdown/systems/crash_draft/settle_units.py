@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -46,12 +47,25 @@ def settle_units(parts: Sequence[Part]) -> list[Part]:
     """
     parts = [_timed(p) for p in parts]
     out: list[Part | None] = [_by_heading(p) for p in parts]
+    order = sorted(range(len(parts)), key=lambda k: _off_gravity(parts[k]))
     for step in (_by_gravity, _by_another, _by_gravity_alone, _by_another, _by_elimination):
-        for k, part in enumerate(parts):
+        for k in order:
+            part = parts[k]
             if out[k] is None:
                 known = [q for q in out if q is not None and q.kind == "acceleration"]
                 out[k] = step(part, known)
     return [p for p in out if p is not None]
+
+
+def _off_gravity(part: Part) -> float:
+    """How far its rest is from gravity in any unit, relative."""
+    if len(part.axes) < 3:
+        return math.inf
+    length = float(np.linalg.norm(quiet_part(part.values).mean))
+    if length <= 0.0:
+        return math.inf
+    known = (STANDARD_GRAVITY / s for s in ACCEL_UNITS.values() if s > 0.0)
+    return min(abs(math.log(length / g)) for g in known)
 
 
 def _timed(part: Part) -> Part:
@@ -83,6 +97,9 @@ def _by_heading(part: Part) -> Part | None:
 
 
 def _by_gravity(part: Part, known: Sequence[Part]) -> Part | None:
+    # A gyro may rest at what gravity is in some unit: beside an accelerometer it must agree.
+    if not part.kind and any(q.path == part.path for q in known):
+        return None
     if part.kind not in ("", "acceleration") or len(part.axes) < 3:
         return None
     said = accel_unit(part.values, part.step, quiet_part(part.values))
@@ -93,6 +110,8 @@ def _by_gravity(part: Part, known: Sequence[Part]) -> Part | None:
 
 def _by_gravity_alone(part: Part, known: Sequence[Part]) -> Part | None:
     """An accelerometer, as it weighs something at rest, in a unit that is not settled."""
+    if not part.kind and any(q.path == part.path for q in known):
+        return None
     if part.kind not in ("", "acceleration") or len(part.axes) < 3:
         return None
     said = accel_unit(part.values, part.step, quiet_part(part.values))
@@ -125,7 +144,8 @@ def _by_elimination(part: Part, known: Sequence[Part]) -> Part | None:
     quiet = quiet_part(values)
     if part.kind == "velocity":
         return _asked(part, "velocity", "km/h", FACTORS["velocity"], _speeds)
-    if part.kind == "rate" or (not part.kind and known and len(part.axes) == 3):
+    beside = any(q.path == part.path or _together(q, part) for q in known)
+    if part.kind == "rate" or (not part.kind and beside and len(part.axes) == 3):
         said = gyro_unit(part.time, values, quiet)
         why = "" if part.kind else "it does not follow the accelerations, and rests near zero; "
         if said.settled:
@@ -192,7 +212,8 @@ def _accelerations(part: Part, unit: str, factor: float) -> str:
 
 def _rates(part: Part, unit: str, factor: float) -> str:
     peak, turn = _peak_change(part, factor)
-    return f'"{unit}" makes a peak of {np.degrees(peak):.3g} deg/s and a turn of {np.degrees(turn):.3g} deg'
+    turned = f"a turn of {np.degrees(turn):.3g} deg"
+    return f'"{unit}" makes a peak of {np.degrees(peak):.3g} deg/s and {turned}'
 
 
 def _speeds(part: Part, unit: str, factor: float) -> str:

@@ -13,10 +13,15 @@ from strapdown.formats.inference.clock import infer_time_unit, mean_step
 from strapdown.formats.inference.conclusion import THRESHOLD
 from strapdown.systems.crash_draft.header_words import Heading
 from strapdown.systems.crash_draft.parts import Clock
+from strapdown.systems.crash_draft.triad_kind import pulse_samples
 
 Array = NDArray[np.float64]
 
-__all__ = ["find_clock"]
+__all__ = ["find_clock", "likely_rate"]
+
+RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
+# Four fifths of the power of a frontal impact, s.
+USUAL_PULSE = 0.06
 
 # Steps of a clock stay within this of their median, but for as many as this part of them.
 REGULAR, IRREGULAR_PART = 0.5, 0.05
@@ -67,17 +72,28 @@ def find_clock(
     return Clock("", "", "no column grows in equal steps", math.nan, math.nan), None
 
 
+def likely_rate(values: Array) -> float:
+    """A usual rate at which the pulse lasts as long as one does, for numbers without time.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+    """
+    samples = pulse_samples(values)
+    return min(RATES, key=lambda rate: abs(math.log(max(samples, 1) / rate / USUAL_PULSE)))
+
+
 def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock, Array]:
     step = mean_step(values)
     if heading.unit in TIME_UNITS:
         factor = TIME_UNITS[heading.unit]
         rate = 1.0 / (step * factor)
-        return Clock(name, heading.unit, f"{why}, which names the unit", step, rate), values * factor
+        return Clock(
+            name, heading.unit, f"{why}, which names the unit", step, rate
+        ), values * factor
     said = infer_time_unit(_whole(values))
     shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
-    within = {
-        u: p for u, p in shares.items() if SLOWEST <= 1.0 / (step * TIME_UNITS[u]) <= FASTEST
-    }
+    within = {u: p for u, p in shares.items() if SLOWEST <= 1.0 / (step * TIME_UNITS[u]) <= FASTEST}
     # A step of one is a count as often as it is a millisecond.
     total = sum(within.values()) + (1.0 if _counts(values) and heading.quantity != "time" else 0.0)
     best = max(within, key=lambda u: within[u], default="s")

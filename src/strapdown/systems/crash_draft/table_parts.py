@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -14,7 +15,7 @@ from strapdown.formats.crash_units import factor_of
 from strapdown.formats.stamps import EPOCH
 from strapdown.systems.crash_draft.header_words import Heading, read_heading
 from strapdown.systems.crash_draft.parts import Part, Skipped
-from strapdown.systems.crash_draft.table_clock import find_clock
+from strapdown.systems.crash_draft.table_clock import find_clock, likely_rate
 from strapdown.systems.crash_draft.table_triads import group_columns
 
 Array = NDArray[np.float64]
@@ -25,6 +26,8 @@ __all__ = ["LEAST_SAMPLES", "table_parts"]
 LEAST_SAMPLES = 8
 # Ticks beyond this are counted from the first, before they become floats.
 FAR = 2.0**40
+# What the reader calls a column that has no heading.
+_NUMBERED = re.compile(r"column \d+")
 _KINDS = ("acceleration", "rate", "velocity", "time")
 
 
@@ -66,7 +69,9 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         )
     clock, time = find_clock(table.columns, table.headings)
     if time is None:
-        stamps = np.arange(rows, dtype=np.float64)
+        whole = np.column_stack([v for v in table.columns.values() if np.isfinite(v).all()])
+        clock = replace(clock, rate=likely_rate(whole))
+        stamps = np.arange(rows, dtype=np.float64) / clock.rate
     else:
         factor = 1.0 / (clock.rate * clock.step)
         origin = table.origins.get(clock.column, 0.0) * factor
@@ -141,6 +146,8 @@ def _columns(path: str, record: CrashRecord) -> tuple[_Table, list[Skipped]]:
 
 def _heading(channel: CrashChannel) -> Heading:
     """What the heading says: the reader's word where it has a unit, ours in other languages."""
+    if _NUMBERED.fullmatch(channel.name) and not channel.unit:
+        return Heading("", "", "", "")
     own = read_heading(channel.name)
     axis, turned = channel.axis.lstrip("-"), channel.axis.startswith("-")
     if axis:

@@ -92,9 +92,7 @@ class Page:
             shown = "".join(c if c.isprintable() else " " for c in text)
             if len(shown) > 6 * LONGEST:
                 shown = shown[: 6 * LONGEST - 1] + "…"
-            wrapped = textwrap.wrap(
-                shown, WIDTH - 2, break_long_words=True, break_on_hyphens=False
-            )
+            wrapped = textwrap.wrap(shown, WIDTH - 2, break_long_words=True, break_on_hyphens=False)
             self.lines += [f"# {line}".rstrip() for line in wrapped or [""]]
 
     def table(self, header: str, *remarks: str) -> None:

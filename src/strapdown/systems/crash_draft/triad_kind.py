@@ -29,7 +29,8 @@ USUAL_NOISE, USUAL_OFFSET, DECADES = math.radians(0.1), math.radians(1.0), 0.7
 USUAL_PEAK, PEAK_DECADES = math.radians(120.0), 0.6
 # Two ranges of one sensor, or two recorders, agree so far.
 LEAST_CORRELATION = 0.8
-SCALE_TOLERANCE = 0.2
+# Of the logarithm: noise flattens the slope, and the next unit is a factor of 9.8 away.
+SCALE_TOLERANCE = 0.35
 # Ends of the ranges of accelerometers, in g, and how exactly they are met.
 FULL_SCALES = (
     *(1.2, 1.5, 1.7, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 18.0, 20.0, 24.0, 25.0, 30.0),
@@ -39,8 +40,12 @@ FULL_SCALES = (
 ROUND = 0.003
 # Four fifths of the power of a crash are within so long.
 PULSE = (0.008, 0.8)  # s
+# A pulse stands so far above the noise.
+LEAST_PULSE = 8.0
 # Of a reading: where a low range stands at its end, the two have nothing to agree on.
 NEAR_END = 0.98
+# What is below this part of the largest is mostly noise.
+MOVES = 0.15
 
 
 @dataclass(frozen=True)
@@ -142,9 +147,9 @@ def accel_unit(values: Array, step: float, quiet: Quiet) -> Answer:
 
 
 def _round_end(values: Array, unit: str) -> float | None:
-    """Full scale in g, where values stand at an end that is round in this unit and no power of two."""
+    """Full scale in g, where values end at a number that is round in g and no power of two."""
     limits = find_limits(
-        np.arange(len(values)) * 1e-3, values, np.full(3, np.inf), np.zeros(3)
+        np.arange(len(values), dtype=np.float64) * 1e-3, values, np.full(3, np.inf), np.zeros(3)
     )
     ends = [abs(e) for e in (*limits.lower, *limits.upper) if np.isfinite(e)]
     if not ends:
@@ -156,6 +161,33 @@ def _round_end(values: Array, unit: str) -> float | None:
     if abs(in_g / near - 1.0) > ROUND or abs(end / power - 1.0) <= ROUND:
         return None
     return near
+
+
+def pulse_samples(values: Array) -> int:
+    """How many samples hold the middle four fifths of the power of the shortest pulse.
+
+    Parameters
+    ----------
+    values : ndarray, (n, k)
+        In any units; what grows evenly, as a clock does, and what feels nothing is not counted. A
+        gyro that turns long after the blow does not make it longer.
+
+    Returns
+    -------
+    int
+        0 where there is no pulse.
+    """
+    lengths = []
+    for column in values.T:
+        free = np.abs(column - np.median(column))
+        noise = max(float(np.median(free)), float(np.sort(free)[int(0.7 * free.size)]))
+        if np.ptp(np.diff(column)) == 0.0 or not free.max() > LEAST_PULSE * noise:
+            continue
+        # Without the noise, which a long record has more of than the pulse has power.
+        power = np.cumsum(np.where(free > 3.0 * noise, free, 0.0) ** 2)
+        edges = np.searchsorted(power, np.array([0.1, 0.9]) * power[-1])
+        lengths.append(int(edges[1] - edges[0]))
+    return min(lengths, default=0)
 
 
 def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
@@ -173,10 +205,7 @@ def clock_by_pulse(clock: Clock, values: Array) -> tuple[str, str] | None:
     (unit, why) or None
         None where more than one unit, or none, makes a crash of it.
     """
-    free = values - np.median(values, axis=0)
-    power = np.cumsum((free**2).sum(axis=1))
-    edges = np.searchsorted(power, np.array([0.1, 0.9]) * power[-1])
-    samples = int(edges[1] - edges[0])
+    samples = pulse_samples(values)
     if samples < 3:
         return None
     lasts = {u: samples * f * clock.step for u, f in TIME_UNITS.items()}
@@ -205,7 +234,7 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     the rest's offset and noise, and the peak, each as a broad normal distribution of the
     logarithm.
     """
-    crash = slice(max(quiet.count - 1, 0), None)
+    crash = slice(max(quiet.count - 1, 0) if quiet.count < len(values) - LEAST_QUIET else 0, None)
     said, _, _, _ = infer_gyro(time[crash] - time[crash][0], values[crash], None, {"s": 1.0})
     prior = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     peak = float(np.abs(values - quiet.mean).max())
@@ -233,9 +262,7 @@ def gyro_unit(time: Array, values: Array, quiet: Quiet) -> Answer:
     return Answer(unit, found[unit], told, tuple(found.items()))
 
 
-def same_quantity(
-    known: Array, other: Array
-) -> tuple[str, float, float] | None:
+def same_quantity(known: Array, other: Array) -> tuple[str, float, float] | None:
     """Unit of a triad by one that felt the same and is known.
 
     Parameters
@@ -255,33 +282,40 @@ def same_quantity(
     scales = {u: s for u, s in ACCEL_UNITS.items() if s > 0.0}
     unit = min(scales, key=lambda u: abs(math.log(slope / scales[u])))
     ratio = slope / scales[unit]
-    if abs(ratio - 1.0) > SCALE_TOLERANCE:
+    if abs(math.log(ratio)) > SCALE_TOLERANCE:
         return None
     return unit, ratio, correlation
 
 
 def regress(known: Array, other: Array) -> tuple[float, float]:
-    """Scale of `other` to `known` where neither is at its end, and how well they correlate."""
-    ends = NEAR_END * np.nanmax(np.abs(known), axis=0)
-    inside = np.abs(known) < ends
-    x, y = [], []
-    for k in range(known.shape[1]):
-        rows = inside[:, k] & np.isfinite(known[:, k]) & np.isfinite(other[:, k])
-        if rows.sum() < 3:
-            continue
-        x.append(other[rows, k] - np.median(other[rows, k]))
-        y.append(known[rows, k] - np.median(known[rows, k]))
-    if not x:
-        return 0.0, 0.0
-    a, b = np.concatenate(x), np.concatenate(y)
-    power, own = float(a @ a), float(b @ b)
+    """How one triad follows another that may have a shorter range.
+
+    Parameters
+    ----------
+    known, other : ndarray, (n, k)
+        At the same instants.
+
+    Returns
+    -------
+    scale : float
+        Of `other` to `known`, from where `known` moves and is not at its end; 0 where it cannot
+        be told.
+    correlation : float
+        Of all axes together, `other` being cut where `known` ends.
+    """
+    x, y = (v - np.median(v, axis=0) for v in (known, other))
+    largest = np.abs(x).max(axis=0)
+    margin = (1.0 - NEAR_END) * np.ptp(x, axis=0)
+    inside = (x > x.min(axis=0) + margin) & (x < x.max(axis=0) - margin)
+    moves = inside & (np.abs(x) > MOVES * largest.max())
+    x_in, y_in = x[moves], y[moves]
+    power, own = float(y_in @ y_in), float(x_in @ x_in)
     if power <= 0.0 or own <= 0.0:
         return 0.0, 0.0
     # Both are noisy: the slope between the two regressions is not drawn to zero.
-    correlation = float(a @ b) / math.sqrt(power * own)
-    return math.copysign(math.sqrt(own / power), correlation), correlation
-
-
-def gravity_in(unit: str) -> float:
-    """Length of gravity in a unit."""
-    return STANDARD_GRAVITY / ACCEL_UNITS[unit]
+    scale = math.copysign(math.sqrt(own / power), float(x_in @ y_in))
+    cut = np.clip(scale * y, x.min(axis=0), x.max(axis=0))
+    power, own = float((cut * cut).sum()), float((x * x).sum())
+    if power <= 0.0:
+        return 0.0, 0.0
+    return scale, float((cut * x).sum()) / math.sqrt(power * own)

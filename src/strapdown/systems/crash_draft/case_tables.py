@@ -1,0 +1,139 @@
+"""What a case says once: what it is about, the vehicle, its entry, options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from strapdown.systems.crash_draft.group_units import Unit
+from strapdown.systems.crash_draft.parts import Skipped
+from strapdown.systems.crash_draft.toml_text import ASK, Page, array, number, plain, string
+
+__all__ = ["case_table", "entry_table", "head", "left_out", "options_table", "vehicle_table"]
+
+KMH = 3.6
+
+
+def head(page: Page) -> None:
+    """What the file is and how it is filled in."""
+    page.say(
+        "A crash case for strapdown. It was written from the records; the answers are yours.",
+        "",
+        'Wherever it says "?", only you know the answer: write it there. Texts keep their '
+        "quotation marks, numbers have none. Where it says 'found', the records told it; where it "
+        "says 'assumed', nothing did: look at it. Then run: strapdown crash, with this file.",
+        "",
+        "Axes of the vehicle: forward, right, down. All positions are from one origin of your "
+        "choice, such as the centre of mass, in m; keys may end in _mm or _cm instead of _m, "
+        "speeds in _m_per_s instead of _km_per_h.",
+    )
+
+
+def case_table(page: Page, title: str, facts: Mapping[str, str]) -> None:
+    """Title and number: found in a test's record, else asked."""
+    page.blank()
+    if title:
+        page.key("title", string(title), "found: in the record")
+    else:
+        page.key(
+            "title",
+            ASK,
+            'only you know: e.g. "Car against pole, 12 March"',
+            what="what it is about",
+        )
+    number_of = facts.get("test", "")
+    page.key("number", string(number_of), "of your file, as you like" if not number_of else "found")
+    page.key("author", '""', "who stands for it, as you like")
+    page.key("description", '""', "a few sentences for the first page, as you like")
+
+
+def vehicle_table(page: Page, facts: Mapping[str, str]) -> None:
+    """Vehicle and reference point."""
+    page.table("[vehicle]")
+    page.key("name", string(facts.get("vehicle", "")), "for the report, as you like")
+    mass = _fact(facts, "mass_kg")
+    if mass is None:
+        page.key(
+            "mass_kg", ASK, "only you know: as it was driven, in kg, e.g. 1450", what="mass, kg"
+        )
+    else:
+        page.key("mass_kg", number(mass), "found: in the record, as tested, kg")
+    for name, usual in (("length_m", 4.5), ("width_m", 1.8)):
+        value = _fact(facts, name)
+        how = "assumed: of a car, m; it is drawn so" if value is None else "found: in the record, m"
+        page.key(name, number(usual if value is None else value), how)
+    page.table("[point]", "The point whose motion and change of velocity are told.")
+    page.key("name", '"centre of mass"')
+    page.key("position_m", array([0.0, 0.0, 0.0]), "assumed: it is the origin of all positions, m")
+
+
+def entry_table(page: Page, facts: Mapping[str, str]) -> None:
+    """Speed at the impact: found in a test's record, else asked."""
+    page.table(
+        "[entry]",
+        "How fast the vehicle was at the impact, and how that is known. If it stood still before "
+        'the blow: kind = "standstill", and delete the speed and its sd.',
+    )
+    page.key("kind", '"speed"')
+    speed = _fact(facts, "speed_m_per_s")
+    if speed is None:
+        page.key(
+            "speed_km_per_h",
+            ASK,
+            "only you know: forward, km/h, e.g. 25.6",
+            what="entry speed, km/h",
+        )
+        page.key(
+            "speed_sd_km_per_h",
+            ASK,
+            "only you know: standard deviation, km/h: two thirds of all such values are within it, "
+            "e.g. 0.4 for a light barrier",
+            what="its standard deviation, km/h",
+        )
+        page.key(
+            "source",
+            ASK,
+            'only you know: how it was measured, e.g. "light barrier 2 m before the pole"',
+            what="how the speed is known",
+        )
+        return
+    page.key("speed_km_per_h", number(speed * KMH), "found: in the record, km/h")
+    page.key("speed_sd_km_per_h", "0.1", "assumed: of a speed trap of a laboratory, km/h")
+    page.key("source", string("stated by the record"), "found")
+
+
+def _fact(facts: Mapping[str, str], key: str) -> float | None:
+    try:
+        value = float(facts.get(key, ""))
+    except ValueError:
+        return None
+    return value if value > 0.0 else None
+
+
+def left_out(page: Page, skipped: Sequence[Skipped]) -> None:
+    """What of the records is not used, and why, as comments."""
+    if not skipped:
+        return
+    page.blank()
+    page.say("---- left out")
+    for one in skipped:
+        page.say(f"{plain(one.path)}, {plain(one.what)}: {one.why}")
+
+
+def options_table(page: Page, units: Sequence[Unit]) -> None:
+    """How the clocks are tied, and what else may be chosen."""
+    page.table("[options]")
+    several = len(units) > 1
+    if several:
+        own = all(u.impact.at_zero for u in units)
+        page.key(
+            "clock",
+            '"trigger"' if own else '"correlation"',
+            "found: all records count from one trigger"
+            if own
+            else "assumed: the clocks are laid over each other by what the units felt",
+        )
+    page.key("monte_carlo_runs", "2000")
+    page.say(
+        "window_s = [-0.1, 0.75]   of the path, from the trigger; severity, references (another "
+        "measurement to hold the answers against) and more: docs/case.md"
+    )

@@ -1,0 +1,295 @@
+"""What a case says of each unit: where it sits, when it was struck, its triads."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from strapdown.systems.crash_draft.group_units import Unit
+from strapdown.systems.crash_draft.heading_of_unit import Facing
+from strapdown.systems.crash_draft.parts import Part
+from strapdown.systems.crash_draft.range_ends import RangeEnds, in_words
+from strapdown.systems.crash_draft.stated_errors import stated_of
+from strapdown.systems.crash_draft.toml_text import (
+    ASK,
+    Page,
+    array,
+    inline,
+    number,
+    plain,
+    string,
+)
+
+__all__ = ["unit_tables"]
+
+KMH = 3.6
+SHOWN_SENSORS = 8
+ONLY = "only you know which way it faces: "
+
+
+def unit_tables(page: Page, unit: Unit, facing: Facing, units: Sequence[Unit]) -> None:
+    """One unit: its mounting, trigger and triads.
+
+    Parameters
+    ----------
+    page : Page
+        To which it is added.
+    unit : Unit
+    facing : Facing
+        Of this unit.
+    units : sequence of Unit
+        All of the case.
+    """
+    page.blank()
+    page.say(f"---- the unit '{plain(unit.name)}'")
+    for why in unit.why:
+        page.say(f"found: {why}.")
+    if unit.why:
+        page.say(
+            "If they are separate boxes: give each its own [[units]] table, with its own position."
+        )
+    elif len(units) > 1:
+        page.say(
+            "Taken for a box of its own. If it is one with another unit: move its "
+            "[[units.accelerometers]] under that one, and delete the rest."
+        )
+    page.lines.append("[[units]]")
+    page.key("name", string(unit.name))
+    place = next((p.place for p in unit.accelerometers if p.place), "")
+    where = f"found: the record says '{plain(place)}'; " if place else ""
+    page.key(
+        "position_m",
+        array([None, None, None]),
+        f"{where}only you know: m forward, right, down from the origin, e.g. [0.62, -0.45, 0.2]",
+        what=f"where '{plain(unit.name)}' sits, m forward, right, down",
+    )
+    page.key("position_sd_m", "0.02", "assumed: measured with a tape, m")
+    _angles(page, unit, facing)
+    page.key("angles_sd_deg", "1.0", "assumed: bolted along the vehicle's axes, deg")
+    _trigger(page, unit)
+    if unit.gyro is None and unit.gyro_from:
+        page.key(
+            "gyro_from",
+            string(unit.gyro_from),
+            "found: it has no gyro of its own; a rigid vehicle turns alike everywhere",
+        )
+    for k, part in enumerate(unit.accelerometers):
+        words = ""
+        _triad(page, unit, part, "[[units.accelerometers]]", k, words)
+    if unit.gyro is not None:
+        _triad(page, unit, unit.gyro, "[units.gyro]", -1, "")
+    _assumed(page, unit)
+
+
+def _angles(page: Page, unit: Unit, facing: Facing) -> None:
+    sitting = unit.impact.sitting
+    turns = "roll, pitch, heading that turn the vehicle's axes into the sensor's, deg"
+    if sitting is None:
+        page.say(turns, facing.why)
+        value = [0.0, 0.0, facing.heading_deg] if facing.heading_deg is not None else [None] * 3
+        page.key("angles_deg", array(value), what=f"how '{plain(unit.name)}' is turned: {turns}")
+        return
+    told = (
+        f"found: at rest its {sitting.along} points up (it reads {sitting.length:.2f} m/s², "
+        f"{sitting.lean_deg:.1f} deg off), which is roll and pitch"
+        if sitting.along
+        else f"found: roll and pitch by gravity at rest, {sitting.length:.2f} m/s² along no axis"
+    )
+    page.say(turns, told, facing.why)
+    page.key(
+        "angles_deg",
+        array([sitting.roll_deg, sitting.pitch_deg, facing.heading_deg]),
+        what=f"heading of '{plain(unit.name)}', deg: {facing.why.removeprefix(ONLY)}",
+    )
+
+
+def _trigger(page: Page, unit: Unit) -> None:
+    impact = unit.impact
+    clock = unit.accelerometers[-1].clock
+    if not clock.unit:
+        at = impact.trigger * clock.rate
+        page.key(
+            "trigger_s",
+            ASK,
+            f"only you know: its largest blow begins at sample {at:.0f}, counted from zero; in s "
+            "on its clock, e.g. that number divided by the samples a second",
+            what=f"instant of the impact on the clock of '{plain(unit.name)}', s",
+        )
+        page.key("trigger_sd_s", "0.005", "assumed, s")
+        return
+    cut = unit.ends[len(unit.accelerometers) - 1]
+    if not impact.found and cut.saturated:
+        page.say(
+            f"found: it was struck so hard that it stood at the end of its range, in {cut.samples} "
+            f"samples; what it shows of the change of velocity, {impact.largest * KMH:.2g} km/h "
+            "within 150 ms, is therefore too little"
+        )
+        page.key(
+            "trigger_s", number(impact.trigger, 7), "assumed: where its largest pulse begins, s"
+        )
+        page.key("trigger_sd_s", "0.01", "assumed, s")
+        return
+    if not impact.found:
+        page.say(
+            "No crash was found: the largest change of the horizontal velocity within 150 ms is "
+            f"{impact.largest * KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
+            f"acceleration, {in_words(impact.peak, 'acceleration')}, is at {impact.trigger:.6g} s."
+        )
+        page.key(
+            "trigger_s",
+            ASK,
+            f"only you know: the instant on this unit's clock, s, e.g. {impact.trigger:.6g}",
+            what=f"instant of the impact on the clock of '{plain(unit.name)}', s",
+        )
+        page.key("trigger_sd_s", "0.01", "assumed, s")
+        return
+    if impact.at_zero:
+        page.key("trigger_s", "0.0", "found: the record counts from its trigger, s")
+    else:
+        page.key(
+            "trigger_s",
+            number(impact.trigger, 7),
+            "found: time zero by 49 CFR 563, s on this unit's clock; if it stamped its trigger, "
+            "write that instant",
+        )
+    page.key("trigger_sd_s", number(impact.trigger_sd, 2), "found: how well that is known, s")
+    page.say(
+        f"found: from there the horizontal velocity changes by {impact.largest * KMH:.3g} km/h, "
+        f"with a peak of {in_words(impact.peak, 'acceleration')}"
+        + (f"; {impact.more} more events follow" if impact.more else "")
+    )
+    if impact.rest is None:
+        page.say(
+            "found: no rest before the impact, so that it does not tell roll and pitch of the "
+            "vehicle there, deg"
+        )
+        page.key("levelling_deg", "[0.0, 0.0]", "assumed: a level road")
+        page.key("levelling_sd_deg", "2.0", "assumed, deg")
+    else:
+        kind = {"still": "at rest", "steady": "steady, though perhaps moving"}[impact.grade]
+        length = impact.rest[1] - impact.rest[0]
+        page.say(
+            f"found: it was {kind} from {impact.rest[0]:.6g} to {impact.rest[1]:.6g} s, "
+            f"{length:.3g} s; to name another, counted from the trigger: rest_s = [from, to]"
+        )
+
+
+def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) -> None:
+    ends = unit.ends[k]
+    page.table(header)
+    if words:
+        page.say(f"{words}")
+    page.key("path", string(part.path))
+    page.key("channels", inline(part.channels), f"found: {part.why.split('; ')[0]}")
+    missing = [a for a in "xyz" if a not in part.channels]
+    if missing:
+        page.say(f"found: nothing of {', '.join(missing)} in the record")
+    if part.clock.column:
+        page.key("time", string(part.clock.column), f"found: {part.clock.why}")
+        if part.clock.unit:
+            page.key(
+                "time_unit",
+                string(part.clock.unit),
+                f"found: {part.clock.rate:.5g} samples a second",
+            )
+        else:
+            page.key(
+                "time_unit",
+                ASK,
+                f"only you know: {part.clock.candidates}",
+                what=f"unit of the time of {plain(part.path)}",
+            )
+    elif not part.clock.unit:
+        page.key(
+            "rate_hz",
+            ASK,
+            f"only you know: samples a second; the record has no time column; {part.clock.rate:g} "
+            "would make it a crash of a usual length",
+            what=f"samples a second of {plain(part.path)}",
+        )
+    how = "; ".join(part.why.split("; ")[1:])
+    if part.unit:
+        page.key("unit", string(part.unit), f"found: {how}" if how else "found")
+    else:
+        page.key(
+            "unit",
+            ASK,
+            f"only you know: {part.candidates}",
+            what=f"unit of {plain(', '.join(part.channels.values()))} in {plain(part.path)}",
+        )
+    if part.sampling:
+        page.key("sampling", string(part.sampling), "found: stated by the record")
+    for note in part.notes:
+        page.say(f"found: {note}")
+    peaks = [in_words(p, part.kind) for p in ends.peak if p == p]
+    page.say(f"found: largest {', '.join(peaks)} along its axes")
+    if ends.saturated:
+        stood = [
+            f"{axis} at {in_words(e, part.kind)}"
+            for axis, e in zip("xyz", ends.ends, strict=True)
+            if e is not None
+        ]
+        page.say(
+            f"found: it stood at the end of its range in {ends.samples} samples: {', '.join(stood)}"
+        )
+    _sensor(page, part, ends, unit)
+
+
+def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
+    """What is not known of the part: of the catalogue where its range tells it, else assumed."""
+    if ends.saturated and len(ends.sensors) == 1 and not part.uncertainty:
+        page.key(
+            "sensor",
+            string(ends.sensors[0]),
+            "assumed: of the catalogue it alone ends there; look at `strapdown modules`",
+        )
+        return
+    numbers, why = (part.uncertainty, part.basis)
+    if not numbers:
+        numbers, why = stated_of(part, ends, unit.impact, unit.accelerometers[0])
+    page.say(f"assumed: {why}")
+    page.key(
+        "uncertainty",
+        "{ " + ", ".join(f"{k} = {number(v, 4)}" for k, v in numbers.items()) + " }",
+    )
+    if not part.uncertainty:
+        shown = ", ".join(ends.sensors[:SHOWN_SENSORS])
+        more = " and more" if len(ends.sensors) > SHOWN_SENSORS else ""
+        page.say(
+            "If you know the part, write instead of that line: sensor = and its name in quotation "
+            f"marks. Of the catalogue these reach so far: {shown or 'none'}{more}; a file of your "
+            "own in its form will do, too"
+        )
+
+
+def _assumed(page: Page, unit: Unit) -> None:
+    axes = {a for p in unit.accelerometers for a in p.channels}
+    lacks_gyro = unit.gyro is None and not unit.gyro_from
+    if not lacks_gyro and axes == set("xyz"):
+        return
+    page.table(
+        "[units.assumed]",
+        "What is not measured has to be bounded by you; it enters the bounds of the answers.",
+    )
+    if lacks_gyro:
+        page.key(
+            "turn_sd_deg",
+            ASK,
+            "only you know: no gyro: by how much the vehicle turned in the crash, standard "
+            "deviation, deg, e.g. 2.0 for a centric frontal impact, 15.0 for an offset one",
+            what=f"'{plain(unit.name)}' has no gyro: how much it may have turned, deg",
+        )
+    missing = [a for a in "xyz" if a not in axes]
+    if missing:
+        page.key(
+            "delta_v_sd_m_per_s",
+            ASK,
+            f"only you know: no {', '.join(missing)}: how much the velocity may have changed along "
+            "it, standard deviation, m/s, e.g. 1.0",
+            what=f"'{plain(unit.name)}' lacks {', '.join(missing)}: change of velocity there, m/s",
+        )
+    page.key(
+        "because",
+        ASK,
+        'only you know: why, e.g. "centric impact, no turn in the film"',
+        what="why these may be assumed",
+    )
