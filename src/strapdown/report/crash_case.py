@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
-from strapdown.report.chart import Chart
 from strapdown.report.crash_assumptions import CONVENTIONS
+from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
 from strapdown.report.crash_document import crash_document, drawings
 from strapdown.report.crash_figures import crash_figures
 from strapdown.report.crash_json import crash_json
-from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
 from strapdown.report.document import Animation, ChartBlock, Document, Picture
+from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
-from strapdown.report.svg_chart import draw
 from strapdown.systems.crash_case import CaseResult, run_case
 
 __all__ = ["crash", "file_name", "rerun_crash", "write_crash"]
@@ -121,17 +120,18 @@ def write_crash(
     ) as folder:
         _write_numbers(result, folder)
         progress("drawing the figures", 0.65)
+        stills = draw_stills(document)
         (folder / "figures").mkdir()
-        _draw(document, folder / "figures")
-        progress("writing the page", 0.8)
-        (folder / "report.html").write_text(document_page(document), encoding="utf-8", newline="\n")
-        progress("setting the PDF", 0.85)
-        write_pdf(document, folder / "report.pdf")
+        _keep(document, stills, folder / "figures")
+        progress("writing the page", 0.85)
+        _write(folder / "report.html", document_page(document, stills=stills))
+        progress("setting the PDF", 0.9)
+        write_pdf(document, folder / "report.pdf", stills=stills)
     return seals[0]
 
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:
-    (folder / "crash.json").write_text(to_json(crash_json(result)), encoding="utf-8", newline="\n")
+    _write(folder / "crash.json", to_json(crash_json(result)))
     told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
     main = result.reconstruction.main
     write_table(trajectory_table(main.path), folder / "trajectory.csv", told)
@@ -159,17 +159,17 @@ def file_name(name: str, made: set[str]) -> str:
     return own
 
 
-def _draw(document: Document, folder: Path) -> None:
+def _keep(document: Document, stills: Sequence[str], folder: Path) -> None:
+    """Put every picture of the report among the figures."""
+    drawn = iter(stills)
     for block in drawings(document):
         match block:
-            case ChartBlock(chart=Chart() as chart):
-                draw(chart, folder / f"{chart.slug}.svg")
+            case ChartBlock(chart=chart):
+                _write(folder / f"{chart.slug}.svg", next(drawn))
             case Picture() as picture:
                 _write(folder / f"{picture.slug}.svg", picture.svg)
-            case Animation(stills=stills):
-                _write(folder / f"{stills.slug}.svg", stills.svg)
-            case _:
-                pass
+            case Animation(stills=picture):
+                _write(folder / f"{picture.slug}.svg", picture.svg)
 
 
 def _write(path: Path, text: str) -> None:

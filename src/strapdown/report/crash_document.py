@@ -23,7 +23,7 @@ from strapdown.report.document import (
 )
 from strapdown.systems.crash_case import CaseResult
 
-__all__ = ["crash_document"]
+__all__ = ["crash_document", "drawings"]
 
 
 def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Document:
@@ -242,9 +242,9 @@ def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
     )
 
 
-def drawings(document: Document) -> list[Block]:
+def drawings(document: Document) -> list[ChartBlock | Picture | Animation]:
     """Return every chart, picture and animation, in the order of the report."""
-    found: list[Block] = []
+    found: list[ChartBlock | Picture | Animation] = []
     for block in (*document.front, *(b for s in document.sections for b in s.blocks)):
         if isinstance(block, ChartBlock | Picture | Animation):
             found.append(block)

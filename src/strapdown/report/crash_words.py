@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
@@ -109,7 +111,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     figures.append(
         KeyFigure(
             "Place at the end",
-            f"{plain(float(np.hypot(*place[:2])), 2)} m",
+            f"{plain(math.hypot(place[0], place[1]), 2)} m",
             ", ".join(
                 f"{name} {about(p, h, 'm')}"
                 for name, p, h in zip(axis_names(result), place, half, strict=True)
