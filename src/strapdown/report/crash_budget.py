@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -83,6 +84,9 @@ def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) 
     # Stable, so that equal ones keep the order of the budget; the rest always last.
     order = sorted(table.index, key=lambda name: (name == _REST, -float(size[name])))
     categories = (_SUM, *(str(name) for name in order))
+    # Three digits of the larger sum, and as many decimals of all that adds up to it.
+    most = float(total.max())
+    digits = max(0, 2 - math.floor(math.log10(most))) if most > 0.0 else 0
     panels = []
     for column, colour in zip(table.columns, (BLUE, GREEN), strict=True):
         values = np.array([float(total[column]), *(float(table[column][n]) for n in order)])
@@ -93,17 +97,17 @@ def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) 
                 title=f"{column}, {unit}",
                 categories=categories,
                 bars=(
-                    _bars(_SUM, [0], values[:1], BLACK),
-                    _bars(str(column), range(1, len(values)), values[1:], colour),
+                    _bars(_SUM, [0], values[:1], BLACK, digits),
+                    _bars(str(column), range(1, len(values)), values[1:], colour, digits),
                 ),
             )
         )
     return Chart(slug, title, caption, f"standard deviation, {unit}", tuple(panels), beside=True)
 
 
-def _bars(name: str, at: Sequence[int] | range, values: object, colour: str) -> Bars:
+def _bars(name: str, at: Sequence[int] | range, values: object, colour: str, digits: int) -> Bars:
     ends = np.asarray(values, dtype=np.float64)
-    labels = tuple(f"{v:.2g}" if v < 0.0995 else f"{v:.3g}" for v in ends.tolist())
+    labels = tuple(f"{v:.{digits}f}" for v in ends.tolist())
     where = np.array(list(at), dtype=np.float64)
     return Bars(name, where, ends, colour, labels=labels, legend=False)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,8 +15,8 @@ from strapdown.crash.delta_v_bound import DeltaVBound, body_delta_v_bound
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.crash.velocity_course import VelocityCourse
 from strapdown.crash.window_weights import window_weights
-from strapdown.report.chart import BLACK, GREY, PURPLE, Chart, Fill, Line, Mark, Panel, curve
-from strapdown.report.crash_moments import AROUND, signed, unit_look
+from strapdown.report.chart import GREY, PURPLE, Chart, Fill, Line, Panel, curve
+from strapdown.report.crash_moments import AROUND, event_marks, signed, unit_look
 
 Array = NDArray[np.float64]
 
@@ -151,10 +151,11 @@ def delta_v_chart(
     lines: list[list[Line]] = [[] for _ in AXES]
     for k, unit in enumerate(units):
         if unit.acceleration.begin <= zero < unit.acceleration.end:
-            strong = unit is main
-            _add_course(lines, unit, (zero, *span), None if strong else k, len(units) == 1)
+            look = unit_look(k, len(units) == 1)
+            _add_course(lines, unit, (zero, *span), unit.name, look, 2.2 if unit is main else 1.3)
+    own = unit_look(None if combined is not None else 0)["colour"]
     if combined is not None:
-        _add_course(lines, combined, (zero, *span), None, False)
+        _add_course(lines, combined, (zero, *span), "mean of the units", unit_look(None), 2.2)
     last = min(span[1], main.acceleration.end)
     instants = np.unique(np.r_[np.linspace(zero, last, _INSTANTS)[1:], end])
     half = KMH * delta_v_half_widths(main, zero, found.time_zero_sd, instants, gravity)
@@ -172,7 +173,7 @@ def delta_v_chart(
             1e3 * np.r_[zero, instants],
             np.r_[0.0, np.maximum(low, 0.0) if axis == "resultant" else low],
             np.r_[0.0, middle + half[:, k]],
-            BLACK,
+            own,
             0.15,
             legend=k == 0,
         )
@@ -181,12 +182,12 @@ def delta_v_chart(
         ends = KMH * np.array([values[k] - halves[k], values[k] + halves[k]])
         at = np.array([1e3 * end])
         marks = [
-            Line("bar", np.repeat(at, 2), ends, BLACK, width=2.4, legend=False),
+            Line("bar", np.repeat(at, 2), ends, own, width=2.4, legend=False),
             Line(
                 f"end of the event, 95 % {of}",
                 at,
                 np.array([KMH * values[k]]),
-                BLACK,
+                own,
                 points=True,
                 symbol="circle",
                 size=8.0,
@@ -207,7 +208,7 @@ def delta_v_chart(
         _caption(bool(stated)),
         "time from the trigger, ms",
         tuple(panels),
-        marks=(Mark(1e3 * zero, "time zero"), Mark(1e3 * end, "end of the event")),
+        marks=event_marks([found], *span),
     )
 
 
@@ -225,15 +226,11 @@ def _add_course(
     lines: list[list[Line]],
     unit: UnitReconstruction,
     times: tuple[float, float, float],
-    number: int | None,
-    alone: bool,
+    name: str,
+    look: Mapping[str, str],
+    width: float,
 ) -> None:
     course = delta_v_course(unit.acceleration, *times)
-    look = unit_look(number, alone)
-    name = unit.name if number is not None or alone else "mean of the units"
-    if number is None and unit.at_point.prepared is not None:
-        name = unit.name
-    width = 2.2 if number is None else 1.3
     for k in range(len(AXES)):
         made = curve(
             name, 1e3 * course[:, 0], KMH * course[:, 1 + k], look["colour"], look["dash"], width

@@ -94,7 +94,7 @@ def pdof_dial(
     at = 2.0 * _TOP + 2.0
     out.circle((14.0, at), 3.6, None, fill=INK)
     name = shortened(point_name, 160.0, SMALL)
-    out.text((23.0, at), f"{name}; front up, angles from it", SMALL, _SOFT)
+    out.text((23.0, at), f"{name}; the front is up", SMALL, _SOFT)
     at += 26.0
     if not rows:
         out.text((14.0, at), "no event, no direction of force", 13.0, INK, bold=True)

@@ -12,7 +12,7 @@ from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof_interval import AngleInterval
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.report.chart import BLACK, look
+from strapdown.report.chart import BLACK, Mark, look
 
 Array = NDArray[np.float64]
 
@@ -20,8 +20,10 @@ __all__ = [
     "AROUND",
     "angle_words",
     "crash_span",
+    "event_marks",
     "interval_words",
     "main_event",
+    "marks_apart",
     "path_moments",
     "signed",
     "unit_look",
@@ -31,6 +33,8 @@ __all__ = [
 AROUND = (0.05, 0.10)
 # Of a record without an event, about the trigger.
 _NO_EVENT = (-0.1, 0.3)
+# Of what is drawn: closer labels would lie on each other.
+_CLOSE = 0.06
 # Told apart without colour, the mean's is solid.
 _DASHES = ("dash", "dashdot", "longdash", "dot")
 
@@ -95,6 +99,44 @@ def path_moments(path: CrashPath, events: Sequence[CrashEvent]) -> list[tuple[st
         else:
             out.append((name, at))
     return out
+
+
+def event_marks(
+    events: Sequence[CrashEvent], begin: float, end: float, scale: float = 1e3
+) -> tuple[Mark, ...]:
+    """Marks at time zero and at the end of each event, as `marks_apart`."""
+    named = [(e.time_zero, "time zero") for e in events] + [(e.end, "event end") for e in events]
+    return marks_apart(named, begin, end, scale)
+
+
+def marks_apart(
+    named: Sequence[tuple[float, str]], begin: float, end: float, scale: float = 1e3
+) -> tuple[Mark, ...]:
+    """Marks at instants, whose labels do not lie on each other.
+
+    Parameters
+    ----------
+    named : sequence of (float, str)
+        Instants in s; those outside are left out.
+    begin, end : float, s
+        Of what is drawn.
+    scale : float
+        Of the axis: 1000 where it is in ms.
+
+    Returns
+    -------
+    tuple of Mark
+        Of marks that stand close the last has all names.
+    """
+    out: list[Mark] = []
+    for at, name in sorted(named):
+        if not begin <= at <= end:
+            continue
+        if out and at - out[-1].x / scale < _CLOSE * (end - begin):
+            name = f"{out[-1].label}, {name}"
+            out[-1] = Mark(out[-1].x, "")
+        out.append(Mark(scale * at, name))
+    return tuple(out)
 
 
 def signed(value: float, digits: int) -> str:

@@ -23,10 +23,10 @@ from strapdown.report.chart import (
     Chart,
     Fill,
     Line,
-    Mark,
     Panel,
     curve,
 )
+from strapdown.report.crash_moments import marks_apart, path_moments
 from strapdown.tables import EULER, NED, VELOCITY
 
 Array = NDArray[np.float64]
@@ -226,23 +226,15 @@ def _chart(
     samples: PathSamples | None,
 ) -> Chart:
     path, events = when
-    marks = [Mark(1e3 * path.entry.time, "entry")]
-    for event in events:
-        for at, name in ((event.time_zero, "time zero"), (event.end, "end of the event")):
-            if path.time[0] <= at <= path.time[-1]:
-                marks.append(Mark(1e3 * at, name))
+    named = [(at, name) for name, at in path_moments(path, events) if name not in ("begin", "end")]
     said = " Shaded: 95 % by the linear covariance"
     if samples is not None:
         said += f"; dashed: the middle 95 % of {len(samples.errors)} runs of the Monte Carlo"
-    return Chart(slug, title, f"{caption}{said}.", _X, tuple(panels), marks=tuple(_apart(marks)))
-
-
-def _apart(marks: list[Mark]) -> list[Mark]:
-    """Marks that would lie on each other as one."""
-    out: list[Mark] = []
-    for mark in sorted(marks, key=lambda m: m.x):
-        if out and mark.x - out[-1].x < 5.0:
-            out[-1] = Mark(mark.x, f"{out[-1].label}, {mark.label}")
-        else:
-            out.append(mark)
-    return out
+    return Chart(
+        slug,
+        title,
+        f"{caption}{said}.",
+        _X,
+        tuple(panels),
+        marks=marks_apart(named, path.time[0], path.time[-1]),
+    )

@@ -21,11 +21,10 @@ from strapdown.report.chart import (
     Chart,
     Level,
     Line,
-    Mark,
     Panel,
     curve,
 )
-from strapdown.report.crash_moments import crash_span, unit_look
+from strapdown.report.crash_moments import crash_span, event_marks, marks_apart, unit_look
 from strapdown.report.recorded_lines import (
     BUCKETS,
     flags_in_vehicle_axes,
@@ -95,11 +94,7 @@ def unit_signals(
     rates = None
     if synchronised.lender is None and recorded.gyro is not None:
         rates = _rates(recorded.gyro, recorded, synchronised, unit, number, span)
-    marks = tuple(
-        mark
-        for e in events
-        for mark in (Mark(1e3 * e.time_zero, "time zero"), Mark(1e3 * e.end, "end of the event"))
-    )
+    marks = event_marks(events, *span)
     bands = tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events)
     crash = replace(crash, marks=marks, bands=bands)
     rates = None if rates is None else replace(rates, marks=marks, bands=bands)
@@ -248,6 +243,8 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"axes. Shaded: the event; {said}.",
         "time from the trigger, s",
         tuple(panels),
-        marks=tuple(Mark(e.time_zero, "time zero") for e in events),
+        marks=marks_apart(
+            [(e.time_zero, "time zero") for e in events], float(time[0]), float(time[-1]), 1.0
+        ),
         bands=tuple(bands),
     )

@@ -13,8 +13,8 @@ from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.unit_comparison import UnitComparison
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.dsp.channel_class import LEAST_RATE, cfc_filter
-from strapdown.report.chart import Band, Chart, Fill, Line, Mark, Panel, curve
-from strapdown.report.crash_moments import crash_span, unit_look
+from strapdown.report.chart import Band, Chart, Fill, Line, Panel, curve
+from strapdown.report.crash_moments import crash_span, event_marks, unit_look
 
 Array = NDArray[np.float64]
 
@@ -115,6 +115,6 @@ def accelerations_chart(
         f"off, {how}; 1 g = 9.80665 m/s². Shaded: the event.",
         _X,
         tuple(Panel(f"{axis}, g", tuple(rows[k]), height=0.9) for k, axis in enumerate(_AXES)),
-        marks=tuple(Mark(1e3 * e.time_zero, "time zero") for e in events),
+        marks=event_marks(events, *span),
         bands=tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events),
     )
