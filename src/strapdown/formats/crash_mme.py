@@ -166,10 +166,11 @@ def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
         found = [p for p in sorted(folder.iterdir()) if _NUMBERED.search(p.name) and p.is_file()]
         same = [p for p in found if p.stem.lower() == head.stem.lower()]
         stems = sorted({p.stem for p in found})
-        if not same and len(stems) > 1:
+        tests = {p.stem.lower() for p in head.parent.iterdir() if p.suffix.lower() == ".mme"}
+        if not same and (len(stems) > 1 or any(s.lower() in tests for s in stems)):
             shown = ", ".join(clean(s, 40) for s in stems[:6])
             raise DataError(
-                f"its channels are of several tests, and none has its name: {shown}",
+                f"the channels there are of other tests, and none has its name: {shown}",
                 file=head.name,
                 quantity="channels",
                 remedy="put each test into a folder of its own",

@@ -23,8 +23,19 @@ from strapdown.formats.recording import RawLog
 
 Array = NDArray[np.float64]
 
-__all__ = ["detect", "read", "record_of"]
+__all__ = ["detect", "detect_log", "read", "read_log_record", "record_of"]
 
+# Formats of attitude logs whose columns may be those of a crash.
+LOGS = (
+    "sensor-logger",
+    "phyphox",
+    "sensor-folder",
+    "npy-folder",
+    "npz",
+    "parquet",
+    "hdf5",
+    "matlab",
+)
 # Of a column of text so many fields must be numbers to be one with a fault in it.
 MOSTLY = 0.5
 # How even the steps of a column without a name must be, to be taken for a clock.
@@ -38,7 +49,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a text table, or another log that has columns.
+    """Read a text table.
 
     Parameters
     ----------
@@ -54,14 +65,44 @@ def read(path: Path) -> CrashRecord:
     DataError
         It is no table, or a damaged one.
     """
-    from strapdown.formats import READERS
-
-    general = {"mpu6050", "broad", "comma2k19", "sensorstream", "csv"}
-    for key, reader in READERS.items():
-        if key not in general and reader.detect(path):
-            return record_of(reader.read(path), path, key)
     raw, notes, title = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title)
+
+
+def detect_log(path: Path) -> bool:
+    """Tell whether it is a log of another format that has columns: .npz, .h5, of a phone."""
+    from strapdown.formats import READERS
+
+    return any(READERS[key].detect(path) for key in LOGS)
+
+
+def read_log_record(path: Path) -> CrashRecord:
+    """Read a log of another format.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    CrashRecord
+
+    Raises
+    ------
+    DataError
+        It is damaged, or of no such format.
+    """
+    from strapdown.formats import READERS
+
+    for key in LOGS:
+        if READERS[key].detect(path):
+            return record_of(READERS[key].read(path), path, "log")
+    raise DataError(
+        "it is of none of these formats",
+        file=path.name,
+        quantity="format",
+        remedy=f"give one of: {'; '.join(READERS[key].title for key in LOGS)}",
+    )
 
 
 def record_of(

@@ -14,7 +14,7 @@ from strapdown.exceptions import DataError
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.crash_text import LONGEST_NAME, clean
 from strapdown.formats.crash_units import factor_of, unit_of
-from strapdown.formats.mme_codes import DIMENSIONS, MmeCode, decode_mme
+from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
 from strapdown.formats.mme_text import MmeHeader, even_stamps, read_header, read_samples
 from strapdown.tables import SAMPLINGS
 
@@ -193,9 +193,9 @@ def _plain_number(header: MmeHeader, key: str) -> float | None:
 def _low_pass(file: MmeFile, cut_off: float | None) -> str:
     parts = []
     stated = file.header.text("channel frequency class")
-    if file.known:
+    if file.known and file.known.code[-1] != NO_CLASS:
         parts.append(file.known.filter)
-    elif stated:
+    elif stated and file.known is None:
         parts.append(stated if not stated.isdecimal() else f"CFC {stated}")
     if cut_off is not None and cut_off > 0.0:
         parts.append(f"{cut_off:g} Hz before the sampler")

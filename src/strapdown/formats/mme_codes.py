@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from strapdown.formats.mme_locations import BODY_PARTS, CRITERIA, OTHER_PLACES, VEHICLE_PARTS
 
-__all__ = ["DIMENSIONS", "FILTERS", "LENGTH", "MmeCode", "decode_mme"]
+__all__ = ["DIMENSIONS", "FILTERS", "LENGTH", "NO_CLASS", "MmeCode", "decode_mme"]
 
 LENGTH = 16
 OBJECTS = {
@@ -202,6 +202,8 @@ FILTERS: dict[str, str] = {
     "V": "from film or video",
     "X": "no filter class",
 }
+#: The letter of a channel that has no class.
+NO_CLASS = "X"
 # Parts that keep their place in a body that does not bend: what else there is moves of itself.
 _FIXED = (
     "VEHC APIL BPIL CPIL DPIL CRME SECM SILB TUNN ROOF ROFR FORA FRAM FOWE CEUN CTUN ABSE SERM "
