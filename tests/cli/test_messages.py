@@ -14,6 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_crash import CRASH_CALLS
+from bad_crash_records import RECORD_CALLS
 from bad_inputs import CASES
 from bad_navigation import CALLS
 
@@ -44,6 +45,13 @@ writes; LOW, HIGH and GYRO are the parts. `record` gives the same of another cra
 applies a function to the table of a part or of all, `after` cuts what is before an instant from
 the trigger, and `ENTRY` is 7.1 ± 0.2 m/s. Where a record can be used, the notes stand in
 `findings`.
+
+"""
+
+RECORDS = """## From Python: crash records
+
+Each record is a small file with one fault; its channels are asked for as a case asks for them, by
+`triad_of_channels`. Where the record can be used, the notes stand in `attrs["findings"]`.
 
 """
 
@@ -90,6 +98,10 @@ def _from_python() -> str:
         parts.append(
             f"### {case.title}\n\n```python\n{case.source}\n```\n\n```text\n{case.said}\n```\n\n"
         )
+    parts.append(RECORDS)
+    for record in RECORD_CALLS:
+        parts.append(f"### {record.title}\n\n```python\n{record.source}\n```\n\n")
+        parts.append(f"```text\n{record.said}\n```\n\n")
     return "".join(parts).rstrip("\n") + "\n"
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats import crash_json, crash_mme, crash_nhtsa, crash_table
+from strapdown.formats import crash_json, crash_log, crash_mme, crash_nhtsa, crash_table
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import clean
 
@@ -38,8 +38,8 @@ CRASH_READERS: dict[str, CrashReader] = {
     ),
     "log": CrashReader(
         "log with a column a channel: .npz .parquet .h5 .mat, of a phone",
-        crash_table.detect_log,
-        crash_table.read_log_record,
+        crash_log.detect,
+        crash_log.read,
     ),
     "csv": CrashReader(
         "text table with a column a channel: .csv .txt; also of a vehicle's event data recorder",

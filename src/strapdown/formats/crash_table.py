@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,20 +22,10 @@ from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
-__all__ = ["detect", "detect_log", "read", "read_log_record", "record_of"]
+__all__ = ["detect", "read", "record_of"]
 
-# Formats of attitude logs whose columns may be those of a crash.
-LOGS = (
-    "sensor-logger",
-    "phyphox",
-    "sensor-folder",
-    "npy-folder",
-    "npz",
-    "parquet",
-    "hdf5",
-    "matlab",
-)
 # Of a column of text so many fields must be numbers to be one with a fault in it.
 MOSTLY = 0.5
 # How even the steps of a column without a name must be, to be taken for a clock.
@@ -67,42 +57,6 @@ def read(path: Path) -> CrashRecord:
     """
     raw, notes, title = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title)
-
-
-def detect_log(path: Path) -> bool:
-    """Tell whether it is a log of another format that has columns: .npz, .h5, of a phone."""
-    from strapdown.formats import READERS
-
-    return any(READERS[key].detect(path) for key in LOGS)
-
-
-def read_log_record(path: Path) -> CrashRecord:
-    """Read a log of another format.
-
-    Parameters
-    ----------
-    path : Path
-
-    Returns
-    -------
-    CrashRecord
-
-    Raises
-    ------
-    DataError
-        It is damaged, or of no such format.
-    """
-    from strapdown.formats import READERS
-
-    for key in LOGS:
-        if READERS[key].detect(path):
-            return record_of(READERS[key].read(path), path, "log")
-    raise DataError(
-        "it is of none of these formats",
-        file=path.name,
-        quantity="format",
-        remedy=f"give one of: {'; '.join(READERS[key].title for key in LOGS)}",
-    )
 
 
 def record_of(
@@ -297,19 +251,40 @@ def _channel(
 def _samples(
     raw: RawLog, source: str, said: ChannelName, factor: float | None
 ) -> Callable[[], NDArray[Any]]:
-    column = Column(source, said.unit or None, "")
-
     def read() -> NDArray[Any]:
         if said.quantity == "time":
-            return ticks_of(raw, column)[0]
-        values = numbers(raw, column, said.quantity if said.quantity != "other" else source)
-        values = values.astype(np.float64)
+            return _ticks(raw, source)[0]
+        values = _numbers(raw, source).astype(np.float64)
         if said.quantity == "velocity" and not said.change and values.size:
             # Speed of the sensor, not a change: what it was at first is taken off.
             values = values - values[0]
         return values if factor is None else values * factor
 
     return read
+
+
+def _numbers(raw: RawLog, source: str) -> NDArray[Any]:
+    column = Column(source, None, "")
+    return _retold(lambda: numbers(raw, column, f"channel {source}"))
+
+
+def _ticks(raw: RawLog, source: str) -> tuple[NDArray[Any], bool]:
+    return _retold(lambda: ticks_of(raw, Column(source, None, "")))
+
+
+def _retold(read: Callable[[], T]) -> T:
+    """What readers of logs say, without the options of their command."""
+    try:
+        return read()
+    except DataError as error:
+        found = error.finding
+        raise DataError(
+            found.what,
+            file=found.file,
+            row=found.row,
+            quantity=found.quantity,
+            remedy="correct or delete that row, or name another channel",
+        ) from None
 
 
 def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
@@ -324,7 +299,7 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
                 quantity="time",
                 remedy='name it, as in time = "column 1", or state the rate: rate_hz = 1000',
             )
-        stamps, dated = ticks_of(raw, Column(clock, None, ""))
+        stamps, dated = _ticks(raw, clock)
         unit = "ns" if dated else stated
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]
 

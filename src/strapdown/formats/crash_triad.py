@@ -232,8 +232,9 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
         hole = int(endless[0]) if endless.size else 0
     elif there.size > 1:
         # Rows of other sensors lie between those of a slow one; a sample left out is a hole.
-        steps = np.diff(stamps[there])
-        holes = (np.diff(there) > 1) & (steps > HOLE * np.median(steps))
+        steps, rows = np.diff(stamps[there]), np.diff(there)
+        together = steps[rows == 1]
+        holes = (rows > 1) & (steps > HOLE * np.median(together if together.size else steps))
         if holes.any():
             hole = int(there[int(np.argmax(holes))]) + 1
     if hole < 0:

@@ -211,8 +211,9 @@ def test_damaged_headers(test_of, tmp_path):
     with pytest.raises(DataError, match="neither `key :value` nor a number") as error:
         test_of("Channel code :x\nno colon here\n1\n")
     assert error.value.finding.row == 2
-    with pytest.raises(DataError, match="'heavy' is no number"):
-        test_of(channel(), mme="Title :x\nMass test object 1 :heavy\n")
+    record = test_of(channel(), mme="Title :x\nMass test object 1 :heavy\n")
+    assert "left out: 'heavy' is no number" in record.findings[0].what
+    assert "mass_kg" not in record.facts
     (tmp_path / "T2.mme").write_text(MME)
     with pytest.raises(DataError, match=r"holds 2 tests: T1\.mme, T2\.mme"):
         read_crash_record(tmp_path)

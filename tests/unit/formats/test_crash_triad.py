@@ -140,6 +140,13 @@ def test_a_hole_is_named_by_its_row_and_a_slow_axis_is_none(read):
     assert error.value.finding.row == 11
 
 
+def test_a_hole_in_four_rows_is_one(read):
+    record = read("t [ms],ax [g]\n0,1\n1,1\n2,\n3,1\n")
+    with pytest.raises(DataError, match="not a finite number") as error:
+        triad_of_channels(record, {"x": "ax [g]"}, quantity="acceleration")
+    assert error.value.finding.row == 4
+
+
 def test_channels_with_stamps_of_their_own_are_put_beside_each_other():
     def channel(name, axis, time):
         stamps = np.asarray(time)
