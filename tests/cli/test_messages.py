@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_case import CASE_FILES, TEXT
 from bad_crash import CRASH_CALLS
+from bad_crash_records import RECORD_CALLS
 from bad_inputs import CASES
 from bad_navigation import CALLS
 
@@ -52,6 +53,13 @@ CASE_FILE = """## A crash case file
 
 Each message names the line of the key; where two keys contradict each other, the lines and values
 of both. Here the differences are from this file, whose records are beside it:
+
+"""
+
+RECORDS = """## From Python: crash records
+
+Each record is a small file with one fault; its channels are asked for as a case asks for them, by
+`triad_of_channels`. Where the record can be used, the notes stand in `attrs["findings"]`.
 
 """
 
@@ -103,6 +111,10 @@ def _from_python() -> str:
         parts.append(
             f"### {case.title}\n\n```python\n{case.source}\n```\n\n```text\n{case.said}\n```\n\n"
         )
+    parts.append(RECORDS)
+    for record in RECORD_CALLS:
+        parts.append(f"### {record.title}\n\n```python\n{record.source}\n```\n\n")
+        parts.append(f"```text\n{record.said}\n```\n\n")
     return "".join(parts).rstrip("\n") + "\n"
 
 

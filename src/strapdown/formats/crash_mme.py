@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
-from strapdown.formats.mme_channel import MmeFile, channel_of, is_bad, read_mme_file
+from strapdown.formats.mme_channel import channel_of, is_bad
+from strapdown.formats.mme_file import MmeFile, read_mme_file
 from strapdown.formats.mme_text import MmeHeader, read_header
 
 __all__ = ["detect", "read"]
@@ -72,12 +74,13 @@ def read(path: Path) -> CrashRecord:
     others = {
         f.code.upper(): (n, f) for n, f in reversed(list(zip(names, files, strict=True))) if f.code
     }
+    facts = _facts(header, findings)
     findings += [f for file in files for f in _told(file, listed)]
     return CrashRecord(
         path=path,
         format="mme",
         title=next((t for k in _TITLES if (t := header.text(k))), clean(head.stem)),
-        facts=_facts(header),
+        facts=facts,
         channels=tuple(channel_of(f, n, others) for n, f in zip(names, files, strict=True)),
         files=(head, *([index] if index else []), *(f.path for f in files)),
         findings=tuple(findings),
@@ -166,10 +169,11 @@ def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
         found = [p for p in sorted(folder.iterdir()) if _NUMBERED.search(p.name) and p.is_file()]
         same = [p for p in found if p.stem.lower() == head.stem.lower()]
         stems = sorted({p.stem for p in found})
-        if not same and len(stems) > 1:
+        tests = {p.stem.lower() for p in head.parent.iterdir() if p.suffix.lower() == ".mme"}
+        if not same and (len(stems) > 1 or any(s.lower() in tests for s in stems)):
             shown = ", ".join(clean(s, 40) for s in stems[:6])
             raise DataError(
-                f"its channels are of several tests, and none has its name: {shown}",
+                f"the channels there are of other tests, and none has its name: {shown}",
                 file=head.name,
                 quantity="channels",
                 remedy="put each test into a folder of its own",
@@ -190,7 +194,7 @@ def _objects(header: MmeHeader) -> int:
     return 1 if stated is None or stated < 1 else int(min(stated, 99))
 
 
-def _facts(header: MmeHeader) -> dict[str, str]:
+def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
     facts = {clean(key, LONGEST_NAME): header.text(key) for key in header.values}
     spoken = {
         "test": "laboratory test ref. number",
@@ -204,7 +208,13 @@ def _facts(header: MmeHeader) -> dict[str, str]:
             ("mass_kg", "mass test object 1"),
             ("speed_m_per_s", "velocity test object 1"),
         ):
-            if (value := header.number(key)) is not None:
+            try:
+                value = header.number(key)
+            except DataError as error:
+                # What the report could say of the vehicle is no reason to refuse its record.
+                findings.append(replace(error.finding, what=f"left out: {error.finding.what}"))
+                continue
+            if value is not None:
                 facts[name] = f"{value:.10g}"
         facts["vehicle"] = header.text("name of test object 1")
     return {k: v for k, v in facts.items() if v}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 __all__ = ["detect", "read", "record_of"]
 
@@ -38,7 +39,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a text table, or another log that has columns.
+    """Read a text table.
 
     Parameters
     ----------
@@ -54,12 +55,6 @@ def read(path: Path) -> CrashRecord:
     DataError
         It is no table, or a damaged one.
     """
-    from strapdown.formats import READERS
-
-    general = {"mpu6050", "broad", "comma2k19", "sensorstream", "csv"}
-    for key, reader in READERS.items():
-        if key not in general and reader.detect(path):
-            return record_of(reader.read(path), path, key)
     raw, notes, title = read_text_table(path)
     return record_of(raw, path, "csv", notes=notes, title=title)
 
@@ -256,19 +251,40 @@ def _channel(
 def _samples(
     raw: RawLog, source: str, said: ChannelName, factor: float | None
 ) -> Callable[[], NDArray[Any]]:
-    column = Column(source, said.unit or None, "")
-
     def read() -> NDArray[Any]:
         if said.quantity == "time":
-            return ticks_of(raw, column)[0]
-        values = numbers(raw, column, said.quantity if said.quantity != "other" else source)
-        values = values.astype(np.float64)
+            return _ticks(raw, source)[0]
+        values = _numbers(raw, source).astype(np.float64)
         if said.quantity == "velocity" and not said.change and values.size:
             # Speed of the sensor, not a change: what it was at first is taken off.
             values = values - values[0]
         return values if factor is None else values * factor
 
     return read
+
+
+def _numbers(raw: RawLog, source: str) -> NDArray[Any]:
+    column = Column(source, None, "")
+    return _retold(lambda: numbers(raw, column, f"channel {source}"))
+
+
+def _ticks(raw: RawLog, source: str) -> tuple[NDArray[Any], bool]:
+    return _retold(lambda: ticks_of(raw, Column(source, None, "")))
+
+
+def _retold(read: Callable[[], T]) -> T:
+    """What readers of logs say, without the options of their command."""
+    try:
+        return read()
+    except DataError as error:
+        found = error.finding
+        raise DataError(
+            found.what,
+            file=found.file,
+            row=found.row,
+            quantity=found.quantity,
+            remedy="correct or delete that row, or name another channel",
+        ) from None
 
 
 def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
@@ -283,7 +299,7 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
                 quantity="time",
                 remedy='name it, as in time = "column 1", or state the rate: rate_hz = 1000',
             )
-        stamps, dated = ticks_of(raw, Column(clock, None, ""))
+        stamps, dated = _ticks(raw, clock)
         unit = "ns" if dated else stated
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]
 

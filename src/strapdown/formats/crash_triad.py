@@ -218,6 +218,13 @@ def _as_mean(
 
 
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
+    if not values.size:
+        raise DataError(
+            "it has no samples",
+            file=channel.file or None,
+            quantity=f"channel {channel.name}",
+            remedy="get the record again, or leave the channel out",
+        )
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
     hole = -1
@@ -225,8 +232,9 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
         hole = int(endless[0]) if endless.size else 0
     elif there.size > 1:
         # Rows of other sensors lie between those of a slow one; a sample left out is a hole.
-        steps = np.diff(stamps[there])
-        holes = (np.diff(there) > 1) & (steps > HOLE * np.median(steps))
+        steps, rows = np.diff(stamps[there]), np.diff(there)
+        together = steps[rows == 1]
+        holes = (rows > 1) & (steps > HOLE * np.median(together if together.size else steps))
         if holes.any():
             hole = int(there[int(np.argmax(holes))]) + 1
     if hole < 0:

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.crash_text import LONGEST_NAME, clean
 from strapdown.formats.crash_units import factor_of, unit_of
-from strapdown.formats.mme_codes import DIMENSIONS, MmeCode, decode_mme
-from strapdown.formats.mme_text import MmeHeader, even_stamps, read_header, read_samples
+from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS
+from strapdown.formats.mme_file import MmeFile, clock_of, stamps_of
+from strapdown.formats.mme_text import MmeHeader, read_samples
 from strapdown.tables import SAMPLINGS
 
 Array = NDArray[np.float64]
 
-__all__ = ["MmeFile", "channel_of", "read_mme_file"]
+__all__ = ["channel_of", "is_bad"]
 
 #: What the writer of this package says in comments, and no field of the standard does.
 SAMPLING_NOTE = "sampling "
@@ -40,51 +38,6 @@ _REMARKS = (
     "laboratory channel code",
     "customer channel code",
 )
-
-
-@dataclass(frozen=True, eq=False)
-class MmeFile:
-    """One channel file.
-
-    Attributes
-    ----------
-    path : Path
-    header : MmeHeader
-    code : str
-        As it stands there, or in the index; empty where neither has one.
-    known : MmeCode or None
-        The code in words, where it is one.
-    """
-
-    path: Path
-    header: MmeHeader
-    code: str
-    known: MmeCode | None
-
-
-def read_mme_file(path: Path, indexed: str, objects: int) -> MmeFile:
-    """Read the header of a channel file.
-
-    Parameters
-    ----------
-    path : Path
-    indexed : str
-        Code that the index has of it; empty where it is not there.
-    objects : int
-        Test objects of the test.
-
-    Returns
-    -------
-    MmeFile
-
-    Raises
-    ------
-    DataError
-        As `read_header`.
-    """
-    header = read_header(path)
-    code = header.text("channel code") or indexed
-    return MmeFile(path, header, clean(code, LONGEST_NAME), decode_mme(code, objects=objects))
 
 
 def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile]]) -> CrashChannel:
@@ -113,8 +66,8 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
     quantity, unit, factor, against = _unit(file, text)
     notes = header.all("comments")
     change = CHANGE_NOTE in notes
-    clock = _clock(file, others)
-    read_stamps = _stamps(file, clock, others)
+    clock = clock_of(file, others)
+    read_stamps = stamps_of(file, clock, others)
 
     def samples() -> Array:
         values = read_samples(file.path, header, f"channel {name}")
@@ -193,9 +146,9 @@ def _plain_number(header: MmeHeader, key: str) -> float | None:
 def _low_pass(file: MmeFile, cut_off: float | None) -> str:
     parts = []
     stated = file.header.text("channel frequency class")
-    if file.known:
+    if file.known and file.known.code[-1] != NO_CLASS:
         parts.append(file.known.filter)
-    elif stated:
+    elif stated and file.known is None:
         parts.append(stated if not stated.isdecimal() else f"CFC {stated}")
     if cut_off is not None and cut_off > 0.0:
         parts.append(f"{cut_off:g} Hz before the sampler")
@@ -233,87 +186,3 @@ def is_bad(file: MmeFile) -> bool:
     """Whether the laboratory gives another status than a good one."""
     status = file.header.text("data status").lower()
     return bool(status) and status not in _GOOD
-
-
-def _clock(file: MmeFile, others: Mapping[str, tuple[str, MmeFile]]) -> str:
-    """Code of the channel that holds its stamps; empty where they are even."""
-    kind = file.header.text("reference channel").lower()
-    named = file.header.text("reference channel name")
-    if kind == "implicit" or (not kind and not named) or file.code[2:6].upper() == "TIRS":
-        return ""
-    if not kind and file.header.text("sampling interval"):
-        return ""
-    code = named.split("/")[0].strip()
-    if code.upper() not in others:
-        raise DataError(
-            f"its stamps are those of channel '{code}', which the test does not have"
-            if code
-            else "its stamps are those of another channel, which is not named",
-            file=file.path.name,
-            row=file.header.line("reference channel name") or file.header.line("reference channel"),
-            quantity="reference channel name",
-            remedy="add that channel from the laboratory, or state an even sampling: "
-            "`Reference channel :implicit` with `Time of first sample` and `Sampling interval`",
-        )
-    return code
-
-
-def _stamps(
-    file: MmeFile, clock: str, others: Mapping[str, tuple[str, MmeFile]]
-) -> Callable[[int], Array]:
-    header = file.header
-    if clock:
-        held = others[clock.upper()][1]
-
-        def recorded(count: int) -> Array:
-            text = held.header.text("unit")
-            unit = unit_of(text) if text else ("time", "s")
-            if unit is None or unit[0] != "time":
-                raise DataError(
-                    f"it holds stamps, and its unit is '{text[:40]}'",
-                    file=held.path.name,
-                    row=held.header.line("unit"),
-                    quantity="unit",
-                    remedy="write s or ms",
-                )
-            stamps = read_samples(held.path, held.header, f"channel {clock}")
-            if stamps.size != count:
-                raise DataError(
-                    f"it has {count} samples, and its stamps, in {held.path.name}, are "
-                    f"{stamps.size}",
-                    file=file.path.name,
-                    quantity="number of samples",
-                    remedy="get both files of the test again",
-                )
-            bad = np.flatnonzero(~(np.diff(stamps) > 0.0))
-            if bad.size or not np.isfinite(stamps[:1]).all():
-                k = int(bad[0]) + 1 if bad.size else 0
-                raise DataError(
-                    f"time goes from {stamps[k - 1]:.9g} to {stamps[k]:.9g}",
-                    file=held.path.name,
-                    row=held.header.end + k + 1,
-                    quantity="time",
-                    remedy="correct the stamps, or get the file of the test again",
-                )
-            return stamps * TIME_UNITS[unit[1]]
-
-        return recorded
-
-    def even(count: int) -> Array:
-        interval = header.number("sampling interval")
-        if interval is None or not interval > 0.0:
-            raise DataError(
-                "its sampling interval is not stated"
-                if interval is None
-                else f"a sampling interval of {interval:g} s is none",
-                file=file.path.name,
-                row=header.line("sampling interval"),
-                quantity="sampling interval",
-                remedy="write it in the header, in s; or state rate_hz = 10000",
-            )
-        first = "0"
-        if header.number("time of first sample") is not None:
-            first = header.text("time of first sample").split()[0]
-        return even_stamps(first, header.text("sampling interval").split()[0], count)
-
-    return even

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from strapdown.formats.mme_fine_locations import FINE, FINE_1, FINE_2, FINE_3
 from strapdown.formats.mme_locations import BODY_PARTS, CRITERIA, OTHER_PLACES, VEHICLE_PARTS
 
-__all__ = ["DIMENSIONS", "FILTERS", "LENGTH", "MmeCode", "decode_mme"]
+__all__ = ["DIMENSIONS", "FILTERS", "LENGTH", "NO_CLASS", "MmeCode", "decode_mme"]
 
 LENGTH = 16
 OBJECTS = {
@@ -42,100 +43,6 @@ POSITIONS = {
     "8": "third row middle",
     "9": "third row right",
     **{letter: f"seat {letter}" for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
-}
-# Those that stand in any of the fine locations with one meaning.
-_FINE = {
-    "00": "",
-    "BO": "bottom",
-    "FR": "front",
-    "IN": "inner",
-    "LE": "left",
-    "LO": "lower",
-    "MI": "middle",
-    "OU": "outer",
-    "RE": "rear",
-    "RI": "right",
-    "TP": "top",
-    "UP": "upper",
-    "CG": "centre of gravity",
-    "CX": "centre in x",
-    "CY": "centre in y",
-    "CZ": "centre in z",
-    "PR": "before the test",
-    "RD": "redundant",
-    **{f"{k:02d}": f"no. {k}" for k in range(1, 100)},
-}
-_FINE_1 = {
-    "AV": "mean",
-    "SU": "sum",
-    "LL": "left lower",
-    "LR": "left and right",
-    "LU": "left upper",
-    "RL": "right lower",
-    "RU": "right upper",
-    "LA": "left anterior",
-    "LM": "left middle",
-    "LP": "left posterior",
-    "RA": "right anterior",
-    "RM": "right middle",
-    "RP": "right posterior",
-    "CS": "crash sensor",
-    "IS": "impact sound sensor",
-    "OR": "origin",
-    "AD": "adult",
-    "CH": "child",
-    "IP": "in position",
-    "OP": "out of position",
-}
-_FINE_2 = {
-    "AV": "mean",
-    "SU": "sum",
-    "DI": "difference",
-    "NE": "negative",
-    "PO": "positive",
-    "SF": "scale factor",
-    "L1": "left redundant",
-    "L2": "lower redundant",
-    "M1": "middle redundant",
-    "R1": "right redundant",
-    "U1": "upper redundant",
-    "HS": "high-speed sampling",
-    "RW": "raw data",
-    "OR": "origin",
-    "3C": "3 ms value, cumulative",
-    "3S": "3 ms value, single peak",
-}
-_FINE_3 = {
-    "PO": "after the test",
-    "BR": "BioRID",
-    "BS": "BioSID",
-    "E1": "EuroSID-1",
-    "E2": "ES-2",
-    "ER": "ES-2 with rib extension",
-    "H2": "Hybrid II, mid-sized male",
-    "H3": "Hybrid III, mid-sized male",
-    "HF": "Hybrid III, small female",
-    "HM": "Hybrid III, large male",
-    "Q0": "Q0 dummy",
-    "Q1": "Q1 dummy",
-    "Q2": "Q1.5 dummy",
-    "Q3": "Q3 dummy",
-    "Q4": "Q3 dummy for side impact",
-    "Q6": "Q6 dummy",
-    "QA": "Q10 dummy",
-    "QB": "Q10 dummy (Euro NCAP)",
-    "S2": "SID-IIs",
-    "SH": "SID-H3",
-    "SI": "SID",
-    "TF": "THOR, small female",
-    "TH": "THOR",
-    "TM": "THOR, large male",
-    "T3": "THOR with Hybrid III legs",
-    "WF": "WorldSID, small female",
-    "WS": "WorldSID",
-    "Y6": "Hybrid III, 3 years",
-    "Y7": "Hybrid III, 6 years",
-    "YA": "Hybrid III, 10 years",
 }
 #: Physical dimension: its words, and what it is as a quantity of a crash record.
 DIMENSIONS: dict[str, tuple[str, str]] = {
@@ -202,6 +109,8 @@ FILTERS: dict[str, str] = {
     "V": "from film or video",
     "X": "no filter class",
 }
+#: The letter of a channel that has no class.
+NO_CLASS = "X"
 # Parts that keep their place in a body that does not bend: what else there is moves of itself.
 _FIXED = (
     "VEHC APIL BPIL CPIL DPIL CRME SECM SILB TUNN ROOF ROFR FORA FRAM FOWE CEUN CTUN ABSE SERM "
@@ -287,8 +196,8 @@ def decode_mme(code: str, *, objects: int = 1) -> MmeCode | None:
     else:
         location = words("main location", main, BODY_PARTS, VEHICLE_PARTS, CRITERIA, OTHER_PLACES)
     fine = tuple(
-        words(f"fine location {k}", text[4 + 2 * k : 6 + 2 * k], _FINE, own)
-        for k, own in ((1, _FINE_1), (2, _FINE_2), (3, _FINE_3))
+        words(f"fine location {k}", text[4 + 2 * k : 6 + 2 * k], FINE, own)
+        for k, own in ((1, FINE_1), (2, FINE_2), (3, FINE_3))
     )
     dimension, quantity = DIMENSIONS.get(text[12:14], ("", "other"))
     if not dimension:

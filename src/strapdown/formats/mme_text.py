@@ -138,11 +138,12 @@ def read_header(path: Path) -> MmeHeader:
     end = 0
     for row, line in enumerate(_lines(text_of(path, LONGEST_HEADER)), start=1):
         text = line.strip()
-        if text and is_sample(text):
-            break
-        end = row
         if not text:
             continue
+        if is_sample(text):
+            end = row - 1
+            break
+        end = row
         match = _KEY.fullmatch(text)
         if match is None:
             raise DataError(
@@ -208,6 +209,14 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
             row=header.end + (len(lines) if cut else int(promised) + 1),
             quantity=quantity,
             remedy="the file is cut: get it again" if cut else "get the file of the test again",
+        )
+    if not lines:
+        raise DataError(
+            "a header, and no samples under it",
+            file=path.name,
+            row=header.end,
+            quantity=quantity,
+            remedy="the file is cut: get it again",
         )
     if not _UNUSUAL.search("\n".join(lines)):
         # Most files have points alone and nothing missing.

@@ -22,7 +22,7 @@ from strapdown.formats.mme_channel import (
     FILTER_NOTE,
     SAMPLING_NOTE,
 )
-from strapdown.formats.mme_codes import FILTERS, LENGTH, decode_mme
+from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
 from strapdown.formats.mme_text import even_stamps
 
 Array = NDArray[np.float64]
@@ -155,7 +155,7 @@ def _object_and_place(channel: CrashChannel) -> str:
 def _ending(channel: CrashChannel) -> str:
     letters = {words: letter for letter, words in FILTERS.items()}
     direction = _DIRECTIONS.get(channel.axis, "0")
-    return _DIMENSIONS[channel.quantity] + direction + letters.get(channel.low_pass, "X")
+    return _DIMENSIONS[channel.quantity] + direction + letters.get(channel.low_pass, NO_CLASS)
 
 
 def _check(channel: CrashChannel, time: Array, values: Array) -> None:

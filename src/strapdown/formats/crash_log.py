@@ -1,0 +1,59 @@
+"""Logs of attitude formats as crash records: arrays, phones, MATLAB, HDF5."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from strapdown.exceptions import DataError
+from strapdown.formats.crash_record import CrashRecord
+from strapdown.formats.crash_table import record_of
+
+__all__ = ["detect", "read"]
+
+# Formats of attitude logs whose columns may be those of a crash.
+LOGS = (
+    "sensor-logger",
+    "phyphox",
+    "sensor-folder",
+    "npy-folder",
+    "npz",
+    "parquet",
+    "hdf5",
+    "matlab",
+)
+
+
+def detect(path: Path) -> bool:
+    """Tell whether it is a log of another format that has columns: .npz, .h5, of a phone."""
+    from strapdown.formats import READERS
+
+    return any(READERS[key].detect(path) for key in LOGS)
+
+
+def read(path: Path) -> CrashRecord:
+    """Read a log of another format.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    CrashRecord
+
+    Raises
+    ------
+    DataError
+        It is damaged, or of no such format.
+    """
+    from strapdown.formats import READERS
+
+    for key in LOGS:
+        if READERS[key].detect(path):
+            return record_of(READERS[key].read(path), path, "log")
+    raise DataError(
+        "it is of none of these formats",
+        file=path.name,
+        quantity="format",
+        remedy=f"give one of: {'; '.join(READERS[key].title for key in LOGS)}",
+    )
