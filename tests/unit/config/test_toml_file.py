@@ -54,7 +54,7 @@ def test_a_list_that_does_not_end_is_named_at_the_end_of_the_file(tmp_path):
         ("[t]\na = 1\n[u]\n[t]\n", "line 4, t: it is written twice: in line 1 too"),
         ("[t]\n[[t]]\n", "line 2, t: it is written twice: in line 1 too"),
         ("[[t]]\n[t]\n", "line 2, t: it is written twice: in line 1 too"),
-        ("a = { b = 1 }\n[u]\nc = { d = 1, d = 2 }", "line 3, c, d: it is written twice"),
+        ("a = { b = 1 }\n[u]\nc = { d = 1, d = 2 }", "line 3, u, c, d: it is written twice"),
         ("[[u]]\nname = 1\n\nname = 2\n", "line 4, u 1, name: it is written twice: in line 2"),
     ],
 )
