@@ -140,7 +140,7 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
     if number is not None:
         # What stands twice is known only once all of the line is read.
         twice = _twice("\n".join(rows[:number]), number)
-        if what.startswith("Cannot") and twice:
+        if what.startswith(("Cannot", "Duplicate")) and twice:
             key, first = twice
             return ConfigError(
                 f"it is written twice: in line {first} too",
