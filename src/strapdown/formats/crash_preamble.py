@@ -104,10 +104,12 @@ def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:
         for at, line in enumerate(lines[:HIGHEST_HEADER])
         if line.strip() and not csv.is_comment(line)
     ]
-    # Rows of numbers alone; of a table that has a column of text, too, rows that are mostly numbers.
-    for share in (1.0, 0.5):
+    # Rows of numbers alone; of a table that has a column of text, rows that are mostly numbers.
+    for whole in (True, False):
         for k, (_, fields) in enumerate(said):
-            if any(fields) and sum(map(csv.is_data, fields)) >= share * len(fields):
+            there = [f for f in fields if f]
+            numbers = sum(map(csv.is_data, there))
+            if numbers and (numbers == len(there) if whole else 2 * numbers >= len(fields)):
                 return _above(said[:k], len(fields))
     return None, None, []
 
