@@ -99,15 +99,18 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
 
 def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:
     """Where the header and the units stand, and the units; None where the first line is it."""
-    said: list[tuple[int, list[str]]] = []
-    for at, line in enumerate(lines[:HIGHEST_HEADER]):
-        if not line.strip() or csv.is_comment(line):
-            continue
-        separator = csv.separator_of(line)
-        fields = csv.fields_of(line, separator)
-        if all(csv.is_data(f) for f in fields) and any(fields):
-            return _above(said, len(fields))
-        said.append((at, fields))
+    said = [
+        (at, csv.fields_of(line, csv.separator_of(line)))
+        for at, line in enumerate(lines[:HIGHEST_HEADER])
+        if line.strip() and not csv.is_comment(line)
+    ]
+    # Rows of numbers alone; of a table that has a column of text, rows that are mostly numbers.
+    for whole in (True, False):
+        for k, (_, fields) in enumerate(said):
+            there = [f for f in fields if f]
+            numbers = sum(map(csv.is_data, there))
+            if numbers and (numbers == len(there) if whole else 2 * numbers >= len(fields)):
+                return _above(said[:k], len(fields))
     return None, None, []
 
 

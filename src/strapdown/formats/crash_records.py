@@ -83,7 +83,8 @@ def read_crash_record(
             remedy=nearest(format, CRASH_READERS),
         )
     try:
-        return _read(file, format)
+        # Messages name a record by the last part of its path, which "." does not have.
+        return _read(file if file.name not in ("", "..") else file.resolve(), format)
     except (OSError, ValueError) as error:
         # A name that no file can have, a file that may not be read, a link that leads in a ring.
         raise DataError(

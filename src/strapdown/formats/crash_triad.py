@@ -212,6 +212,7 @@ def _as_mean(
             + (", the first from time zero" if from_zero else ""),
             file=channel.file or None,
             quantity=f"channel {channel.name}",
+            remedy="if it holds the change of each sample alone, add them up first",
         )
     )
     return mean_accelerations_of(stamps, values, from_zero=from_zero)

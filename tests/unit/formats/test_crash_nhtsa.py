@@ -41,6 +41,11 @@ def test_a_folder_and_its_header_are_one_test(folder):
     assert any("1 of 3 listed channels" in f.what for f in record.findings)
 
 
+def test_the_folder_in_which_one_stands_has_its_name(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    assert read_crash_record(".").path.name == folder.name
+
+
 def test_channels_say_what_the_header_says(folder):
     one, other = read_crash_record(folder).channels
     assert (one.quantity, one.axis, one.unit, one.place) == (

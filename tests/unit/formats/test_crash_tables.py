@@ -108,6 +108,11 @@ def test_a_title_above_the_header_and_a_row_of_units(read):
     assert record.channel("Acc X").row(0) == 5
 
 
+def test_a_title_above_a_table_with_a_column_of_text(read):
+    record = read("sep=,\nA title\nt [s],ax [g],state\n0,1,ok\n1,2,ok\n")
+    np.testing.assert_allclose(record.channel("ax [g]").load()[1], [9.80665, 19.6133])
+
+
 def test_a_table_without_a_header(read):
     rows = "".join(f"{k * 1e-3:.3f},{k},{-k}\n" for k in range(10))
     record = read(rows)
