@@ -149,6 +149,16 @@ def test_the_mean_of_the_units_is_better_than_each(crash):
     assert -change.vector[0] == pytest.approx(known, abs=0.1)
 
 
+def test_what_rings_against_one_another_is_not_drawn_to_the_less(units):
+    # Left and right swing by tens of g against one another. Weighed sample by sample, the scale
+    # factor would count whichever reads less, and their mean would come to 18.1 m/s.
+    found = reconstruct(units[:2], 1000.0, "mean")
+    lost = [-delta_v(u.acceleration, 0.0, 0.115).vector[0] for u in found.answers]
+    assert min(lost[:2]) <= lost[2] <= max(lost[:2])
+    crush = [u.path.table["north"].max() for u in found.answers]
+    assert min(crush[:2]) <= crush[2] <= max(crush[:2])
+
+
 def test_they_are_compared_forward_and_down_alone(crash):
     for pair in crash.comparison.pairs:
         assert np.isnan(pair.difference[:, 1]).all()

@@ -27,6 +27,8 @@ __all__ = ["COMBINATIONS", "combine_units"]
 COMBINATIONS = ("weighted", "median")
 # Near the impact: rates are weighed by how well they tell the turn over it.
 TURN_WINDOW = (-0.1, 0.75)
+# What swings faster than this is ringing, by which units differ.
+RINGING = 0.05  # s
 # Of squared cosines.
 ROUNDING = 1e-9
 
@@ -62,7 +64,8 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
     Notes
     -----
     Weights follow from what each unit states for itself, and any that sum to one are right; those
-    of units that share unknowns are not the best. Samples of a combination are taken for
+    of units that share unknowns are not the best. Where something is assumed of a unit, each axis
+    is weighed by itself, by what is measured of it. Samples of a combination are taken for
     independent, though what the noise of the gyros does through a lever arm is not: this states
     more than there is.
     """
@@ -233,10 +236,13 @@ def _without_own_tilt(unit: AtPoint) -> SampleEffects:
 
 def _inverse_weights(units: Sequence[AtPoint]) -> Array:
     information: list[Array] = []
+    by_axis = _by_axis(units)
     for u in units:
         effects = u.effects
         covariance = np.einsum("pni,pnj->nij", effects.force, effects.force, optimize=True)
         covariance += effects.force_noise[:, :, None] ** 2 * np.eye(3)
+        if by_axis:
+            covariance = _over_the_pulse(covariance, u.time) * np.eye(3)
         information.append(_of_measured(floored(covariance), u.unmeasured))
     by_none = _by_none([u.unmeasured for u in units])
     if by_none is not None:
@@ -245,6 +251,30 @@ def _inverse_weights(units: Sequence[AtPoint]) -> Array:
         information = [i + size * by_none for i in information]
     total = np.linalg.inv(np.sum(information, axis=0))
     return np.array([total @ i for i in information])
+
+
+def _by_axis(units: Sequence[AtPoint]) -> bool:
+    """Whether each axis is weighed by itself.
+
+    An assumed turn through the arms makes errors of the axes hang together, and whole matrices
+    would draw on one axis for another: what rings downward would come forward. Where a missing
+    axis is none of the vehicle's, it cannot be had by axis.
+    """
+    missing = [u.unmeasured for u in units if u.unmeasured is not None]
+    aligned = all(np.abs(p - np.diag(np.diagonal(p))).max() < ROUNDING for p in missing)
+    return aligned and any(u.assumed_axes for u in units)
+
+
+def _over_the_pulse(covariance: Array, time: Array) -> Array:
+    """Means over 50 ms: a scale factor is wrong by more where a unit reads more.
+
+    Sample by sample the one that reads less would always count for more, and where two ring
+    against one another the mean would be less than either.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    width = max(1, round(RINGING / float(np.median(np.diff(time)))))
+    return np.asarray(uniform_filter1d(covariance, width, axis=0, mode="nearest"))
 
 
 def _of_measured(covariance: Array, unmeasured: Array | None) -> Array:
