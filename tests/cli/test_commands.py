@@ -169,6 +169,9 @@ def test_the_demo_runs_without_any_recording(here, run_cli, monkeypatch):
     assert found.code == 0
     assert "set STRAPDOWN_DATA" in found.out
     assert (here / "demo" / "alexiev-fig4" / "report.html").is_file()
+    assert (here / "demo" / "crash-pole" / "report.html").is_file()
+    # -7.203 m/s are -25.9 km/h.
+    assert re.search(r"Delta-V 2[56]\.\d+ ± 0\.\d+ km/h; direction of force", found.out)
 
 
 def test_python_m_strapdown_and_a_closed_pipe(tmp_path):

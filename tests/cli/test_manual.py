@@ -35,6 +35,13 @@ def runner():
     return module
 
 
+@pytest.mark.slow
+def test_the_tutorial_for_investigators(capsys, monkeypatch):
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    page = ROOT / "docs" / "crash_tutorial.md"
+    assert runner().check(page, write=False) == 0, capsys.readouterr().out
+
+
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.md"))
 
 

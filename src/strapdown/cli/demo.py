@@ -16,13 +16,15 @@ def demo(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the results go.")] = Path("demo"),
     force: Annotated[bool, typer.Option("--force", help="Replace results that are there.")] = False,
 ) -> None:
-    """Show the main job: a scenario with exact truth, and a real recording where there is one.
+    """Show the main jobs: a scenario with exact truth, a crash, and a real recording.
 
     The recording is looked for in the folder that STRAPDOWN_DATA names, by default
     ../shared/data.
     """
     from strapdown.cli.attitude import attitude
     from strapdown.cli.console import console
+    from strapdown.cli.crash import crash
+    from strapdown.cli.simulate import simulate
 
     page = console()
     page.print(
@@ -30,6 +32,14 @@ def demo(
         style="italic",
     )
     attitude(["alexiev-fig4"], rate=100.0, out=out / "alexiev-fig4", force=force)
+    page.print(
+        "\nA car against a pole, as two cheap recorders have it: their records, and the report.\n",
+        style="italic",
+    )
+    records = out / "crash-pole-records"
+    simulate("pole", out=records, force=force, quiet=True)
+    crash(records / "case.toml", out=out / "crash-pole", force=force)
+    page.print(f"The records and the truth are in {records}.")
     data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data")) / _TURNS
     turn = data / "rotate-360ccw-around-z-pointing-up"
     if not turn.is_dir():

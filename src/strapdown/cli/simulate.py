@@ -34,7 +34,9 @@ def simulate(
     formats: Annotated[
         str | None,
         typer.Option(
-            "--format", metavar="F", help="csv, npz, h5, mat (joined by commas), or all (csv)."
+            "--format",
+            metavar="F",
+            help="csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.",
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(help="Of the errors (0).")] = None,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,18 @@ from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.formats.recorder_csv import write_path_csv, write_recorder_csv
-from strapdown.report.simulated_case_file import case_text, part_file
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
+from strapdown.formats.mme_writer import write_mme
+from strapdown.formats.recorder_csv import (
+    ACCEL_HEADINGS,
+    GYRO_HEADINGS,
+    TIME,
+    write_path_csv,
+    write_recorder_csv,
+)
+from strapdown.report.simulated_case_file import PartPlace, case_text, part_file, part_name
 from strapdown.report.stated_errors import stated_errors
-from strapdown.sensors.crash_unit import Mounting
+from strapdown.sensors.crash_unit import Mounting, RecordedTriad
 from strapdown.simulation.case_recording import (
     AFTER,
     RecordedCase,
@@ -24,10 +33,10 @@ from strapdown.simulation.case_recording import (
 )
 from strapdown.simulation.crash_cases import find_case
 from strapdown.systems.crash_trials.exact_answers import ExactAnswers
+from strapdown.tables import ACCEL, GYRO
 
 __all__ = ["write_crash_simulation"]
 
-FORMATS = ("csv",)
 # Over which 49 CFR 563 looks for the change of an event; the pulses of all crashes here are over.
 SPAN = 0.15  # s
 
@@ -46,11 +55,11 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
     Returns
     -------
     Seal
-        The folder holds one text table a part of each recorder (``imu1_low_g.csv``), on its own
-        clock; ``cameras.csv``, the path of the reference point that two cameras saw, and
-        ``truth.csv``, the exact one with velocity and attitude, both by time from the trigger;
-        ``case.toml``, which `strapdown crash` reads; and ``scenario.json`` with the exact
-        answers and every error that was drawn.
+        The folder holds one text table a part of each recorder (``imu1_low_g.csv``), or one test
+        in ISO MME a recorder (``imu1/imu1.mme``), on its own clock; ``cameras.csv``, the path of
+        the reference point that two cameras saw, and ``truth.csv``, the exact one with velocity
+        and attitude, both by time from the trigger; ``case.toml``, which `strapdown crash` reads;
+        and ``scenario.json`` with the exact answers and every error that was drawn.
 
     Raises
     ------
@@ -59,13 +68,7 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
         with, or `out` may not be written.
     """
     check_destination(out, force)
-    for name in spec.formats:
-        if name not in FORMATS:
-            raise ConfigError(
-                f"there is no writer of crash records for '{name}'",
-                quantity="--format",
-                remedy=nearest(name, FORMATS),
-            )
+    formats = _formats(spec)
     case = find_case(spec.name)
     recorded = record_case(
         case, spec.units, rate=spec.rate_hz, sampling=spec.sampling, seed=spec.seed
@@ -78,11 +81,14 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
         force=force,
         seals=seals,
     ) as folder:
-        for unit in recorded.units:
-            _write_parts(folder, unit)
+        places: dict[str, PartPlace] = {}
+        # The case reads what was named first.
+        for name in reversed(formats):
+            for unit in recorded.units:
+                places |= RECORD_WRITERS[name](folder, unit)
         write_path_csv(folder / "cameras.csv", recorded.camera_path)
         write_path_csv(folder / "truth.csv", recorded.truth)
-        text = case_text(recorded, spec.seed)
+        text = case_text(recorded, places, spec.seed)
         (folder / "case.toml").write_text(text, encoding="utf-8", newline="\n")
         (folder / "scenario.json").write_text(
             to_json(_description(spec, recorded)), encoding="utf-8", newline="\n"
@@ -90,11 +96,78 @@ def write_crash_simulation(spec: CrashSimulationSpec, out: Path, *, force: bool 
     return seals[0]
 
 
-def _write_parts(folder: Path, of: RecordedUnit) -> None:
-    for k, triad in enumerate(of.unit.accelerometers):
-        write_recorder_csv(folder / f"{part_file(of, k)}.csv", triad.table)
-    if of.unit.gyro is not None:
-        write_recorder_csv(folder / f"{part_file(of, None)}.csv", of.unit.gyro.table)
+def _formats(spec: CrashSimulationSpec) -> tuple[str, ...]:
+    for name in spec.formats:
+        if name not in (*RECORD_WRITERS, "all"):
+            raise ConfigError(
+                f"there is no writer of crash records for '{name}'",
+                quantity="--format",
+                remedy=nearest(name, [*RECORD_WRITERS, "all"]),
+            )
+    return tuple(RECORD_WRITERS) if "all" in spec.formats else tuple(dict.fromkeys(spec.formats))
+
+
+def _parts(of: RecordedUnit) -> list[tuple[int | None, RecordedTriad]]:
+    """Accelerometers by their numbers, and the gyro (None)."""
+    parts: list[tuple[int | None, RecordedTriad]] = list(enumerate(of.unit.accelerometers))
+    return parts if of.unit.gyro is None else [*parts, (None, of.unit.gyro)]
+
+
+def _write_csv(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
+    """One text table a part, as a recorder exports it."""
+    places = {}
+    for which, triad in _parts(of):
+        name = part_file(of, which)
+        write_recorder_csv(folder / f"{name}.csv", triad.table)
+        headings = GYRO_HEADINGS if which is None else ACCEL_HEADINGS
+        places[name] = PartPlace(f"{name}.csv", headings, TIME)
+    return places
+
+
+def _write_mme(folder: Path, of: RecordedUnit) -> dict[str, PartPlace]:
+    """One test in ISO MME for all parts, as a laboratory hands it over."""
+    name = of.unit.name.lower()
+    channels = {part_file(of, which): _channels(of, which, triad) for which, triad in _parts(of)}
+    record = CrashRecord(
+        Path(name),
+        "simulated",
+        f"simulated recorder {of.unit.name}",
+        {},
+        tuple(c for triple in channels.values() for c in triple),
+        (),
+    )
+    codes = write_mme(folder / name, record, name=name)
+    return {
+        part: PartPlace(f"{name}/{name}.mme", (codes[x.name], codes[y.name], codes[z.name]))
+        for part, (x, y, z) in channels.items()
+    }
+
+
+def _channels(
+    of: RecordedUnit, which: int | None, triad: RecordedTriad
+) -> tuple[CrashChannel, CrashChannel, CrashChannel]:
+    quantity = "rate" if which is None else "acceleration"
+    time = triad.table.index.to_numpy(dtype=np.float64)
+    values = triad.table[GYRO if which is None else ACCEL].to_numpy(dtype=np.float64)
+
+    def channel(k: int) -> CrashChannel:
+        return CrashChannel(
+            f"{part_name(of, which)} {'xyz'[k]}",
+            quantity,
+            "xyz"[k],
+            QUANTITIES[quantity],
+            lambda: (time, values[:, k]),
+            sampling=triad.table.attrs["sampling"],
+        )
+
+    return channel(0), channel(1), channel(2)
+
+
+#: What records are written in: a function that says where each part of a recorder then is.
+RECORD_WRITERS: dict[str, Callable[[Path, RecordedUnit], dict[str, PartPlace]]] = {
+    "csv": _write_csv,
+    "mme": _write_mme,
+}
 
 
 def _description(spec: CrashSimulationSpec, recorded: RecordedCase) -> dict[str, Any]:

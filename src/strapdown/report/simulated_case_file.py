@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from strapdown import earth
-from strapdown.formats.recorder_csv import ACCEL_HEADINGS, GYRO_HEADINGS, TIME
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.catalogue_keys import KEYS
 from strapdown.sensors.crash_unit import RecordedTriad
@@ -18,7 +18,7 @@ from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation.case_recording import RecordedCase, RecordedUnit
 from strapdown.simulation.recorder_design import TriadDesign
 
-__all__ = ["case_text", "part_file", "part_name"]
+__all__ = ["PartPlace", "case_text", "part_file", "part_name"]
 
 # Attributes of a triad's uncertainty, and the keys of the catalogue in which a case states them.
 _STATED: dict[str, dict[str, str]] = {
@@ -133,12 +133,23 @@ seed = 0
 """
 
 
-def case_text(recorded: RecordedCase, seed: int) -> str:
+@dataclass(frozen=True)
+class PartPlace:
+    """Where a part of a recorder was written: the file, its three channels, and its stamps."""
+
+    path: str
+    channels: tuple[str, str, str]
+    time: str | None = None
+
+
+def case_text(recorded: RecordedCase, places: Mapping[str, PartPlace], seed: int) -> str:
     """Write the case file of a simulated crash.
 
     Parameters
     ----------
     recorded : RecordedCase
+    places : mapping of str to PartPlace
+        By `part_file`.
     seed : int
         Of the simulation, for the file's number.
 
@@ -171,7 +182,7 @@ def case_text(recorded: RecordedCase, seed: int) -> str:
                 slip=_number(round(entry.slip_deg, 6)),
             )
         )
-    pieces += [_unit_text(unit) for unit in recorded.units]
+    pieces += [_unit_text(unit, places) for unit in recorded.units]
     pieces.append(_REFERENCES)
     pieces.append(
         _OPTIONS.format(
@@ -197,7 +208,7 @@ def part_file(unit: RecordedUnit, which: int | None) -> str:
     return f"{unit.unit.name}_{part_name(unit, which)}".lower().replace("-", "_")
 
 
-def _unit_text(of: RecordedUnit) -> str:
+def _unit_text(of: RecordedUnit, places: Mapping[str, PartPlace]) -> str:
     unit, design = of.unit, of.recorder.design
     assert unit.trigger is not None
     text = _UNIT.format(
@@ -215,9 +226,9 @@ def _unit_text(of: RecordedUnit) -> str:
         zip(unit.accelerometers, design.accelerometers, strict=True)
     ):
         comment = "  # the lowest range first" if k == 0 else ""
-        text += f"\n[[units.accelerometers]]{comment}\n" + _triad_text(of, triad, built, k)
+        text += f"\n[[units.accelerometers]]{comment}\n" + _triad_text(of, triad, built, k, places)
     if unit.gyro is not None and design.gyro is not None:
-        text += "\n[units.gyro]\n" + _triad_text(of, unit.gyro, design.gyro, None)
+        text += "\n[units.gyro]\n" + _triad_text(of, unit.gyro, design.gyro, None, places)
     if of.recorder.assumed_turn_sd_deg is not None:
         text += _ASSUMED.format(
             turn=_number(of.recorder.assumed_turn_sd_deg), because=_text(of.recorder.because)
@@ -226,15 +237,19 @@ def _unit_text(of: RecordedUnit) -> str:
 
 
 def _triad_text(
-    of: RecordedUnit, triad: RecordedTriad, built: TriadDesign, which: int | None
+    of: RecordedUnit,
+    triad: RecordedTriad,
+    built: TriadDesign,
+    which: int | None,
+    places: Mapping[str, PartPlace],
 ) -> str:
-    headings = GYRO_HEADINGS if which is None else ACCEL_HEADINGS
-    channels = ", ".join(f'{axis} = "{h}"' for axis, h in zip("xyz", headings, strict=True))
+    place = places[part_file(of, which)]
+    channels = ", ".join(f'{a} = "{name}"' for a, name in zip("xyz", place.channels, strict=True))
     lines = [
         f'name = "{part_name(of, which)}"',
-        f'path = "{part_file(of, which)}.csv"',
+        f'path = "{place.path}"',
         f"channels = {{ {channels} }}",
-        f'time = "{TIME}"',
+        *([f'time = "{place.time}"'] if place.time else []),
         f'sampling = "{triad.table.attrs["sampling"]}"',
         f'sensor = "{built.part}"',
     ]

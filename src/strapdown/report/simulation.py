@@ -58,7 +58,8 @@ def simulate(
         One of `sensors.catalogue.SENSORS`, or the path of a file in the same form: the errors
         of one unit of it, drawn with the seed, take the place of the scenario's own.
     formats : sequence of str
-        Of `formats.log_writers.LOG_WRITERS`, or ``all``; ``csv``.
+        Of `formats.log_writers.LOG_WRITERS`, of a crash of `crash_simulation.RECORD_WRITERS`, or
+        ``all``; ``csv``.
     units : sequence of str
         Of a crash: names of its recorders, or ``all``.
     force : bool

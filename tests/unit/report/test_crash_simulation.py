@@ -228,3 +228,29 @@ def test_options_are_in_the_seal_and_come_back(tmp_path):
     truth = seal.path / "truth.csv"
     truth.write_bytes(truth.read_bytes()[:-1])
     assert verify(seal.path).details == ("truth.csv: changed after it was sealed",)
+
+
+def test_records_in_iso_mme_are_the_same_records(tmp_path):
+    from strapdown.formats.crash_records import read_crash_record
+
+    folder = simulate("pole", tmp_path / "mme", formats=["mme"], units=["imu1"]).path
+    assert not list(folder.glob("imu*.csv"))
+    (told,) = read_spec(folder).units
+    (of,) = record_case(CASES["pole"], ["IMU1"]).units
+    parts = zip(
+        (*told.accelerometers, told.gyro), (*of.unit.accelerometers, of.unit.gyro), strict=True
+    )
+    for spec, triad in parts:
+        record = read_crash_record(folder / spec.path)
+        for axis, column in zip("xyz", triad.table, strict=True):
+            time, values = record.channel(spec.channels[axis]).load()
+            # Stamps are written to the last bit, or as a channel of their own.
+            assert np.array_equal(time, triad.table.index)
+            assert np.array_equal(values, triad.table[column])
+    assert verify(folder).verdict == "identical"
+
+
+def test_the_case_reads_the_format_that_was_named_first(tmp_path):
+    folder = simulate("no-gyro", tmp_path / "both", formats=["csv", "mme"]).path
+    assert (folder / "imu1" / "imu1.mme").is_file()
+    assert read_spec(folder).units[0].accelerometers[0].path == "imu1_low_g.csv"
