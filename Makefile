@@ -62,7 +62,8 @@ messages: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) tests/cli/test_messages.py
 
 statements: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py
+	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py \
+		tests/unit/systems/test_reproduce_tadic.py
 
 pictures: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) tests/cli/test_pictures.py

@@ -73,9 +73,18 @@ class Direction:
     @property
     def relative_deg(self) -> float:
         """Over ground, from the heading at the impact."""
+        return self._over_ground.relative_deg
+
+    @property
+    def ned_vertical_deg(self) -> float:
+        """Over ground."""
+        return self._over_ground.vertical_deg
+
+    @property
+    def _over_ground(self) -> NedPdof:
         found = self.ned.pdof
         assert isinstance(found, NedPdof)
-        return found.relative_deg
+        return found
 
 
 def _pdof(change: VelocityChange) -> Pdof:
@@ -121,32 +130,33 @@ def table(made: Experiment) -> Table:
     for window in WINDOWS:
         for name in PLATFORMS:
             d = direction(made, name, window)
-            sides, heights = d.body.interval.horizontal, d.body.interval.vertical
+            half = [
+                0.5 * i.width_deg for i in (d.body.interval.horizontal, d.body.interval.vertical)
+            ]
             rows.append(
                 (
                     f"{name}, {window}",
                     (
                         *(PAPER[name] if window == "detection" else (None, None)),
-                        *(d.horizontal_deg, sides.low_deg, sides.high_deg),
-                        *(d.vertical_deg, heights.low_deg, heights.high_deg),
-                        *(d.relative_deg, d.true.horizontal_deg, d.true.vertical_deg),
+                        *(d.horizontal_deg, half[0], d.vertical_deg, half[1]),
+                        *(d.relative_deg, d.ned_vertical_deg),
+                        *(d.true.horizontal_deg, d.true.vertical_deg),
                     ),
                 )
             )
     return Table(
         "table2",
         "Table 2: direction of force",
-        "Degrees; where the force came from, 0 the front, positive from the right and from above, "
-        "with the 95 % bounds of each. The paper gives no convention of signs and no window other "
-        "than the moment of detection and 30 ms; its REF and LCEDR are LAB and IMU here. First "
-        "sign: the 30 ms up to where the speed has changed by 0.8 km/h within 20 ms; detection: "
-        "those up to where it has changed by 8 km/h. Body: along the turning axes of the vehicle; "
-        "over ground: north-east-down, from the heading at the impact. The "
-        "truth is that of the simulated crash, which is not the paper's.",
+        "Degrees; where the force came from, horizontally (H) from the front, positive from the "
+        "right, and vertically (V), positive from above; ± is the 95 % bound. The paper gives no "
+        "convention of signs and no window other than the moment of detection and 30 ms; its REF "
+        "and LCEDR are LAB and IMU here. First sign: the 30 ms up to where the speed has changed "
+        "by 0.8 km/h within 20 ms; detection: those up to where it has changed by 8 km/h. Body: "
+        "along the turning axes of the vehicle; NED: resolved over ground, from the heading at "
+        "the impact. The truth is that of the simulated crash, which is not the paper's.",
         (
-            *("platform, window", "paper, horizontal", "paper, vertical"),
-            *("body, horizontal", "from", "to", "body, vertical", "from", "to"),
-            *("over ground", "truth, horizontal", "truth, vertical"),
+            *("platform, window", "paper, H", "paper, V", "body, H", "±", "body, V", "±"),
+            *("NED, H", "NED, V", "truth, H", "truth, V"),
         ),
         tuple(rows),
     )

@@ -203,8 +203,8 @@ def decimetre_from(
         verdict,
         condition,
         "RMS over all experiments of the worst axis of each platform, against the cameras; "
-        f"decimetres end at {amount(limit, 'm')}. What scale factors of ±10 % (one sigma 5.8 %) make follows from the budget. The "
-        "ringing is felt by perfect sensors at 200 Hz.",
+        f"decimetres end at {amount(limit, 'm')}. What scale factors of ±10 % (one sigma "
+        "5.8 %) make follows from the budget. The ringing is felt by perfect sensors at 200 Hz.",
         (
             *(Evidence(f"{n}, worst axis", v, "m") for n, v in worst.items()),
             Evidence("longitudinal, by 1 % of scale factor", scale, "m"),
