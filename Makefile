@@ -62,10 +62,12 @@ messages: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) tests/cli/test_messages.py
 
 statements: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py
+	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py \
+		tests/unit/systems/test_reproduce_tadic.py
 
 pictures: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) tests/cli/test_pictures.py
+	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) tests/cli/test_pictures.py \
+		tests/unit/systems/test_reproduce_tadic.py
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

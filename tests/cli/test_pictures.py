@@ -6,11 +6,9 @@
 from __future__ import annotations
 
 import os
-import re
-from importlib.metadata import version
+import sys
 from pathlib import Path
 
-import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -21,12 +19,11 @@ from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
 from strapdown.systems.trajectory_source import make_motion
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from same_picture import PINNED, same_picture
+
 ROOT = Path(__file__).parents[2]
 EXAMPLES, IMAGES = ROOT / "docs" / "examples", ROOT / "docs" / "images"
-NUMBER = re.compile(r"-?\d+\.?\d*(?:e-?\d+)?")
-# Matplotlib names clips and markers by what is in them.
-NAMES = re.compile(r"\b[pmC](?=[0-9a-f]{10}\b)[0-9a-f]+")
-PINNED = re.search(r"^matplotlib==(\S+)", (ROOT / "constraints.txt").read_text(), re.M)
 
 
 def redraw(name, path):
@@ -37,19 +34,7 @@ def redraw(name, path):
     draw(simulation_chart(spec, motion.trajectory(time)), path, caption=True)
 
 
-def same_picture(a, b):
-    """Whether nothing differs but numbers, by less than can be seen: 0.01 of a point."""
-    texts = [NAMES.sub("", path.read_text(encoding="utf-8")) for path in (a, b)]
-    if NUMBER.sub("", texts[0]) != NUMBER.sub("", texts[1]):
-        return False
-    x, y = (np.array(NUMBER.findall(text), dtype=np.float64) for text in texts)
-    return x.shape == y.shape and bool((np.abs(x - y) < 0.01).all())
-
-
-@pytest.mark.skipif(
-    PINNED is not None and version("matplotlib") != PINNED[1],
-    reason=f"another matplotlib ({mpl.__version__}) than that of constraints.txt draws otherwise",
-)
+@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 @pytest.mark.parametrize("name", ["car", "aircraft"])
 def test_a_picture_of_the_manual_is_what_is_drawn_now(name, tmp_path):
     shown = IMAGES / f"trajectory_{name}.svg"

@@ -99,3 +99,22 @@ def test_the_manual_has_the_statements_of_this_code():
         written = f"\n{table}\n"
         PAGE.write_text(before + BEGIN + written + END + after, encoding="utf-8")
     assert written.strip() == table.strip(), "run `make statements` and read the difference"
+
+
+@pytest.mark.slow
+def test_tadic_is_written_and_verified_like_the_other(tmp_path, run_cli):
+    out = tmp_path / "tadic"
+    found = run_cli("reproduce", "tadic", "--out", out)
+    assert found.code == 0, found.err
+    result = json.loads((out / "reproduction.json").read_text())
+    assert {"fig6", "fig7", "fig8", "fig9"} <= {p.stem for p in (out / "figures").iterdir()}
+    assert result["headline"] in found.out
+    page = (out / "report.html").read_text()
+    assert not re.search(r'(src|href)="(?!#)', page.split("</main>")[0])
+    assert run_cli("verify", out).out.startswith("identical")
+
+
+def test_the_help_names_every_paper(run_cli):
+    text = run_cli("reproduce", "--help").out
+    for paper in REPRODUCTIONS:
+        assert paper in text

@@ -22,6 +22,18 @@ from strapdown.systems.reproduction import Figure, Trace
 
 # As on the page of the bench.
 ALGORITHM_COLOURS = {"naive": ORANGE, "euler": VERMILLION, "dcm": GREEN, "quaternion": BLUE}
+# Colour, dash and symbol of what a crash is recorded with: told apart without colours, too.
+RECORDERS = {
+    "LAB1": (BLUE, "solid", "circle"),
+    "LAB2": (SKY, "dash", "square"),
+    "IMU1": (VERMILLION, "solid", "diamond"),
+    "IMU2": (ORANGE, "dash", "triangle-up"),
+    "LAB": (BLUE, "solid", "circle"),
+    "IMU low-g": (ORANGE, "dash", "square"),
+    "IMU high-g": (VERMILLION, "dashdot", "diamond"),
+    "5 g": (SKY, "dash", "circle"),
+    "10 g": (VERMILLION, "solid", "square"),
+}
 _AXES = dict(zip("xyz", AXIS_COLOURS, strict=True))
 _OTHERS = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILLION)
 
@@ -37,7 +49,8 @@ def chart(figure: Figure) -> Chart:
     -------
     Chart
         The first curve of an algorithm has the colour of that algorithm, its further ones
-        others of the palette; references are dotted.
+        others of the palette; references are dotted. Recorders of a crash have a dash and a
+        symbol of their own.
     """
     colours: dict[str, tuple[str, str]] = {}
     for panel in figure.panels:
@@ -65,6 +78,9 @@ def _style(trace: Trace, taken: dict[str, tuple[str, str]]) -> tuple[str, str]:
     if trace.reference:
         count = sum(dash == "dot" for _, dash in taken.values())
         return (BLACK, GREY)[count % 2], "dot"
+    recorder = RECORDERS.get(trace.name.split(",")[0])
+    if recorder is not None:
+        return recorder[:2]
     if trace.name.startswith("gyro ") and trace.name[-1] in _AXES:
         return _AXES[trace.name[-1]], "solid"
     own = ALGORITHM_COLOURS.get(trace.name.replace(",", " ").replace(":", " ").split()[0])
@@ -76,5 +92,6 @@ def _style(trace: Trace, taken: dict[str, tuple[str, str]]) -> tuple[str, str]:
 
 def _line(trace: Trace, colour: str, dash: str) -> Line:
     if trace.points:
-        return Line(trace.name, trace.x, trace.y, colour, points=True)
+        symbol = RECORDERS.get(trace.name.split(",")[0], ("", "", "diamond"))[2]
+        return Line(trace.name, trace.x, trace.y, colour, points=True, symbol=symbol)
     return curve(trace.name, trace.x, trace.y, colour, dash, 1.2 if trace.reference else 1.6)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
-from strapdown.crash.pdof import NedPdof, Pdof, pdof
+from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
 from strapdown.crash.velocity_change import VelocityChange, velocity_change
 from strapdown.systems.reproduction import (
     DOES_NOT_HOLD,
@@ -73,9 +73,18 @@ class Direction:
     @property
     def relative_deg(self) -> float:
         """Over ground, from the heading at the impact."""
+        return self._over_ground.relative_deg
+
+    @property
+    def ned_vertical_deg(self) -> float:
+        """Over ground."""
+        return self._over_ground.vertical_deg
+
+    @property
+    def _over_ground(self) -> NedPdof:
         found = self.ned.pdof
         assert isinstance(found, NedPdof)
-        return found.relative_deg
+        return found
 
 
 def _pdof(change: VelocityChange) -> Pdof:
@@ -121,32 +130,33 @@ def table(made: Experiment) -> Table:
     for window in WINDOWS:
         for name in PLATFORMS:
             d = direction(made, name, window)
-            sides, heights = d.body.interval.horizontal, d.body.interval.vertical
+            half = [
+                0.5 * i.width_deg for i in (d.body.interval.horizontal, d.body.interval.vertical)
+            ]
             rows.append(
                 (
                     f"{name}, {window}",
                     (
                         *(PAPER[name] if window == "detection" else (None, None)),
-                        *(d.horizontal_deg, sides.low_deg, sides.high_deg),
-                        *(d.vertical_deg, heights.low_deg, heights.high_deg),
-                        *(d.relative_deg, d.true.horizontal_deg, d.true.vertical_deg),
+                        *(d.horizontal_deg, half[0], d.vertical_deg, half[1]),
+                        *(d.relative_deg, d.ned_vertical_deg),
+                        *(d.true.horizontal_deg, d.true.vertical_deg),
                     ),
                 )
             )
     return Table(
         "table2",
         "Table 2: direction of force",
-        "Degrees; where the force came from, 0 the front, positive from the right and from above, "
-        "with the 95 % bounds of each. The paper gives no convention of signs and no window other "
-        "than the moment of detection and 30 ms; its REF and LCEDR are LAB and IMU here. First "
-        "sign: the 30 ms up to where the speed has changed by 0.8 km/h within 20 ms; detection: "
-        "those up to where it has changed by 8 km/h. Body: along the turning axes of the vehicle; "
-        "over ground: north-east-down, from the heading at the impact. The "
-        "truth is that of the simulated crash, which is not the paper's.",
+        "Degrees; where the force came from, horizontally (H) from the front, positive from the "
+        "right, and vertically (V), positive from above; ± is the 95 % bound. The paper gives no "
+        "convention of signs and no window other than the moment of detection and 30 ms; its REF "
+        "and LCEDR are LAB and IMU here. First sign: the 30 ms up to where the speed has changed "
+        "by 0.8 km/h within 20 ms; detection: those up to where it has changed by 8 km/h. Body: "
+        "along the turning axes of the vehicle; NED: resolved over ground, from the heading at "
+        "the impact. The truth is that of the simulated crash, which is not the paper's.",
         (
-            *("platform, window", "paper, horizontal", "paper, vertical"),
-            *("body, horizontal", "from", "to", "body, vertical", "from", "to"),
-            *("over ground", "truth, horizontal", "truth, vertical"),
+            *("platform, window", "paper, H", "paper, V", "body, H", "±", "body, V", "±"),
+            *("NED, H", "NED, V", "truth, H", "truth, V"),
         ),
         tuple(rows),
     )
@@ -196,23 +206,29 @@ def _pdof_of(vector: Array) -> tuple[float, float]:
 
 def frames_agree(made: Experiments) -> Statement:
     """Judge that body and north-east-down have the same direction."""
-    apart = {
-        window: float(
-            np.mean(
-                [
-                    abs(d.horizontal_deg - d.relative_deg)
-                    for e in made.all
-                    for d in (direction(e, n, window) for n in PLATFORMS)
-                ]
-            )
+    exact, start = made.first.exact, made.first.platform("IMU1").path.table["heading"]
+    heading = float(np.interp(0.0, start.index.to_numpy(dtype=np.float64), start.to_numpy()))
+    apart = {}
+    for window in WINDOWS:
+        change = direction(made.first, "IMU1", window).body.delta_v
+        body = pdof(exact.along_body(change.start, change.end))
+        over = ned_pdof(exact.over_ground(change.start, change.end), heading)
+        apart[window] = max(
+            abs(over.relative_deg - body.horizontal_deg), abs(over.vertical_deg - body.vertical_deg)
         )
-        for window in WINDOWS
-    }
-    return frames_from(apart)
+    sensed = [
+        abs(d.ned_vertical_deg - d.vertical_deg)
+        for e in made.all
+        for d in (direction(e, n, "detection") for n in PLATFORMS)
+    ]
+    return frames_from(apart, float(np.mean(sensed)))
 
 
-def frames_from(apart: dict[str, float]) -> Statement:
-    """Judge from the mean difference of the two by window, deg."""
+def frames_from(apart: dict[str, float], sensed: float) -> Statement:
+    """Judge from the true difference of the two by window, deg.
+
+    `sensed` is what the platforms make of the vertical one at detection.
+    """
     close = [w for w in WINDOWS if apart[w] < SAME]
     if len(close) == len(WINDOWS):
         verdict, condition = HOLDS, ""
@@ -230,9 +246,14 @@ def frames_from(apart: dict[str, float]) -> Statement:
         "In this specific crash” body” and “NED” frames were aligned (→the same PDOF).",
         verdict,
         condition,
-        "Mean difference of the horizontal angle between the two frames, all platforms and "
-        "experiments. The simulated car turns by 87°/s from the pulse on.",
-        tuple(Evidence(f"apart, {w}", apart[w], "°") for w in WINDOWS),
+        "True directions in both frames, the larger difference of the two angles, over IMU1's "
+        "windows: the simulated car turns, up to 87°/s. What sensors make of the vertical angle is "
+        "more, because a bias of 0.2 m/s² is levelled as a tilt of 1.2°, and that turns the change "
+        "over ground: mean over all platforms and experiments.",
+        (
+            *(Evidence(f"true difference, {w}", apart[w], "°") for w in WINDOWS),
+            Evidence("vertical, as sensed, detection", sensed, "°"),
+        ),
     )
 
 

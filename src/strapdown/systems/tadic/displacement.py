@@ -90,13 +90,16 @@ def errors_table(made: Experiments) -> Table:
         "fig9-errors",
         "Fig. 9: errors over all experiments",
         f"{len(made.all)} experiments with other sensors, cameras and errors of the entry speed, "
-        "m. RMS after 750 ms, largest at any instant, and the 95 % bound that the reconstruction "
-        "and the cameras tell; last, how many of the errors after 750 ms are within it.",
+        "m. RMS after 750 ms, largest at any instant, and (±) the 95 % bound that the "
+        "reconstruction and the cameras tell; last, how many of the errors after 750 ms are "
+        "within it.",
         (
             "platform",
-            *(f"{a}, RMS" for a in AXES),
-            *(f"{a}, largest" for a in AXES),
-            *(f"{a}, bound" for a in AXES),
+            *(
+                f"{what} {a}"
+                for what in ("RMS", "largest", "±")
+                for a in ("ahead", "right", "down")
+            ),
             "within, %",
         ),
         tuple((name, tuple(float(v) for v in values if v is not None)) for name, values in rows),
@@ -203,8 +206,8 @@ def decimetre_from(
         verdict,
         condition,
         "RMS over all experiments of the worst axis of each platform, against the cameras; "
-        f"decimetres end at {amount(limit, 'm')}. What scale factors of ±10 % (one sigma 5.8 %) make follows from the budget. The "
-        "ringing is felt by perfect sensors at 200 Hz.",
+        f"decimetres end at {amount(limit, 'm')}. What scale factors of ±10 % (one sigma "
+        "5.8 %) make follows from the budget. The ringing is felt by perfect sensors at 200 Hz.",
         (
             *(Evidence(f"{n}, worst axis", v, "m") for n, v in worst.items()),
             Evidence("longitudinal, by 1 % of scale factor", scale, "m"),
