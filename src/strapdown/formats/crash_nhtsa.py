@@ -87,7 +87,7 @@ def read(path: Path) -> CrashRecord:
     """
     test = read_nhtsa(header_of(path))
     there = [c for c in test.channels if c.path is not None]
-    vehicles = {v.number for v in test.vehicles}
+    vehicles = {v.number for v in test.vehicles} or {c.vehicle for c in there} - {0}
     return CrashRecord(
         path=path,
         format="nhtsa",

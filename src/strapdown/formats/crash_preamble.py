@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
+from typing import Any
 
-from strapdown.exceptions import DataError
+from strapdown.exceptions import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.crash_attributes import check_attributes
+from strapdown.formats.crash_csv_writer import NOTE
 from strapdown.formats.crash_units import unit_of
 from strapdown.formats.recording import RawLog
 
-__all__ = ["read_text_table"]
+__all__ = ["notes_of", "read_text_table"]
 
 # A header stands within so many lines, or there is none.
 HIGHEST_HEADER = 200
 # Rows of plain numbers of some hundred bytes: more than this is no table of a crash.
 LARGEST = 2_000_000_000
+_TITLE = "# title: "
 _NO_UNIT = ("", "-", "--", "none", "1")
 
 
-def read_text_table(path: Path) -> RawLog:
+def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str]:
     """Read a text table whose header need not be its first line.
 
     Parameters
@@ -29,6 +34,10 @@ def read_text_table(path: Path) -> RawLog:
     -------
     RawLog
         Its `units` are those of a row of units, where there is one.
+    dict of str to dict
+        What comments say of columns, as `crash_attributes.attributes_of` gives it.
+    str
+        Title in a comment, or empty.
 
     Raises
     ------
@@ -61,7 +70,31 @@ def read_text_table(path: Path) -> RawLog:
     raw.findings[:0] = findings
     if units and len(units) == len(raw.columns):
         raw.units |= {name: u for name, u in zip(raw.columns, units, strict=True) if u}
-    return raw
+    notes = notes_of(lines, raw)
+    title = next((line[len(_TITLE) :] for line in lines[:1] if line.startswith(_TITLE)), "")
+    return raw, notes, title
+
+
+def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
+    """What comments say of columns; what is not understood is told in the log's findings."""
+    names = list(raw.columns)
+    notes: dict[str, dict[str, Any]] = {}
+    for row, line in enumerate(lines, start=1):
+        if line.strip() and not csv.is_comment(line):
+            break
+        if not line.startswith(NOTE):
+            continue
+        try:
+            said = json.loads(line[len(NOTE) :])
+            checked = check_attributes(said, raw.name, row)
+            column = int(said["column"])
+            notes[names[column - 1]] = checked
+        except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
+            told = (
+                error.finding.what if isinstance(error, DataError) else "no channel is read in it"
+            )
+            raw.findings.append(Finding(f"comment left out: {told}", file=raw.name, row=row))
+    return notes
 
 
 def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:

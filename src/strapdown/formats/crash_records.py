@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats import crash_nhtsa, crash_table
+from strapdown.formats import crash_json, crash_mme, crash_nhtsa, crash_table
 from strapdown.formats.crash_record import CrashRecord
+from strapdown.formats.crash_text import clean
 
 __all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
 
@@ -29,8 +30,19 @@ CRASH_READERS: dict[str, CrashReader] = {
         crash_nhtsa.detect,
         crash_nhtsa.read,
     ),
-    "table": CrashReader(
-        "table with a column a channel: .csv .txt, also .npz .parquet .h5 .mat",
+    "mme": CrashReader(
+        "test in ISO MME (ISO/TS 13499): .mme or its folder", crash_mme.detect, crash_mme.read
+    ),
+    "json": CrashReader(
+        "crash record as JSON, as this package writes it", crash_json.detect, crash_json.read
+    ),
+    "log": CrashReader(
+        "log with a column a channel: .npz .parquet .h5 .mat, of a phone",
+        crash_table.detect_log,
+        crash_table.read_log_record,
+    ),
+    "csv": CrashReader(
+        "text table with a column a channel: .csv .txt; also of a vehicle's event data recorder",
         crash_table.detect,
         crash_table.read,
     ),
@@ -75,8 +87,8 @@ def read_crash_record(
     except (OSError, ValueError) as error:
         # A name that no file can have, a file that may not be read, a link that leads in a ring.
         raise DataError(
-            f"it cannot be read: {type(error).__name__}: {str(error)[:200]}",
-            file=file.name[:200],
+            f"it cannot be read: {type(error).__name__}: {clean(str(error), 200)}",
+            file=clean(file.name),
             remedy="check that it is a file of yours, and copied whole",
         ) from error
 
@@ -84,7 +96,7 @@ def read_crash_record(
 def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
         raise ConfigError(
-            "there is no such file or folder", file=str(file), remedy="check the path"
+            "there is no such file or folder", file=clean(str(file)), remedy="check the path"
         )
     if file.is_file() and file.stat().st_size == 0:
         raise DataError(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +23,19 @@ from strapdown.formats.recording import RawLog
 
 Array = NDArray[np.float64]
 
-__all__ = ["detect", "read", "record_of"]
+__all__ = ["detect", "detect_log", "read", "read_log_record", "record_of"]
 
+# Formats of attitude logs whose columns may be those of a crash.
+LOGS = (
+    "sensor-logger",
+    "phyphox",
+    "sensor-folder",
+    "npy-folder",
+    "npz",
+    "parquet",
+    "hdf5",
+    "matlab",
+)
 # Of a column of text so many fields must be numbers to be one with a fault in it.
 MOSTLY = 0.5
 # How even the steps of a column without a name must be, to be taken for a clock.
@@ -37,7 +49,7 @@ def detect(path: Path) -> bool:
 
 
 def read(path: Path) -> CrashRecord:
-    """Read a text table, or another log that has columns.
+    """Read a text table.
 
     Parameters
     ----------
@@ -53,16 +65,54 @@ def read(path: Path) -> CrashRecord:
     DataError
         It is no table, or a damaged one.
     """
+    raw, notes, title = read_text_table(path)
+    return record_of(raw, path, "csv", notes=notes, title=title)
+
+
+def detect_log(path: Path) -> bool:
+    """Tell whether it is a log of another format that has columns: .npz, .h5, of a phone."""
     from strapdown.formats import READERS
 
-    general = {"mpu6050", "broad", "comma2k19", "sensorstream", "csv"}
-    for key, reader in READERS.items():
-        if key not in general and reader.detect(path):
-            return record_of(reader.read(path), path, key)
-    return record_of(read_text_table(path), path, "csv")
+    return any(READERS[key].detect(path) for key in LOGS)
 
 
-def record_of(raw: RawLog, path: Path, form: str) -> CrashRecord:
+def read_log_record(path: Path) -> CrashRecord:
+    """Read a log of another format.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    CrashRecord
+
+    Raises
+    ------
+    DataError
+        It is damaged, or of no such format.
+    """
+    from strapdown.formats import READERS
+
+    for key in LOGS:
+        if READERS[key].detect(path):
+            return record_of(READERS[key].read(path), path, "log")
+    raise DataError(
+        "it is of none of these formats",
+        file=path.name,
+        quantity="format",
+        remedy=f"give one of: {'; '.join(READERS[key].title for key in LOGS)}",
+    )
+
+
+def record_of(
+    raw: RawLog,
+    path: Path,
+    form: str,
+    *,
+    notes: Mapping[str, Mapping[str, Any]] | None = None,
+    title: str = "",
+) -> CrashRecord:
     """Make a record of the columns of a log.
 
     Parameters
@@ -71,6 +121,9 @@ def record_of(raw: RawLog, path: Path, form: str) -> CrashRecord:
     path : Path
     form : str
         Key of its format.
+    notes : dict of str to dict, optional
+        What the file says of columns beside their names, as `attributes_of` gives it.
+    title : str, optional
 
     Returns
     -------
@@ -95,20 +148,28 @@ def record_of(raw: RawLog, path: Path, form: str) -> CrashRecord:
             file=raw.name,
             remedy="give the record as CSV with one sample a row",
         )
-    names = unique([clean(s, LONGEST_NAME) or f"column {k + 1}" for k, s in enumerate(kept)])
-    said = {s: _said(raw, s) for s in kept}
+    notes = notes or {}
+    names = unique(
+        [
+            (s in notes and notes[s]["name"]) or clean(s, LONGEST_NAME) or f"column {k + 1}"
+            for k, s in enumerate(kept)
+        ]
+    )
+    said = {s: _noted(notes[s]) if s in notes else _said(raw, s) for s in kept}
     spelled = dict(zip(kept, names, strict=True))
     clock = _clock(raw, said, spelled, findings)
     if clock and said[clock].quantity != "time":
         said[clock] = ChannelName("time")
     channels = tuple(
-        _channel(raw, source, name, said, clock, spelled.get(clock, ""))
+        _with_notes(
+            _channel(raw, source, name, said, clock, spelled.get(clock, "")), notes.get(source)
+        )
         for source, name in spelled.items()
     )
     return CrashRecord(
         path=path,
         format=form,
-        title=clean(path.stem),
+        title=clean(title) or clean(path.stem),
         facts={},
         channels=channels,
         files=raw.files,
@@ -142,6 +203,19 @@ def _said(raw: RawLog, source: str) -> ChannelName:
     if raw.columns[source].dtype.kind == "M":
         return ChannelName("time", "", "ns")
     return read_channel_name(source, raw.units.get(source, ""))
+
+
+def _noted(note: Mapping[str, Any]) -> ChannelName:
+    """A velocity that was written counts from where it did: nothing is taken off again."""
+    change = note["quantity"] == "velocity"
+    return ChannelName(note["quantity"], note["axis"], note["unit"], change)
+
+
+def _with_notes(channel: CrashChannel, note: Mapping[str, Any] | None) -> CrashChannel:
+    if note is None:
+        return channel
+    kept = ("sampling", "place", "low_pass", "remarks", "full_scale", "bandwidth")
+    return replace(channel, body=note["body"] or "vehicle", **{k: note[k] for k in kept})
 
 
 def _clock(

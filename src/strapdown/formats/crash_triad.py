@@ -218,6 +218,13 @@ def _as_mean(
 
 
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
+    if not values.size:
+        raise DataError(
+            "it has no samples",
+            file=channel.file or None,
+            quantity=f"channel {channel.name}",
+            remedy="get the record again, or leave the channel out",
+        )
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
     hole = -1

@@ -78,9 +78,10 @@ def triad_factor(
             # One axis says it for the triad: a header is often filled in once.
             wanted = next(iter(own.values()))
             without = ", ".join(axes[a][0].name for a in open_axes)
+            other = axes[next(iter(own))][0].name
             findings.append(
                 Finding(
-                    f"no unit of {without}: taken as {wanted}, as that of {axes[next(iter(own))][0].name}",
+                    f"no unit of {without}: taken as {wanted}, as that of {other}",
                     file=record.path.name,
                     quantity="unit",
                     remedy=f'if not, write it in the header; state unit = "{wanted}" if so',

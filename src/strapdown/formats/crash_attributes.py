@@ -1,0 +1,114 @@
+"""What is said of a channel, as plain data: for files that keep it beside the numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from strapdown.exceptions import DataError, nearest
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel
+from strapdown.formats.crash_text import LONGEST_NAME, clean
+from strapdown.tables import SAMPLINGS
+
+__all__ = ["attributes_of", "check_attributes"]
+
+_AXES = ("", "x", "y", "z", "-x", "-y", "-z")
+_TEXTS = ("name", "quantity", "axis", "unit", "place", "body", "low_pass")
+_NUMBERS = ("full_scale", "bandwidth")
+MOST_REMARKS = 50
+
+
+def attributes_of(channel: CrashChannel) -> dict[str, Any]:
+    """Everything of a channel but its samples.
+
+    Parameters
+    ----------
+    channel : CrashChannel
+
+    Returns
+    -------
+    dict
+        With the unit in SI, in which its values are written.
+    """
+    return {
+        "name": channel.name,
+        "quantity": channel.quantity,
+        "axis": channel.axis,
+        "unit": QUANTITIES[channel.quantity] or channel.unit,
+        "sampling": channel.sampling,
+        "place": channel.place,
+        "body": channel.body,
+        "low_pass": channel.low_pass,
+        "remarks": list(channel.remarks),
+        "full_scale": channel.full_scale,
+        "bandwidth": channel.bandwidth,
+    }
+
+
+def check_attributes(said: object, file: str, row: int | None = None) -> dict[str, Any]:
+    """Check what a file says of a channel.
+
+    Parameters
+    ----------
+    said : object
+        As it was read.
+    file : str
+    row : int, optional
+
+    Returns
+    -------
+    dict
+        As `attributes_of`; what is not there is empty, texts are cleaned.
+
+    Raises
+    ------
+    DataError
+        It is of another form.
+    """
+    if not isinstance(said, Mapping):
+        raise _bad("a channel", "is no table of keys", file, row)
+    texts = {}
+    for key in _TEXTS:
+        value = said.get(key, "")
+        if not isinstance(value, str):
+            raise _bad(key, f"is no text ({str(value)[:40]})", file, row)
+        texts[key] = clean(value, LONGEST_NAME) if key in ("name", "unit") else clean(value)
+    numbers = {}
+    for key in _NUMBERS:
+        value = said.get(key)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if value is not None and not (number and math.isfinite(value)):
+            raise _bad(key, f"is no number ({str(value)[:40]})", file, row)
+        numbers[key] = None if value is None else float(value)
+    for key, known in (("quantity", tuple(QUANTITIES)), ("axis", _AXES)):
+        if texts[key] not in known:
+            raise DataError(
+                f"'{texts[key]}' is no {key}",
+                file=file,
+                row=row,
+                quantity=key,
+                remedy=nearest(texts[key], known),
+            )
+    remarks = said.get("remarks", [])
+    if not isinstance(remarks, list) or not all(isinstance(r, str) for r in remarks):
+        raise _bad("remarks", "are no list of texts", file, row)
+    sampling = said.get("sampling")
+    if sampling not in (None, *SAMPLINGS):
+        raise _bad("sampling", f"is '{str(sampling)[:40]}'", file, row)
+    return {
+        **texts,
+        **numbers,
+        "sampling": sampling,
+        "remarks": tuple(clean(r) for r in remarks[:MOST_REMARKS]),
+    }
+
+
+def _bad(key: str, what: str, file: str, row: int | None) -> DataError:
+    return DataError(
+        f"{key} {what}",
+        file=file,
+        row=row,
+        quantity=key,
+        remedy="write the record again with `strapdown`, or leave that line out",
+    )

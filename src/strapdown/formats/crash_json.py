@@ -1,0 +1,194 @@
+"""Crash records as JSON: everything that a record holds, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.formats.crash_attributes import attributes_of, check_attributes
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
+
+Array = NDArray[np.float64]
+
+__all__ = ["detect", "read", "write_crash_json"]
+
+FORMAT = "strapdown crash record"
+VERSION = 1
+_BEGINNING = 200
+LARGEST = 1_000_000_000
+
+
+def write_crash_json(path: str | Path, record: CrashRecord) -> None:
+    """Write a record as JSON.
+
+    Parameters
+    ----------
+    path : str or Path
+    record : CrashRecord
+        Values are written in SI, each number in the fewest digits that give it back exactly; null
+        stands for a sample that is missing. Channels that share their stamps name one list.
+
+    Raises
+    ------
+    DataError
+        A value is infinite.
+    """
+    clocks: dict[bytes, int] = {}
+    stamps: list[list[float]] = []
+    channels: list[dict[str, Any]] = []
+    for channel in record.channels:
+        if channel.quantity == "time":
+            continue
+        time, values = channel.load()
+        bad = np.flatnonzero(np.isinf(values) | ~np.isfinite(time))
+        if bad.size:
+            raise DataError(
+                f"not a finite number ({values[bad[0]]})",
+                file=channel.file or None,
+                row=channel.row(int(bad[0])),
+                quantity=f"channel {channel.name}",
+                remedy="correct that row, or leave the channel out",
+            )
+        key = time.tobytes()
+        if key not in clocks:
+            clocks[key] = len(stamps)
+            stamps.append(time.tolist())
+        numbers = [None if np.isnan(v) else v for v in values.tolist()]
+        channels.append({**attributes_of(channel), "stamps": clocks[key], "values": numbers})
+    whole = {
+        "format": FORMAT,
+        "version": VERSION,
+        "title": record.title,
+        "facts": dict(record.facts),
+        "stamps_s": stamps,
+        "channels": channels,
+    }
+    text = json.dumps(whole, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    Path(path).write_bytes((text + "\n").encode())
+
+
+def detect(path: Path) -> bool:
+    """Tell whether it is a record as JSON."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        begin = stream.read(_BEGINNING)
+    return begin.lstrip().startswith(b"{") and FORMAT.encode() in begin
+
+
+def read(path: Path) -> CrashRecord:
+    """Read a record that was written as JSON.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    CrashRecord
+
+    Raises
+    ------
+    DataError
+        It is cut, or of another form.
+    """
+    whole = _parsed(path)
+    stamps = [
+        _numbers(s, path, f"stamps_s {k}") for k, s in enumerate(_list(whole, "stamps_s", path))
+    ]
+    for k, clock in enumerate(stamps):
+        if clock.size and not (np.isfinite(clock).all() and (np.diff(clock) > 0.0).all()):
+            raise _form(path, f"stamps_s {k}", "do not advance")
+    said = _list(whole, "channels", path)
+    attributes = [check_attributes(s, path.name) for s in said]
+    names = unique([a["name"] or f"channel {k + 1}" for k, a in enumerate(attributes)])
+    channels = []
+    for k, (one, raw) in enumerate(zip(attributes, said, strict=True)):
+        at = raw.get("stamps")
+        if not isinstance(at, int) or isinstance(at, bool) or not 0 <= at < len(stamps):
+            raise _form(
+                path, f"channel {names[k]}", f"names stamps that are not there ({at!r:.40})"
+            )
+        values = _numbers(raw.get("values"), path, f"channel {names[k]}")
+        if values.size != stamps[at].size or not values.size:
+            raise _form(
+                path, f"channel {names[k]}", f"has {values.size} values, {stamps[at].size} stamps"
+            )
+        kept = {key: one[key] for key in one if key != "name"}
+        channels.append(
+            CrashChannel(name=names[k], load=_loader(stamps[at], values), file=path.name, **kept)
+        )
+    facts = whole.get("facts", {})
+    if not isinstance(facts, dict):
+        raise _form(path, "facts", "are no table of keys")
+    title = whole.get("title", "")
+    return CrashRecord(
+        path=path,
+        format="json",
+        title=clean(title) if isinstance(title, str) else "",
+        facts={clean(k, LONGEST_NAME): clean(str(v)) for k, v in facts.items()},
+        channels=tuple(channels),
+        files=(path,),
+    )
+
+
+def _loader(time: Array, values: Array) -> Callable[[], tuple[Array, Array]]:
+    return lambda: (time.copy(), values.copy())
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise _form(path, "the file", f"has {size} bytes, more than a record has")
+    try:
+        whole = json.loads(path.read_bytes().decode("utf-8-sig"))
+    except json.JSONDecodeError as error:
+        raise DataError(
+            f"the JSON ends or breaks off at column {error.colno} ({error.msg})",
+            file=path.name,
+            row=error.lineno,
+            remedy="the file is cut or was edited: write or copy it again",
+        ) from None
+    except (UnicodeDecodeError, RecursionError, ValueError):
+        raise _form(path, "the file", "is no JSON of a record") from None
+    if not isinstance(whole, dict) or whole.get("format") != FORMAT:
+        raise _form(path, "format", f"is not '{FORMAT}'")
+    if whole.get("version") != VERSION:
+        raise _form(path, "version", f"is {str(whole.get('version'))[:40]}, and {VERSION} is read")
+    return whole
+
+
+def _list(whole: dict[str, Any], key: str, path: Path) -> list[Any]:
+    found = whole.get(key)
+    if not isinstance(found, list) or not found:
+        raise _form(path, key, "is no list, or an empty one")
+    return found
+
+
+def _numbers(values: object, path: Path, quantity: str) -> Array:
+    if not isinstance(values, list):
+        raise _form(path, quantity, "is no list of numbers")
+    plain = [float("nan") if v is None else v for v in values]
+    for k, v in enumerate(plain):
+        if isinstance(v, bool) or not isinstance(v, int | float) or abs(v) == float("inf"):
+            raise _form(path, quantity, f"has no number at sample {k + 1} ({str(v)[:40]})")
+    try:
+        return np.array(plain, dtype=np.float64)
+    except OverflowError:
+        raise _form(path, quantity, "has a number that is too large") from None
+
+
+def _form(path: Path, quantity: str, what: str) -> DataError:
+    return DataError(
+        f"it {what}" if not what.startswith("it ") else what,
+        file=path.name,
+        quantity=quantity,
+        remedy="write the record again, or give it as CSV or ISO MME",
+    )
