@@ -13,6 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from bad_case import CASE_FILES, TEXT
 from bad_crash import CRASH_CALLS
 from bad_inputs import CASES
 from bad_navigation import CALLS
@@ -47,6 +48,13 @@ the trigger, and `ENTRY` is 7.1 ± 0.2 m/s. Where a record can be used, the note
 
 """
 
+CASE_FILE = """## A crash case file
+
+Each message names the line of the key; where two keys contradict each other, the lines and values
+of both. Here the differences are from this file, whose records are beside it:
+
+"""
+
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory, run_cli):
@@ -77,7 +85,12 @@ def page(tmp_path_factory, run_cli):
 
 
 def _from_python() -> str:
-    parts = [PYTHON]
+    parts = [CASE_FILE, f"```toml\n{TEXT}```\n\n"]
+    for file in CASE_FILES:
+        parts.append(
+            f"### {file.title}\n\n```diff\n{file.difference}\n```\n\n```text\n{file.said}\n```\n\n"
+        )
+    parts.append(PYTHON)
     for case in CALLS:
         with pytest.raises(StrapdownError) as caught:
             case.call()

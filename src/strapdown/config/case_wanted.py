@@ -57,7 +57,7 @@ WANTED: dict[str, str] = {
     "rate": "samples in a second",
     "unit": "unit of the record: g or m/s2, deg/s or rad/s",
     "sampling": "instantaneous or mean",
-    "sensor": "a sensor of the catalogue (`strapdown sensors`), or a file of your own",
+    "sensor": "a sensor of the catalogue, or a .toml file of your own",
     "uncertainty": "what is not known of the sensor, from its data sheet",
     "assumed": "what is taken for axes and gyros that are not there",
     "turn_sd": "by how much the vehicle may have turned, as a standard deviation",
@@ -96,4 +96,4 @@ def what_to_write(path: KeyPath) -> str:
     if said.startswith("["):
         header, _, meaning = said.partition(": ")
         form, said = f"write {header} and its keys below it", meaning
-    return f"{form}: {said}" if said else form
+    return f"{form} ({said})" if said else form

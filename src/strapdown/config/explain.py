@@ -79,6 +79,8 @@ def explained(
     else:
         what = f"{shown(given)} does not fit: {error['msg'].lower()}"
         remedy = _REMEDIES.get(error["type"], _OTHER)
+        if error["type"] == "string_type" and isinstance(given, int | float):
+            remedy = f'write it in quotation marks: {path[-1]} = "{shown(given)}"'
     where = _in_file(file, path, written or {})
     quantity = place(_renamed(path, written or {}))
     return ConfigError(

@@ -69,4 +69,4 @@ def converted(value: Any, key: str, name: str) -> Any:
     try:
         return value * multiply / divide
     except OverflowError:
-        return math.copysign(math.inf, value)
+        return math.inf if value > 0 else -math.inf

@@ -11,7 +11,9 @@ LONGEST = 80
 
 
 def shown(value: Any) -> str:
-    """A value as Python writes it, cut where it is long."""
+    """A value as a file would write it, cut where it is long."""
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, str):
         text = repr(value[: LONGEST + 1])
     elif isinstance(value, list | tuple) and len(value) > LONGEST:

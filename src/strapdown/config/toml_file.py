@@ -18,6 +18,8 @@ __all__ = ["TomlFile", "read_toml"]
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
 # What people write, by what a line that is no TOML looks like.
 _SLIPS = (
+    (r"=\s*\?", "this value is still open: put what you know in place of the question mark"),
+    (r"=\s*-?[\d.]+\s*,\s*-?[\d.]+\s*,", "write several numbers in brackets: [0.6, -0.5, 0.2]"),
     (r"=\s*[\[\s\d,.-]*\d,\d+\s*(?:#.*)?$", "write numbers with a point: 25.6, not 25,6"),
     (r"[“”„‟‘’]", "use the plain quotation marks, \" or ', not those of a word processor"),
     (
@@ -25,13 +27,20 @@ _SLIPS = (
         "a backslash in double quotation marks begins an escape: write the path in single ones, "
         "'C:\\case\\record.csv', or with /",
     ),
-    (r"=\s*(?:true|false)\b", "write true or false in small letters, alone"),
+    (r"=\s*(?i:true|false|yes|no)\b", "write true or false, in small letters"),
+    (r"=\s*[+-]?\.\d", "write a 0 before the point: 0.5, not .5"),
+    (r"=\s*[+-]?0\d", "write numbers without zeros before them"),
+    (r"=\s*\d+[-/_]", 'write what is no number in quotation marks: "2024-117"'),
     (
         r"=\s*-?[\d.]+\s*[A-Za-z%°]",
         "write the number alone: the name of the key tells its unit",
     ),
     (r"=\s*[^\s\"'\d\[{+-]", 'write text in quotation marks: key = "text"'),
 )
+
+
+#: Characters of a line that are looked at for a slip.
+LONG = 500
 
 
 @dataclass(frozen=True)
@@ -122,7 +131,8 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
     if number is None:
         number = text.rstrip("\n").count("\n") + 1 if found else None
     rows = text.split("\n")
-    line = rows[number - 1] if number is not None and number <= len(rows) else ""
+    # Of a long line the beginning: patterns take time.
+    line = rows[number - 1][:LONG] if number is not None and number <= len(rows) else ""
     if number is not None:
         # What stands twice is known only once all of the line is read.
         twice = _twice("\n".join(rows[:number]), number)

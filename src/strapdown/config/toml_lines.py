@@ -94,6 +94,9 @@ class _Scan:
             path = (*path, part)
             last = k == len(parts) - 1
             if last and counted:
+                if path in self.lines and path not in self.elements:
+                    # One table before, and now several.
+                    self.lines[path].append(line)
                 self.elements[path] = self.elements.get(path, 0) + 1
                 self.lines.setdefault(path, [line])
             else:

@@ -41,7 +41,7 @@ def check_assumed(k: int, spec: CaseSpec, written: Written) -> None:
             + ", and nothing says how far the vehicle may have turned",
             "turn_sd_deg",
             written,
-            ", or gyro_from of another unit" if no_gyro else "",
+            "write [units.gyro], or gyro_from = the name of another unit" if no_gyro else "",
         )
     if unit.assumed is not None:
         _check_table(k, unit, assumed, written, bool(no_force), bool(no_turn))
@@ -119,11 +119,11 @@ def _listed(axes: list[str]) -> str:
 
 
 def _not_assumed(
-    path: KeyPath, why: str, name: str, written: Written, more: str = ""
+    path: KeyPath, why: str, name: str, written: Written, instead: str = ""
 ) -> ConfigError:
     return written.file.refuse(
         path,
         why,
-        f"name its channel{more}; or write [units.assumed] with {name} = …, a standard "
+        f"{instead or 'name its channel'}; or write [units.assumed] with {name} = …, a standard "
         "deviation, and because = …",
     )

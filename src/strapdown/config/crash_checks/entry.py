@@ -97,7 +97,7 @@ def _sizes(entry: EntrySpec, written: Written) -> None:
         raise written.refuse(
             ("entry", "speed_sd_m_per_s"),
             "no speed is known without error, and every bound of the path rests on it",
-            "give the standard deviation: half of what you would bet two to one on",
+            "give the standard deviation: two of three such measurements lie within it",
         )
     if sd is not None and sd > FASTEST / 3.0:
         raise written.refuse(

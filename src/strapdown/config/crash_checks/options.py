@@ -40,6 +40,10 @@ def check_options(spec: CaseSpec, written: Written) -> None:
 def _windows(spec: CaseSpec, written: Written) -> None:
     at, peak_at = ("options", "window_s"), ("options", "peak_window_s")
     window, peak = spec.options.window_s, spec.options.peak_window_s
+    if peak > LONGEST_PEAK:
+        raise written.refuse(
+            peak_at, f"no pulse of a crash lasts {peak:g} s", "if it is in ms, write peak_window_ms"
+        )
     if window is not None:
         start, end = window
         if not start < end:
@@ -61,10 +65,6 @@ def _windows(spec: CaseSpec, written: Written) -> None:
                 "widen window_s, or shorten peak_window_s",
                 default=peak,
             )
-    if peak > LONGEST_PEAK:
-        raise written.refuse(
-            peak_at, f"no pulse of a crash lasts {peak:g} s", "if it is in ms, write peak_window_ms"
-        )
 
 
 def _model(number: int, name: str, names: Sequence[str], written: Written) -> None:

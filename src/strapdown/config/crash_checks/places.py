@@ -18,6 +18,8 @@ BEYOND = 0.5  # m
 #: And above or below the origin.
 HIGHEST = 4.5  # m
 LONGEST = 30.0  # m
+#: So far from the origin a coordinate is likely in another unit.
+LARGE = 10.0  # m
 #: Beyond it no tape has measured.
 MOST_SD = 2.0  # m
 LIGHTEST, HEAVIEST = 20.0, 100_000.0  # kg
@@ -151,12 +153,17 @@ def _on_vehicle(
         "positions are forward, right, down from one origin; check this one, and the size of the "
         "vehicle in [vehicle]"
     )
-    for part, unit in ((1000.0, "mm"), (100.0, "cm")):
-        small = (forward / part, right / part)
-        fits = _outside(small, corners) <= BEYOND and abs(down) / part <= HIGHEST
-        if name.endswith("_m") and fits and max(abs(v) for v in place) >= 10.0:
-            remedy = f"if it is in {unit}, write {name.removesuffix('_m')}_{unit}"
-            break
+    units = [
+        unit
+        for part, unit in ((1000.0, "mm"), (100.0, "cm"))
+        if name.endswith("_m")
+        and max(abs(v) for v in place) >= LARGE
+        and abs(down) / part <= HIGHEST
+        and _outside((forward / part, right / part), corners) <= BEYOND
+    ]
+    if units:
+        keys = [f"{name.removesuffix('_m')}_{unit}" for unit in units]
+        remedy = f"if it is in {' or '.join(units)}, write {' or '.join(keys)}"
     raise written.refuse(path, why, remedy)
 
 

@@ -58,8 +58,8 @@ def check_ranges(k: int, unit: UnitSpec, written: Written) -> None:
             continue
         if any(b > a for a, b in zip(after, before, strict=True)):
             raise written.contradiction(
-                ("units", k, "accelerometers", n, _range_key(triads[n])),
-                ("units", k, "accelerometers", n - 1, _range_key(triads[n - 1])),
+                ("units", k, "accelerometers", n, *_range_key(triads[n])),
+                ("units", k, "accelerometers", n - 1, *_range_key(triads[n - 1])),
                 f"a range of {_in_g(before)} g stands before one of {_in_g(after)} g",
                 "put the lowest range first: the others take over where it ends",
             )
@@ -134,8 +134,8 @@ def _fits(path: KeyPath, quantity: str, given: float | Triple, written: Written)
         raise error
 
 
-def _range_key(triad: TriadSpec) -> str:
-    return "uncertainty" if "full_scale_g" in triad.uncertainty else "sensor"
+def _range_key(triad: TriadSpec) -> KeyPath:
+    return ("uncertainty", "full_scale_g") if "full_scale_g" in triad.uncertainty else ("sensor",)
 
 
 def _full_scale(triad: TriadSpec) -> Triple | None:

@@ -15,7 +15,7 @@ __all__ = ["check_triads"]
 
 _UNITS = {"accel": ACCEL_UNITS, "gyro": GYRO_UNITS}
 _OTHER = {"accel": "gyro", "gyro": "accel"}
-_NAMES = {"accel": "accelerometer", "gyro": "gyro"}
+_NAMES = {"accel": "an accelerometer", "gyro": "a gyro"}
 
 
 def check_triads(spec: CaseSpec, written: Written) -> None:
@@ -64,9 +64,7 @@ def _channels(
             raise written.contradiction(
                 path,
                 before,
-                f"one channel of {triad.name or 'a record'} is along one axis"
-                if before[:-1] == path[:-1]
-                else "one channel of a record is one axis of one triad",
+                "a channel lies along one axis of one triad",
                 'name the other channel; a gyro is lent to another unit by gyro_from = "…"'
                 if gyro
                 else "name the channel that was recorded along this axis",
@@ -82,9 +80,7 @@ def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
         if unit in _UNITS[_OTHER[kind]]:
             raise written.refuse(
                 (*at, "unit"),
-                f"it is a unit of a {_NAMES[_OTHER[kind]]}, and this is a {_NAMES[kind]}"
-                if kind == "accel"
-                else "it is a unit of an accelerometer, and this is a gyro",
+                f"it is a unit of {_NAMES[_OTHER[kind]]}, and this is {_NAMES[kind]}",
                 f"use one of {', '.join(_UNITS[kind])}, or move the channels to where they belong",
             )
     if triad.time_unit is not None:

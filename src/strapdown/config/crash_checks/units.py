@@ -26,6 +26,7 @@ def check_units(spec: CaseSpec, written: Written) -> None:
         One lacks its place, or says two things at once, or borrows a gyro that is not there.
     """
     check_names("units", [unit.name for unit in spec.units], written)
+    _triggered(spec, written)
     for k, unit in enumerate(spec.units):
         _placed(k, unit, written)
         _gyro(k, spec, written)
@@ -62,6 +63,20 @@ def check_names(several: str, names: Sequence[str], written: Written) -> None:
                 "name one of them otherwise",
             )
         seen[same] = k
+
+
+def _triggered(spec: CaseSpec, written: Written) -> None:
+    without = [k for k, unit in enumerate(spec.units) if unit.trigger_s is None]
+    if without and spec.options.clock == "trigger":
+        raise written.missing(
+            ("units", without[0], "trigger_s"),
+            "the clocks are tied by the common trigger, which is where time is 0; or else write "
+            'clock = "correlation" in [options]',
+        )
+    if len(without) == len(spec.units):
+        raise written.missing(
+            ("units", 0, "trigger_s"), "no unit has one, and it is where time is 0"
+        )
 
 
 def _placed(k: int, unit: UnitSpec, written: Written) -> None:

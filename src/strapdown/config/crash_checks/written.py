@@ -14,6 +14,9 @@ from strapdown.exceptions import ConfigError
 
 __all__ = ["Written"]
 
+#: Keys of a table that a message shows.
+MOST = 4
+
 
 @dataclass(frozen=True)
 class Written:
@@ -83,11 +86,17 @@ class Written:
     def _equation(self, path: KeyPath, value: Any) -> str:
         at = self._at(path)
         name = next((shown_key(part) for part in reversed(at) if isinstance(part, str)), "")
-        return name if _big(value) else f"{name} = {shown(value)}"
+        return name if _big(value) else f"{name} = {_shown(value)}"
+
+
+def _shown(value: Any) -> str:
+    if not isinstance(value, dict):
+        return shown(value)
+    pairs = [f"{shown_key(key)} = {shown(part)}" for key, part in value.items()]
+    return f"{{ {', '.join(pairs[:MOST])}{', …' if len(pairs) > MOST else ''} }}"
 
 
 def _big(value: Any) -> bool:
-    """A table, or several."""
-    return isinstance(value, dict) or (
-        isinstance(value, list) and any(isinstance(part, dict) for part in value)
-    )
+    """A table with tables, or several."""
+    parts = list(value.values()) if isinstance(value, dict) else value
+    return isinstance(parts, list) and any(isinstance(part, dict) for part in parts)
