@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
+    from strapdown.sensors.assumed import Assumed
     from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
     from strapdown.sensors.triad_uncertainty import TriadUncertainty
     from strapdown.systems.attitude_bench import bench_attitude
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Assumed",
     "CrashUnit",
     "Entry",
     "Mounting",
@@ -79,6 +81,7 @@ __all__ = [
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
+    "Assumed": "strapdown.sensors.assumed",
     "CrashUnit": "strapdown.sensors.crash_unit",
     "Entry": "strapdown.crash.entry",
     "Mounting": "strapdown.sensors.crash_unit",

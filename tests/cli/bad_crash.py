@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown import Entry, Mounting, read_nhtsa, reconstruct_crash, sample_paths
+from strapdown import Assumed, Entry, Mounting, read_nhtsa, reconstruct_crash, sample_paths
 from strapdown.crash.reference_path import compare_with_reference
 from strapdown.crash.severity import find_severity_model
 from strapdown.crash.severity_model import injury_risk
@@ -108,6 +108,38 @@ def laboratory_channel_saturated():
 
 def missing_axis():
     return reconstruct_crash([changed(UNIT, HIGH, lambda t: t.drop(columns="accel_y"))], ENTRY)
+
+
+def without(unit, *columns):
+    """The unit without some axes of its accelerometers, and without its gyro."""
+    for which in (LOW, HIGH):
+        unit = changed(unit, which, lambda t: t.drop(columns=list(columns)))
+    return replace(unit, gyro=None)
+
+
+def assumed_and_not_levelled():
+    unit = replace(without(UNIT, "accel_y"), assumed=Assumed(turn_sd_deg=5.0, delta_v_sd=1.0))
+    return reconstruct_crash([unit], ENTRY)
+
+
+def assumed():
+    stated = Assumed(turn_sd_deg=(2.0, 2.0, 5.0), delta_v_sd=1.0, because="the marks are straight")
+    unit = replace(without(UNIT, "accel_y"), assumed=stated)
+    return reconstruct_crash([unit], ENTRY, preparation={"levelling": (0.0, 0.0, 1.0)})
+
+
+def assumed_where_the_impact_is():
+    unit = replace(without(record("side"), "accel_y"), assumed=Assumed(5.0, 1.0))
+    return reconstruct_crash([unit], ENTRY, preparation={"levelling": (0.0, 0.0, 1.0)})
+
+
+def assumed_in_one_range():
+    unit = changed(UNIT, HIGH, lambda t: t.drop(columns="accel_y"))
+    return reconstruct_crash([replace(unit, assumed=Assumed(delta_v_sd=1.0))], ENTRY)
+
+
+def nothing_assumed():
+    Assumed(because="the marks are straight")
 
 
 def gyro_for_accelerometer():
@@ -318,6 +350,11 @@ CRASH_CALLS = (
     CrashCall("The gyro saturated", gyro_saturated),
     CrashCall("A laboratory channel saturated", laboratory_channel_saturated),
     CrashCall("A missing axis", missing_axis),
+    CrashCall("A missing axis that another range has", assumed_in_one_range),
+    CrashCall("A missing axis that is assumed, and no attitude", assumed_and_not_levelled),
+    CrashCall("The same, with the attitude stated", assumed),
+    CrashCall("An impact along an axis that is assumed", assumed_where_the_impact_is),
+    CrashCall("Nothing assumed", nothing_assumed),
     CrashCall("A gyro in place of an accelerometer", gyro_for_accelerometer),
     CrashCall("Parts of different rates and starts", other_rates_and_starts),
     CrashCall("Axes that were not sampled together", axes_not_together),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -16,9 +16,13 @@ from strapdown.crash.unit_effects import unit_effects
 from strapdown.results import RestStretch
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
+from strapdown.sensors.unmeasured import axis_names, unmeasured_axes, unmeasured_turns
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
+
+#: Of units that have none, in place of the name of the one that has.
+NO_GYRO = "no gyro"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +43,9 @@ class AtPoint:
         What it is of; None for a mean of several.
     moved : MovedImu, optional
         How it came to the point.
+    unmeasured, unmeasured_turns : ndarray, (3, 3), optional
+        Projections onto the directions, in vehicle axes, along which the specific force, and
+        about which the turning, is assumed and not measured; None where all are measured.
     """
 
     name: str
@@ -49,6 +56,17 @@ class AtPoint:
     rest_accel_sd: float = 0.0
     prepared: PreparedUnit | None = field(default=None, repr=False)
     moved: MovedImu | None = field(default=None, repr=False)
+    unmeasured: Array | None = field(default=None, repr=False)
+    unmeasured_turns: Array | None = field(default=None, repr=False)
+
+    @property
+    def assumed_axes(self) -> tuple[str, ...]:
+        """What is assumed: of ``forward right down`` and ``roll pitch heading``."""
+        none = np.zeros((3, 3))
+        return axis_names(
+            none if self.unmeasured is None else self.unmeasured,
+            none if self.unmeasured_turns is None else self.unmeasured_turns,
+        )
 
     @property
     def time(self) -> Array:
@@ -67,7 +85,9 @@ class AtPoint:
 
     @property
     def gyro(self) -> str:
-        """Name of the unit that has the gyro, which others may borrow."""
+        """Name of the unit that has the gyro, which others may borrow; or that there is none."""
+        if self.unmeasured_turns is not None and np.trace(self.unmeasured_turns) > 2.5:
+            return NO_GYRO
         lender = None if self.prepared is None else self.prepared.unit.lender
         return self.name if lender is None else lender.name
 
@@ -116,6 +136,9 @@ def at_point(
     AtPoint
     """
     moved = move_unit(prepared, point, window=window)
+    axes, turns = unmeasured_axes(prepared.unit), unmeasured_turns(prepared.unit)
+    if axes.any():
+        moved = _but_along(axes, moved, prepared)
     sd = prepared.unit.trigger_sd if time_sd is None else time_sd
     return AtPoint(
         prepared.unit.name,
@@ -126,4 +149,15 @@ def at_point(
         prepared.rest_accel_sd,
         prepared,
         moved,
+        axes if axes.any() else None,
+        turns if turns.any() else None,
     )
+
+
+def _but_along(axes: Array, moved: MovedImu, prepared: PreparedUnit) -> MovedImu:
+    """What is assumed along an axis is assumed of the point, and no arm adds to it."""
+    kept, imu = np.eye(3) - axes, moved.imu.copy()
+    force = moved.imu[ACCEL].to_numpy(dtype=np.float64) @ kept
+    imu[ACCEL] = force + prepared.imu[ACCEL].to_numpy(dtype=np.float64) @ axes
+    imu.attrs = dict(moved.imu.attrs)
+    return replace(moved, imu=imu, added=kept @ moved.added @ kept)

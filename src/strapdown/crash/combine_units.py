@@ -27,6 +27,10 @@ __all__ = ["COMBINATIONS", "combine_units"]
 COMBINATIONS = ("weighted", "median")
 # Near the impact: rates are weighed by how well they tell the turn over it.
 TURN_WINDOW = (-0.1, 0.75)
+# What swings faster than this is ringing, by which units differ.
+RINGING = 0.05  # s
+# Of squared cosines.
+ROUNDING = 1e-9
 
 
 def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint:
@@ -55,12 +59,13 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
     DataError
         There are fewer than two common samples.
     ConfigError
-        There are too few units, or the method is unknown.
+        There are too few units, the method is unknown, or a median has units with assumed axes.
 
     Notes
     -----
     Weights follow from what each unit states for itself, and any that sum to one are right; those
-    of units that share unknowns are not the best. Samples of a combination are taken for
+    of units that share unknowns are not the best. Where something is assumed of a unit, each axis
+    is weighed by itself, by what is measured of it. Samples of a combination are taken for
     independent, though what the noise of the gyros does through a lever arm is not: this states
     more than there is.
     """
@@ -76,11 +81,19 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
             quantity="units",
             remedy="give two units or more, three or more for a median",
         )
+    if method == "median" and any(u.unmeasured is not None for u in units):
+        raise ConfigError(
+            "a median takes every unit's value, and some units have assumed axes",
+            file=next(u.name for u in units if u.unmeasured is not None),
+            quantity="units",
+            remedy="combine by weights, or leave out the units that lack an axis",
+        )
     time = _common_stamps(units)
     at = [_at(u, time) for u in units]
     force = np.array([u.force for u in at])
     weights = _inverse_weights(at) if method == "weighted" else _median_weights(force)
-    turning = _rate_weights(at)
+    counted = _turning_measured(at)
+    turning = _rate_weights(at, counted)
     name = f"{method} of {', '.join(u.name for u in units)}"
     imu = imu_table(
         time,
@@ -120,7 +133,27 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
         rest,
         # The vehicle's own, which all units feel alike.
         float(share @ [u.rest_accel_sd for u in units]),
+        unmeasured=_by_none([u.unmeasured for u in units]),
+        unmeasured_turns=_by_none(
+            [u.unmeasured_turns for u, counts in zip(units, counted, strict=True) if counts]
+        ),
     )
+
+
+def _by_none(projections: Sequence[Array | None]) -> Array | None:
+    """Projection onto the directions that none of several units measures."""
+    given = [p for p in projections if p is not None]
+    if len(given) < len(projections):
+        return None
+    values, vectors = np.linalg.eigh(np.mean(given, axis=0))
+    kept = vectors[:, values > 1.0 - ROUNDING]
+    return np.asarray(kept @ kept.T) if kept.size else None
+
+
+def _turning_measured(units: Sequence[AtPoint]) -> NDArray[np.bool_]:
+    """Which units measure the turning about the most axes: what others assume does not count."""
+    assumed = [0.0 if u.unmeasured_turns is None else np.trace(u.unmeasured_turns) for u in units]
+    return np.asarray(np.round(assumed) == np.round(min(assumed)))
 
 
 def _common_stamps(units: Sequence[AtPoint]) -> Array:
@@ -202,14 +235,55 @@ def _without_own_tilt(unit: AtPoint) -> SampleEffects:
 
 
 def _inverse_weights(units: Sequence[AtPoint]) -> Array:
-    information = []
+    information: list[Array] = []
+    by_axis = _by_axis(units)
     for u in units:
         effects = u.effects
         covariance = np.einsum("pni,pnj->nij", effects.force, effects.force, optimize=True)
         covariance += effects.force_noise[:, :, None] ** 2 * np.eye(3)
-        information.append(np.linalg.inv(floored(covariance)))
+        if by_axis:
+            covariance = _over_the_pulse(covariance, u.time) * np.eye(3)
+        information.append(_of_measured(floored(covariance), u.unmeasured))
+    by_none = _by_none([u.unmeasured for u in units])
+    if by_none is not None:
+        # Along what none measures all are as good as one another.
+        size = float(np.mean(np.trace(information, axis1=-2, axis2=-1)))
+        information = [i + size * by_none for i in information]
     total = np.linalg.inv(np.sum(information, axis=0))
     return np.array([total @ i for i in information])
+
+
+def _by_axis(units: Sequence[AtPoint]) -> bool:
+    """Whether each axis is weighed by itself.
+
+    An assumed turn through the arms makes errors of the axes hang together, and whole matrices
+    would draw on one axis for another: what rings downward would come forward. Where a missing
+    axis is none of the vehicle's, it cannot be had by axis.
+    """
+    missing = [u.unmeasured for u in units if u.unmeasured is not None]
+    aligned = all(np.abs(p - np.diag(np.diagonal(p))).max() < ROUNDING for p in missing)
+    return aligned and any(u.assumed_axes for u in units)
+
+
+def _over_the_pulse(covariance: Array, time: Array) -> Array:
+    """Means over 50 ms: a scale factor is wrong by more where a unit reads more.
+
+    Sample by sample the one that reads less would always count for more, and where two ring
+    against one another the mean would be less than either.
+    """
+    from scipy.ndimage import uniform_filter1d
+
+    width = max(1, round(RINGING / float(np.median(np.diff(time)))))
+    return np.asarray(uniform_filter1d(covariance, width, axis=0, mode="nearest"))
+
+
+def _of_measured(covariance: Array, unmeasured: Array | None) -> Array:
+    """Inverse of covariances (n, 3, 3), nothing along what is assumed and not measured."""
+    if unmeasured is None:
+        return np.asarray(np.linalg.inv(covariance))
+    kept = np.eye(3) - unmeasured
+    whole = np.linalg.inv(kept @ covariance @ kept + unmeasured)
+    return np.asarray(kept @ whole @ kept)
 
 
 def _median_weights(force: Array) -> Array:
@@ -224,17 +298,17 @@ def _median_weights(force: Array) -> Array:
     return weights
 
 
-def _rate_weights(units: Sequence[AtPoint]) -> Array:
+def _rate_weights(units: Sequence[AtPoint], counted: NDArray[np.bool_]) -> Array:
     """One number a unit; a gyro that several have counts once."""
     time = units[0].time
     steps = np.gradient(time)
     within = (time >= TURN_WINDOW[0]) & (time <= TURN_WINDOW[1])
     steps = np.where(within, steps, 0.0) if within.any() else steps
     known, weights = set(), []
-    for u in units:
+    for u, counts in zip(units, counted, strict=True):
         turned = np.tensordot(steps, u.effects.rate, axes=(0, 1))
         noise = steps[:, None] ** 2 * u.effects.rate_noise**2
         variance = float((turned**2).sum() + noise.sum())
-        weights.append(0.0 if u.gyro in known else 1.0 / max(variance, TINY))
+        weights.append(0.0 if u.gyro in known or not counts else 1.0 / max(variance, TINY))
         known.add(u.gyro)
     return np.asarray(np.array(weights) / np.sum(weights))

@@ -5,14 +5,22 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.crash.at_point import AtPoint
-from strapdown.crash.lever_arm_check import check_lever_arm, lever_arm_findings
-from strapdown.crash.match_axes import axis_findings, match_axes
+from strapdown.crash.lever_arm_check import LeverArmCheck, check_lever_arm, lever_arm_findings
+from strapdown.crash.match_axes import AxisMatch, axis_findings, match_axes
+from strapdown.crash.measured_directions import (
+    chi_square_along,
+    measured_axes,
+    measured_by_all,
+    measured_by_any,
+)
 from strapdown.crash.mounting_rotation import (
+    MountingRotation,
     mounting_rotation,
     rotation_findings,
 )
@@ -32,6 +40,8 @@ Array = NDArray[np.float64]
 __all__ = ["compare_units"]
 
 AXES = ("forward", "right", "down")
+# Variance of what a unit assumes, of the largest there is: none beside what is measured.
+NO_WEIGHT = 1e8
 
 
 def compare_units(
@@ -62,10 +72,12 @@ def compare_units(
 
     Notes
     -----
-    With the difference d of the increments of velocity and its covariance C from all that both
-    units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the attitude that
-    all were levelled at) cancels in d and in C. Ringing that the structure has at one place and
-    not at the other, and whatever else was not stated, shows as a disagreement; its words say
+    Only directions that both units measure are compared: what one assumes of an axis says nothing
+    of the other. With the difference d of the increments of velocity and its covariance C from
+    all that both units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the
+    attitude that all were levelled at) cancels in d and in C. Ringing that the structure has at
+    one place and not at the other, and whatever else was not stated, shows as a disagreement; its
+    words say
     where it is largest. Swapped axes, a turned mounting and wrong positions are looked for in each
     pair.
 
@@ -88,17 +100,17 @@ def compare_units(
         _pair(units[i], units[j], increments[i], increments[j], level)
         for i, j in itertools.combinations(range(len(units)), 2)
     )
-    combined, covariance, chi, against = _against_all(units, increments)
-    freedom = combined.size * (len(units) - 1)
+    together = _against_all(units, increments)
+    chi, freedom = together.chi_square, together.freedom
     probability = _tail(chi, freedom)
     findings = [f for p in pairs for f in p.findings]
     findings += _odd_one(units, pairs)
     return UnitComparison(
         edges,
         pairs,
-        _curve(combined),
-        _curve_sd(covariance),
-        against,
+        _curve(together.combined) + together.told,
+        _curve_sd(together.covariance) + together.told,
+        together.against,
         chi,
         freedom,
         probability,
@@ -116,18 +128,27 @@ def _pair(
 ) -> UnitPair:
     edges = a.edges
     difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)
-    chi, freedom = _square(difference, covariance), difference.size
+    basis = measured_by_all((first, second))
+    told = np.where(measured_axes(basis), 0.0, np.nan)
+    chi, freedom = chi_square_along(basis, difference, covariance)
     probability = _tail(chi, freedom)
-    curve, sd = _curve(difference), _curve_sd(covariance)
+    curve, sd = _curve(difference) + told, _curve_sd(covariance) + told
     lengths = np.diff(edges)[:, None]
-    force_sd = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths
-    axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
+    force_sd = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths + told
     findings: list[Finding] = []
+    whole = not (first.assumed_axes or second.assumed_axes)
+    if whole:
+        axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
+    else:
+        # Three axes and the turning of both are needed to say how they lie to one another.
+        axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
     agree = probability >= level
-    if not agree:
+    if freedom == 0:
+        findings.append(_nothing_in_common(first, second))
+    elif not agree:
         findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
     found = axis_findings(axes, first.name, second.name)
-    if not found and first.prepared is not None and second.prepared is not None:
+    if whole and not found and first.prepared is not None and second.prepared is not None:
         # A small rotation or a wrong place means nothing where an axis is another.
         mounted = first.prepared.unit.mounting, second.prepared.unit.mounting
         angles = math.radians(math.hypot(*(m.angles_sd_deg for m in mounted)))
@@ -145,7 +166,7 @@ def _pair(
         edges,
         curve,
         sd,
-        difference.reshape(-1, 3) / lengths,
+        difference.reshape(-1, 3) / lengths + told,
         force_sd,
         chi,
         freedom,
@@ -158,12 +179,29 @@ def _pair(
     )
 
 
-def _against_all(
-    units: Sequence[AtPoint], increments: Sequence[VelocityIncrements]
-) -> tuple[Array, Array, float, tuple[UnitAgainstAll, ...]]:
+@dataclass(frozen=True, eq=False)
+class _Together:
     """Weighted mean of the increments, its covariance, chi-square, and each unit against it."""
+
+    combined: Array
+    covariance: Array
+    told: Array
+    chi_square: float
+    freedom: int
+    against: tuple[UnitAgainstAll, ...]
+
+
+def _against_all(units: Sequence[AtPoint], increments: Sequence[VelocityIncrements]) -> _Together:
     size = increments[0].values.size
     joint = floored(joint_covariance(increments))
+    pieces, largest = size // 3, float(np.diagonal(joint).max())
+    bases = [measured_by_all((u,)) for u in units]
+    for k, basis in enumerate(bases):
+        if basis.shape[1] < 3:
+            # What a unit assumes has no weight beside what others measure.
+            rows = slice(k * size, (k + 1) * size)
+            unmeasured = np.eye(3) - basis @ basis.T
+            joint[rows, rows] += NO_WEIGHT * largest * np.kron(np.eye(pieces), unmeasured)
     whole = np.tile(np.eye(size), (len(units), 1))
     given = np.concatenate([v.values.ravel() for v in increments])
     weighed = np.linalg.solve(joint, np.column_stack([whole, given]))
@@ -171,15 +209,32 @@ def _against_all(
     combined = covariance @ (whole.T @ weighed[:, size])
     left = given - whole @ combined
     against = []
-    for k, u in enumerate(units):
+    for k, (u, basis) in enumerate(zip(units, bases, strict=True)):
         rows = slice(k * size, (k + 1) * size)
         # The unit is part of the combination: their covariance is the combination's.
         own = joint[rows, rows] - covariance
-        chi = _square(left[rows], own)
+        chi, freedom = chi_square_along(basis, left[rows], own)
+        told = np.where(measured_axes(basis), 0.0, np.nan)
         against.append(
-            UnitAgainstAll(u.name, _curve(left[rows]), _curve_sd(own), chi, size, _tail(chi, size))
+            UnitAgainstAll(
+                u.name,
+                _curve(left[rows]) + told,
+                _curve_sd(own) + told,
+                chi,
+                freedom,
+                _tail(chi, freedom),
+            )
         )
-    return combined, np.asarray(covariance), _square(left, joint), tuple(against)
+    several = measured_by_any(units)
+    freedom = pieces * (sum(b.shape[1] for b in bases) - several.shape[1])
+    return _Together(
+        combined,
+        np.asarray(covariance),
+        np.where(measured_axes(several), 0.0, np.nan),
+        _square(left, joint),
+        freedom,
+        tuple(against),
+    )
 
 
 def _square(difference: Array, covariance: Array) -> float:
@@ -189,7 +244,7 @@ def _square(difference: Array, covariance: Array) -> float:
 def _tail(chi_square: float, freedom: int) -> float:
     from scipy.stats import chi2
 
-    return float(chi2.sf(chi_square, freedom))
+    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
 
 
 def _curve(increments: Array) -> Array:
@@ -214,7 +269,7 @@ def _disagreement(
     probability: float,
 ) -> Finding:
     ratio = np.abs(curve[1:]) / np.maximum(sd[1:], 1e-30)
-    row, axis = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+    row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
     share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
     return Finding(
         f"it and {second.name} disagree at their common point: chi-square {chi:.4g} of {freedom} "
@@ -225,6 +280,15 @@ def _disagreement(
         quantity="delta-V",
         remedy="look at what follows on axes, mounting and positions; without such, one of them "
         "rings or bends with its place, or states too small uncertainties",
+    )
+
+
+def _nothing_in_common(first: AtPoint, second: AtPoint) -> Finding:
+    return Finding(
+        f"it and {second.name} measure no axis in common, and are not compared",
+        file=first.name,
+        quantity="delta-V",
+        remedy="the mean of the units has each axis from the one that measures it",
     )
 
 

@@ -15,6 +15,7 @@ from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, VELOCITY, EntryState
 from strapdown.crash.gnss_entry import entry_state_from_gnss
 from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.sensors.borrowed_gyro import turned_uncertainty
 from strapdown.sensors.triad_numbers import finite, triple
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
@@ -104,7 +105,7 @@ def start_from_gnss(
     Raises
     ------
     DataError, ConfigError, DivergenceError
-        As `entry_state_from_gnss`.
+        As `entry_state_from_gnss`; or an axis or the turning of the unit is assumed.
     """
     unit = None if at.prepared is None else at.prepared.unit
     if unit is None or unit.gyro is None:
@@ -114,6 +115,16 @@ def start_from_gnss(
             quantity="entry",
             remedy="let each unit find its entry, and state that of the mean",
         )
+    if at.assumed_axes:
+        raise DataError(
+            f"its {', '.join(at.assumed_axes)} is assumed and not measured: nothing carries the "
+            "velocity from fix to fix",
+            file=at.name,
+            quantity="entry",
+            remedy="give Entry.from_speed(speed, sd) in m/s, or borrow what is missing from "
+            "another unit",
+        )
+    C_vs = unit.mounting.C_vs
     anchor = given.impact - given.before
     state = entry_state_from_gnss(
         at.imu,
@@ -123,7 +134,9 @@ def start_from_gnss(
         window=given.window,
         antenna=tuple(float(a - p) for a, p in zip(given.antenna, point, strict=True)),
         priors=EntryPriors(
-            gyro=unit.gyro.uncertainty, accel=unit.accelerometers[0].uncertainty, **given.priors
+            gyro=turned_uncertainty(unit.gyro.uncertainty, C_vs),
+            accel=turned_uncertainty(unit.accelerometers[0].uncertainty, C_vs),
+            **given.priors,
         ),
     )
     return _without_biases(at, state, anchor - given.window), _entry(state), state

@@ -50,6 +50,11 @@ class LeverArmCheck:
     told: NDArray[np.bool_]
     misfit: float
 
+    @classmethod
+    def untold(cls) -> LeverArmCheck:
+        """Of units whose motion says nothing of their distance."""
+        return cls(np.zeros(3), np.eye(3), np.full(3, np.inf), np.zeros(3, dtype=bool), 0.0)
+
 
 def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> LeverArmCheck:
     """Estimate how far the stated positions of two units are off.
@@ -73,9 +78,7 @@ def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> Le
     """
     shares = [v.lever for v in (first, second) if v.lever.any()]
     if not shares:
-        return LeverArmCheck(
-            np.zeros(3), np.eye(3), np.full(3, np.inf), np.zeros(3, dtype=bool), 0.0
-        )
+        return LeverArmCheck.untold()
     lever = np.mean(shares, axis=0)
     difference = (first.values - second.values).ravel()
     covariance = floored(difference_covariance(first, second, without=(LEVER_ARM,)))

@@ -48,6 +48,11 @@ class AxisMatch:
     gyro_sure: float
     ambiguous: tuple[str, ...]
 
+    @classmethod
+    def untold(cls) -> AxisMatch:
+        """Of units whose motion says nothing of it."""
+        return cls(np.eye(3), np.eye(3), 0.0, 0.0, 0.0, 0.0, AXES)
+
     @property
     def kind(self) -> str:
         """``agree``, ``unit`` (turned as a whole), ``accelerometers``, ``gyro``, or ``both``."""

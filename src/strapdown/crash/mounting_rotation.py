@@ -51,6 +51,11 @@ class MountingRotation:
     covariance: Array
     misfit: float
 
+    @classmethod
+    def untold(cls) -> MountingRotation:
+        """Of units whose motion says nothing of it."""
+        return cls(np.eye(3), np.zeros(3), np.pi**2 * np.eye(3), 0.0)
+
     @property
     def sd_deg(self) -> Array:
         """About each axis of the first unit, (3,), deg."""

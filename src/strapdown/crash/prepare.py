@@ -17,20 +17,31 @@ from strapdown.crash.prepare_findings import (
     step_findings,
 )
 from strapdown.crash.prepare_options import check_options
-from strapdown.crash.rest_attitude import from_stated_attitude, gravity_correction, level_at_rest
+from strapdown.crash.rest_attitude import (
+    from_stated_attitude,
+    gravity_correction,
+    level_at_rest,
+    with_gravity,
+)
 from strapdown.exceptions import Finding
 from strapdown.results import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.high_g_bias import bias_from_lower_range
-from strapdown.sensors.pre_crash import find_pre_crash_rest, gyro_bias_from, in_axes
+from strapdown.sensors.pre_crash import (
+    BiasEstimate,
+    find_pre_crash_rest,
+    gyro_bias_from,
+    in_axes,
+)
 from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
 from strapdown.sensors.range_agreement import agreement_findings
 from strapdown.sensors.range_merge import merge_ranges
 from strapdown.sensors.rest import rest_between
 from strapdown.sensors.saturation import RangeLimits, find_limits
-from strapdown.sensors.triad_errors import ZERO, Triad
+from strapdown.sensors.triad_errors import ZERO, Triad, triad_of
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.sensors.unit_checks import UnitArrays, check_unit
+from strapdown.sensors.unmeasured import assumed_findings, with_filled_axes, with_gyro
 from strapdown.tables import imu_table
 
 Array = NDArray[np.float64]
@@ -59,14 +70,15 @@ def prepare_unit(
     ----------
     unit : CrashUnit
         On the common clock, zero at the trigger; all triads at the same stamps, the gyro its
-        own or borrowed, in the unit's axes.
+        own or borrowed, in the unit's axes; or without what its `assumed` speaks of.
     gravity : float, m/s²
-        At the place.
+        At the place. Where the unit has axes that are assumed, gravity's part is put there.
     rest : 'auto' or (start, end), s
         Where the vehicle stands before the crash: found, or stated.
     levelling : (roll, pitch, sd), deg, optional
         Attitude of the vehicle before the crash where it is known otherwise: needed where the
-        record has no rest, and better than a sensor with a bias of tenths of g. The bias of the
+        record has no rest or the unit lacks an axis of its accelerometers, and better than a
+        sensor with a bias of tenths of g. The bias of the
         lowest range is then taken from gravity in that attitude, where this says more of it
         than is stated: so are channels that were zeroed before the test given back what they
         lost.
@@ -92,8 +104,8 @@ def prepare_unit(
     ------
     DataError
         The unit is refused by `check_unit`; there is neither a rest nor a steady stretch and no
-        levelling is given; the stated rest has too few samples; or the specific force at rest
-        has not the length of gravity and no levelling is given.
+        levelling is given; the stated rest has too few samples; the specific force at rest
+        has not the length of gravity, or an axis is missing and assumed, and no levelling is given.
     ConfigError
         An option is out of range.
     """
@@ -109,14 +121,15 @@ def prepare_unit(
         hysteresis=hysteresis,
         fade=fade,
     )
-    data = check_unit(unit)
+    unit = with_gyro(with_filled_axes(unit))
+    data = with_gravity(unit, check_unit(unit), levelling, gravity)
     assert unit.gyro is not None
     triads, gyro = unit.accelerometers, unit.gyro.uncertainty
     limits = [_limits(data.time, y, t) for y, t in zip(data.accelerometers, triads, strict=True)]
     gyro_limits = _limits(data.time, data.gyro, unit.gyro)
     noise = [_noise(data.time, t.uncertainty) for t in triads]
     gyro_noise = _noise(data.time, gyro)
-    findings: list[Finding] = [*data.findings]
+    findings: list[Finding] = [*data.findings, *assumed_findings(unit)]
     findings += saturation_findings(unit, data, limits, gyro_limits)
     limits = [_with_held(limit, t) for limit, t in zip(limits, triads, strict=True)]
 
@@ -125,7 +138,9 @@ def prepare_unit(
         unit, data.time, impact, own, levelling is not None, steady_acceleration
     )
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
-    turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=steady_rate)
+    turn = _where_there(
+        gyro_bias_from(own, gyro.axis("bias"), steady_rate=steady_rate), unit.gyro.absent
+    )
 
     bias, bias_from, bias_sd = _range_biases(unit, data, limits, own)
     findings += bias_findings(unit, bias, bias_from, own)
@@ -162,7 +177,9 @@ def prepare_unit(
         level = level_at_rest(standing, unknown, gravity, unit.name)
     correction = 0.0
     matched = bias_from[0] == FROM_GRAVITY
-    if match_gravity and standing is not None and not matched:
+    # Along an axis that is not there nothing is to be corrected.
+    whole = not triads[0].absent
+    if match_gravity and whole and standing is not None and not matched:
         found = gravity_correction(standing, triads[0].uncertainty, unknown, gravity)
         if found is not None:
             matched, (correction, along) = True, found
@@ -265,6 +282,14 @@ def _noise(time: Array, uncertainty: TriadUncertainty) -> Array:
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     white = np.asarray(uncertainty.noise_density) / np.sqrt(steps)[:, None]
     return np.hypot(white, np.asarray(uncertainty.quantization) / math.sqrt(12.0))
+
+
+def _where_there(found: BiasEstimate, absent: tuple[int, ...]) -> BiasEstimate:
+    """Without a word on axes that are not there: what is assumed of them is told elsewhere."""
+    keep = [k not in absent for k in range(3)]
+    return BiasEstimate(
+        triad_of(np.where(keep, found.bias, 0.0)), triad_of(np.where(keep, found.sd, 0.0))
+    )
 
 
 def _stated_sd(uncertainty: TriadUncertainty, C: Array) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +12,15 @@ from strapdown.alignment.levelling import level
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.exceptions import DataError
 from strapdown.results import RestStretch
+from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.prepared_unit import Levelling
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.unit_checks import UnitArrays
+from strapdown.tables import ACCEL
 
 Array = NDArray[np.float64]
 
-__all__ = ["from_stated_attitude", "gravity_correction", "level_at_rest"]
+__all__ = ["from_stated_attitude", "gravity_correction", "level_at_rest", "with_gravity"]
 
 
 def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str) -> Levelling:
@@ -96,6 +100,49 @@ def from_stated_attitude(
     if known >= float(bias_sd.max()):
         return levelling, None
     return levelling, np.asarray(rest.accel_mean) - force_at_rest(roll, pitch, gravity)
+
+
+def with_gravity(
+    unit: CrashUnit,
+    data: UnitArrays,
+    levelling: tuple[float, float, float] | None,
+    gravity: float,
+) -> UnitArrays:
+    """Put gravity's part on the axes that are assumed.
+
+    Parameters
+    ----------
+    unit : CrashUnit
+        Whose triads say which axes those are.
+    data : UnitArrays
+        Its numbers, sensor axes.
+    levelling : (roll, pitch, sd), deg, optional
+        Of the vehicle at rest.
+    gravity : float, m/s²
+
+    Raises
+    ------
+    DataError
+        There is such an axis, and no levelling is stated: accelerometers along two axes do not
+        tell how a vehicle stands.
+    """
+    absent = list(unit.accelerometers[0].absent)
+    if not absent:
+        return data
+    if levelling is None:
+        missing = " and no ".join(ACCEL[k] for k in absent)
+        raise DataError(
+            f"it has no {missing}, and without three axes the attitude at rest is not felt",
+            file=unit.name,
+            quantity="levelling",
+            remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1) for a level road (of "
+            "reconstruct_crash: in preparation={...})",
+        )
+    at_rest = force_at_rest(levelling[0], levelling[1], gravity) @ unit.mounting.C_vs
+    filled = tuple(y.copy() for y in data.accelerometers)
+    for y in filled:
+        y[:, absent] = at_rest[absent]
+    return replace(data, accelerometers=filled)
 
 
 def gravity_correction(

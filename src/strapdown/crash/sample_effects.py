@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 GYRO_BIAS = "gyro bias"
 LEVER_ARM = "lever arm"
 MOUNTING = "mounting"
+NO_TURNING = "assumed: no turning"
+MISSING_AXIS = "assumed: missing axis"
 
 
 @dataclass(frozen=True, eq=False)

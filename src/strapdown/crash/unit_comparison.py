@@ -29,17 +29,19 @@ class UnitPair:
         Integral of the first one's specific force minus that of the second's, vehicle axes,
         from the first edge.
     sd : ndarray, (m + 1, 3), m/s
-        As both state it.
+        As both state it. NaN along axes that either assumes, here and in what follows.
     force_difference, force_sd : ndarray, (m, 3), m/s²
         Means over each piece.
     chi_square, freedom : float, int
-        Of all pieces and axes together, with their covariance.
+        Of all pieces and axes together, with their covariance; of those axes that both
+        measure. Zero, where there is none.
     probability : float
         Of a chi-square as large or larger, where the statements are right.
     agree : bool
     axes : AxisMatch
     turned : MountingRotation
     lever_arm : LeverArmCheck
+        These three tell nothing where either assumes an axis or the turning.
     findings : tuple of Finding
     """
 
@@ -69,7 +71,7 @@ class UnitAgainstAll:
     name : str
     difference, sd : ndarray, (m + 1, 3), m/s
         Its delta-V minus the combination's, and as stated: what it shares with the combination
-        is taken into account.
+        is taken into account. NaN along axes that it, or that all, assume.
     chi_square, freedom, probability
         As `UnitPair`.
     """
@@ -91,7 +93,8 @@ class UnitComparison:
     edges : ndarray, (m + 1,), s
     pairs : tuple of UnitPair
     combined : ndarray, (m + 1, 3), m/s
-        Delta-V of the best weighted combination, gravity still in it, body axes.
+        Delta-V of the best weighted combination, gravity still in it, body axes; NaN along axes
+        that all units assume.
     combined_sd : ndarray, (m + 1, 3), m/s
     against : tuple of UnitAgainstAll
     chi_square, freedom, probability

@@ -9,9 +9,11 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
+from strapdown.crash.assumed_effects import assumed_effects
 from strapdown.crash.sample_effects import (
     GYRO_BIAS,
     LEVER_ARM,
+    MISSING_AXIS,
     MOUNTING,
     SampleEffects,
     level_turned_by,
@@ -21,13 +23,14 @@ from strapdown.exceptions import DataError
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.lever_arm import MovedImu
 from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
+from strapdown.sensors.unmeasured import TURNS as ANGLES
+from strapdown.sensors.unmeasured import unmeasured_axes
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
 # What is alike for all units of one vehicle.
 VEHICLE = "vehicle"
-ANGLES = ("roll", "pitch", "heading")
 # What is faster than this part of a record is vibration to it.
 VIBRATION = 0.025  # s
 
@@ -49,6 +52,8 @@ def unit_effects(prepared: PreparedUnit, moved: MovedImu, *, time_sd: float = 0.
         Bias, scale factor, misalignment, nonlinearity and vibration rectification of every range
         that speaks, with what its bias was taken from; the same of the gyro, with its sensitivity
         to specific force and what it does through the lever arm; mounting; lever arm; timing.
+        What is assumed of axes and turning that were not measured (contributors ``assumed:
+        no turning`` and ``assumed: missing axis``), of the vehicle.
         An unknown without a standard deviation is left out. Those of a borrowed gyro have the
         name of its unit, and are along its axes; those of the levelling are of the vehicle.
 
@@ -97,6 +102,8 @@ class _UnitEffects:
         self.rests: list[Array] = []
         self.tilts: list[Array] = []
         level = prepared.levelling
+        self.unmeasured = unmeasured_axes(unit)
+        self.measured = np.eye(3) - self.unmeasured
         self.level = rotation.dcm_from_euler([level.roll_deg, level.pitch_deg, 0.0])
 
     def collect(self) -> SampleEffects:
@@ -106,6 +113,7 @@ class _UnitEffects:
         self._mounting()
         self._timing()
         self._levelling()
+        self._assumed()
         count, n = len(self.names), len(self.time)
         return SampleEffects(
             tuple(self.names),
@@ -116,7 +124,7 @@ class _UnitEffects:
             np.array(self.tilts).reshape(count, 3),
             # What the gyro's noise adds through the arm is told as if each sample had its own:
             # more than there is, since a slope's noise comes back with the other sign.
-            _sd(self.prepared.noise_covariance + self.moved.added),
+            _sd(self._noise()),
             _sd(self.prepared.gyro_noise_covariance),
         )
 
@@ -130,11 +138,15 @@ class _UnitEffects:
         owner: str = "",
         tilt: Array | None = None,
         through_arm: bool = True,
+        of_all_axes: bool = False,
     ) -> None:
         n = len(self.time)
         added = np.zeros((n, 3)) if force is None else force
         if rate is not None and through_arm and self.moved.lever_arm.any():
             added = added + self.moved.of_rate(rate)
+        if not of_all_axes:
+            # No sensor, and no arm, makes the value of an axis that is assumed.
+            added, rest = added @ self.measured, rest @ self.measured
         # The correction that makes the force at rest as long as gravity takes back what an
         # unknown adds along it.
         if self.prepared.gravity_matched and self.has_rest and rest.any():
@@ -298,18 +310,44 @@ class _UnitEffects:
                 force = self.moved.lever @ (-mounting.position_sd * unit)
                 self._add(f"lever arm {AXES[axis]}", LEVER_ARM, force, None, np.zeros(3))
 
+    def _noise(self) -> Array:
+        of_both = self.prepared.noise_covariance + self.moved.added
+        return np.asarray(self.measured @ of_both @ self.measured)
+
+    def _assumed(self) -> None:
+        for of in assumed_effects(self.prepared):
+            self._add(
+                of.name,
+                of.contributor,
+                of.force,
+                of.rate,
+                np.zeros(3),
+                VEHICLE,
+                of_all_axes=of.contributor == MISSING_AXIS,
+            )
+
     def _levelling(self) -> None:
         sd = np.radians(self.prepared.levelling.sd_deg)
         n = len(self.time)
         for axis, name in enumerate(("north", "east")):
             tilt = sd * np.eye(3)[axis]
             # Where a bias was taken from gravity in a stated attitude, it is wrong with it.
-            shift = np.zeros(3)
-            if self.prepared.bias_from[0] == FROM_GRAVITY:
-                shift = -self.level.T @ np.cross(tilt, [0.0, 0.0, -GRAVITY])
+            shift = -self.level.T @ np.cross(tilt, [0.0, 0.0, -GRAVITY])
+            if self.prepared.bias_from[0] != FROM_GRAVITY:
+                # Gravity was put on an assumed axis, all the same.
+                shift = self.unmeasured @ shift
             if sd > 0.0:
                 force = np.tile(shift, (n, 1))
-                self._add(f"levelling {name}", "levelling", force, None, shift, VEHICLE, tilt)
+                self._add(
+                    f"levelling {name}",
+                    "levelling",
+                    force,
+                    None,
+                    shift,
+                    VEHICLE,
+                    tilt,
+                    of_all_axes=True,
+                )
         steady = self.prepared.rest_accel_sd
         if steady > 0.0 and self.prepared.bias_from[0] == FROM_GRAVITY:
             for axis in range(3):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 #: Length of the trailing window: Tadic and Vukajlovic (2016), section 4.
 PEAK_WINDOW = 0.030
+NO_ROLL = "whether it rolled over cannot be told without a gyro about the forward axis"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +139,7 @@ def reconstruct_unit(
     findings = [
         *events.findings,
         *entry_findings(at_point, entry, path, events, mechanization),
+        *_unseen(at_point, events),
     ]
     for event in events.events:
         ends = event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
@@ -173,6 +175,20 @@ def reconstruct_unit(
                     remedy="choose a window that holds the whole event",
                 )
             )
+    # Of a roll that was assumed nothing can be told.
+    rolled = "roll" not in at_point.assumed_axes
+    types = classify_crashes(
+        [changes.event.delta_v for changes in body],
+        [changes.event.bound.covariance for changes in body],
+        events=events.events,
+        time=acceleration.time if rolled else None,
+        roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64) if rolled else None,
+        start_roll_deg=at_point.levelling.roll_deg,
+        roll_rate_sd=effects.roll_bias_sd,
+        start_roll_sd_deg=at_point.levelling.sd_deg,
+    )
+    if not rolled:
+        types = tuple(replace(t, reason=f"{t.reason}; {NO_ROLL}") for t in types)
     return UnitReconstruction(
         at_point.name,
         at_point,
@@ -182,18 +198,24 @@ def reconstruct_unit(
         path,
         tuple(body),
         tuple(ned),
-        classify_crashes(
-            [changes.event.delta_v for changes in body],
-            [changes.event.bound.covariance for changes in body],
-            events=events.events,
-            time=acceleration.time,
-            roll_rate=at_point.imu["gyro_x"].to_numpy(dtype=np.float64),
-            start_roll_deg=at_point.levelling.roll_deg,
-            roll_rate_sd=effects.roll_bias_sd,
-            start_roll_sd_deg=at_point.levelling.sd_deg,
-        ),
+        types,
         tuple(findings),
     )
+
+
+def _unseen(at_point: AtPoint, events: CrashEvents) -> list[Finding]:
+    """An impact along an axis that is assumed is none of the events."""
+    blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
+    if events.events or not blind:
+        return []
+    return [
+        Finding(
+            f"an impact along {' or '.join(blind)} would not show: that axis is assumed",
+            file=at_point.name,
+            quantity="delta-V",
+            remedy="that no event was found says nothing of such an impact",
+        )
+    ]
 
 
 def _moved(change: DeltaV, ends: tuple[float, float]) -> Array:

@@ -17,7 +17,7 @@ from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
 
-__all__ = ["check_lenders", "turned_gyro"]
+__all__ = ["check_lenders", "turned_gyro", "turned_uncertainty"]
 
 # A component that takes less than this of an axis does not feel that axis's end of range.
 FEELS = 1e-3
@@ -71,11 +71,12 @@ def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> Tr
     C_ba = borrower.C_vs.T @ lender.C_vs
     square = C_ba**2
     feels = np.abs(C_ba) > FEELS
+    told = turned_uncertainty(lent.triad.uncertainty, C_ba)
     table = lent.triad.table
     turned = pd.DataFrame(table[GYRO].to_numpy() @ C_ba.T, index=table.index, columns=GYRO)
     turned.attrs = dict(table.attrs)
     return TriadAtStamps(
-        RecordedTriad(turned, _turned(lent.triad.uncertainty, square, feels), lent.triad.name),
+        RecordedTriad(turned, told, lent.triad.name),
         np.sqrt(lent.noise_factor**2 @ square.T),
         np.sqrt(lent.noise**2 @ square.T),
         np.asarray((lent.clipped[:, None, :] & feels).any(axis=2)),
@@ -84,9 +85,23 @@ def turned_gyro(lent: TriadAtStamps, lender: Mounting, borrower: Mounting) -> Tr
     )
 
 
-def _turned(
-    uncertainty: TriadUncertainty, square: Array, feels: NDArray[np.bool_]
-) -> TriadUncertainty:
+def turned_uncertainty(uncertainty: TriadUncertainty, C: Array) -> TriadUncertainty:
+    """What is stated of a triad, in other axes.
+
+    Parameters
+    ----------
+    uncertainty : TriadUncertainty
+    C : ndarray, (3, 3)
+        Turns vectors from the axes of the triad into the others.
+
+    Returns
+    -------
+    TriadUncertainty
+        Standard deviations as of independent axes, ``sd² -> (C ∘ C) sd²``; the range of an axis is
+        the least of those it feels.
+    """
+    square, feels = C**2, np.abs(C) > FEELS
+
     def turned(name: str) -> Triad:
         return triad_of(np.sqrt(square @ np.square(uncertainty.axis(name))))
 

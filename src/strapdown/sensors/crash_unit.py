@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import ConfigError
+from strapdown.sensors.assumed import Assumed
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.triad_numbers import FARTHEST, check_sd, triple
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -84,6 +85,9 @@ class RecordedTriad:
         Of a table that was brought to other stamps: whether a recorded sample at an end of the
         range counts in a row, where the values themselves may be well within. None where the
         table is as recorded.
+    absent : tuple of int
+        Axes (0, 1, 2) that were not recorded: their columns are there in place of what is
+        assumed (`unmeasured.with_filled_axes`).
 
     Raises
     ------
@@ -95,6 +99,7 @@ class RecordedTriad:
     uncertainty: TriadUncertainty
     name: str
     held: NDArray[np.bool_] | None = None
+    absent: tuple[int, ...] = ()
 
     def __post_init__(self) -> None:
         if not isinstance(self.table, pd.DataFrame):
@@ -136,6 +141,9 @@ class CrashUnit:
         How well that instant is known.
     lender : CrashUnit, optional
         The unit of that name, once its gyro stands in `gyro`, turned into these sensor axes.
+    assumed : Assumed, optional
+        What is taken of the axes that its tables have no column of, and of the turning where
+        it has no gyro and borrows none.
 
     Raises
     ------
@@ -151,6 +159,7 @@ class CrashUnit:
     trigger: float | None = None
     trigger_sd: float = 0.0
     lender: CrashUnit | None = None
+    assumed: Assumed | None = None
 
     def __post_init__(self) -> None:
         given: object = self.accelerometers
@@ -166,6 +175,13 @@ class CrashUnit:
         object.__setattr__(self, "accelerometers", tuple(given))
         if not (self.gyro is None or isinstance(self.gyro, RecordedTriad)):
             raise _kind(self.gyro, self.name, "gyro", "give a RecordedTriad, or None")
+        if not (self.assumed is None or isinstance(self.assumed, Assumed)):
+            raise _kind(
+                self.assumed,
+                self.name,
+                "assumed",
+                "give Assumed(turn_sd_deg=..., delta_v_sd=...), or None",
+            )
         if not isinstance(self.mounting, Mounting):
             raise _kind(self.mounting, self.name, "mounting", "give a Mounting")
         if not (self.trigger is None or is_number(self.trigger)):

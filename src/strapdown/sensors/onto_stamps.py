@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -150,7 +150,7 @@ def onto_stamps(
     table.attrs = {**triad.table.attrs, "sampling": sampling, "source": channels.source}
     order = ("decimated", "averaged", "interpolated", "as recorded")
     result = TriadAtStamps(
-        RecordedTriad(table, triad.uncertainty, triad.name),
+        RecordedTriad(table, triad.uncertainty, triad.name, absent=triad.absent),
         factor,
         noise,
         clipped,
@@ -177,7 +177,7 @@ def at_rows(triad: TriadAtStamps, stamps: Array, rate: float) -> TriadAtStamps:
     part = table.iloc[rows]
     part.attrs = dict(table.attrs)
     return TriadAtStamps(
-        RecordedTriad(part, triad.triad.uncertainty, triad.triad.name),
+        replace(triad.triad, table=part, held=None),
         triad.noise_factor[rows],
         triad.noise[rows],
         triad.clipped[rows],

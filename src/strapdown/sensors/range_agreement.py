@@ -114,6 +114,9 @@ def agreement_findings(
         matrix, sd = regress_range(upper, lower)
         for row, axis in enumerate("xyz"):
             told = (sd[row] < MOST_SD) & moved
+            if low.absent:
+                # What moves along the axis that is not there leaks into the others.
+                told &= np.arange(3) == row
             wrong = told & (np.abs(matrix[row] - np.eye(3)[row]) > OTHER_AXIS)
             if not wrong.any():
                 continue

@@ -19,8 +19,11 @@ LEAST_FLAT = 3  # samples
 LEAST_JUMP = 3.0  # steps
 # So many cannot be where a fast rise meets a slow fall, unless there is no noise at all.
 SURE_FLAT = 10
-# A flat extreme below this part of the stated range, or of the largest reading, is no end.
+# A flat extreme below this part of the stated range, or of the largest reading, is an end only
+# where it is surely flat, left by jumps on both sides, and this many steps off the usual value:
+# a rest between two pulses is flat, too.
 LEAST_PART = 0.1
+OFF_REST = 10.0
 # Of a full scale: what is nearer to it than this, or than a step, is at it.
 ROUNDING = 1e-9
 
@@ -78,7 +81,8 @@ def find_limits(
     A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
     an end where it stays on the very same extreme value of the record for three samples or
     more, up to 0.5 s, and jumps by three steps or more on both sides (ten samples or more: on one
-    side): noise repeats no number, and the top of a smooth pulse is left by fewer steps.
+    side): noise repeats no number, and the top of a smooth pulse is left by fewer steps. Below a
+    tenth of the range, or of the largest reading, it needs ten samples and jumps on both sides.
     """
     lower, upper = -np.asarray(full_scale, dtype=np.float64), np.array(full_scale, dtype=np.float64)
     axes = values.shape[1]
@@ -111,12 +115,16 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
         return None
     top = float(y.max())
     floor = LEAST_PART * max(full if np.isfinite(full) else 0.0, float(np.abs(y).max()))
-    if top <= max(floor, 0.0) or top == float(np.median(y)):
+    usual = float(np.median(y))
+    if top <= 0.0 or top == usual:
         return None
     at = y == top
     edges = np.diff(np.r_[False, at, False].astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     step = _least_step(y)
+    low = top <= floor
+    if low and top - usual < OFF_REST * step:
+        return None
     for a, b in zip(starts.tolist(), ends.tolist(), strict=True):
         sides = [float(y[i]) for i in (a - 1, b) if 0 <= i < y.size]
         jumps = [top - side for side in sides] or [0.0]
@@ -124,8 +132,9 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
         # The top of a parabola that stays within a step for n samples is left by ((n + 2)/n)².
         n = b - a
         least = max(LEAST_JUMP - 0.5, (1.0 + 2.0 / n) ** 2 + 0.5) * step
-        jump = max(jumps) if n >= SURE_FLAT else min(jumps)
-        if n >= LEAST_FLAT and short and jump >= least:
+        jump = max(jumps) if n >= SURE_FLAT and not low else min(jumps)
+        enough = n >= SURE_FLAT and len(sides) == 2 if low else n >= LEAST_FLAT
+        if enough and short and jump >= least:
             return np.asarray(at, dtype=np.bool_)
     return None
 

@@ -23,6 +23,7 @@ from strapdown.sensors.unit_clocks import (
     clocks_by_trigger,
 )
 from strapdown.sensors.units_together import check_options, check_rate, compare_sizes
+from strapdown.sensors.unmeasured import with_filled_axes, with_gyro
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -161,12 +162,22 @@ def synchronise(
         A unit has no trigger, a bad table, or no stretch in common with the others.
     """
     check_options(units, method, rate, reference, sampling)
+    units = [with_filled_axes(u) for u in units]
     by_name = {u.name: u for u in units}
     check_lenders(by_name)
     given = [_channels(u) for u in units]
     check_rate(rate, [g.step for u in given for t in _triads(u) for g in t.groups])
     findings = [f for u in given for t in _triads(u) for f in t.findings]
-    findings += compare_sizes([(u.gyro, u.accelerometers) for u in given])
+    # Of fewer axes a vector is shorter, whatever it is in.
+    findings += compare_sizes(
+        [
+            (
+                None if u.unit.gyro is None or u.unit.gyro.absent else u.gyro,
+                () if any(t.absent for t in u.unit.accelerometers) else u.accelerometers,
+            )
+            for u in given
+        ]
+    )
     zero_sd = 0.0
     if method == "trigger":
         clocks, reference = clocks_by_trigger(given), None
@@ -228,7 +239,7 @@ def _made(
         lender=lender,
     )
     return SynchronisedUnit(
-        made,
+        with_gyro(made),
         accelerometers,
         gyro,
         clock.offset,

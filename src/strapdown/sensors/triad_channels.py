@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.tables import ACCEL, SAMPLINGS, find_gaps
+from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
 from strapdown.tables.checks import check_rows, check_time
 
 Array = NDArray[np.float64]
@@ -30,6 +30,8 @@ OVER_RANGE = 1.05
 # A sample each 100 ms sees no crash.
 SLOWEST_STEP = 0.1  # s
 DEGREES = 180.0 / math.pi
+# What is stated of an axis that is not there.
+_ASSUMED = {ACCEL[0]: "delta_v_sd", GYRO[0]: "turn_sd_deg"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +114,10 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
             f"it has no {' and no '.join(missing)}; it has {', '.join(map(str, table.columns))}",
             file=source,
             quantity=missing[0],
-            remedy="give all three axes, or leave this part out",
+            remedy="give all three axes, or leave this part out"
+            if len(missing) == 3
+            else "give all three axes, leave this part out, or state what is taken of the "
+            f"missing one, CrashUnit(assumed=Assumed({_ASSUMED[columns[0]]}=...))",
         )
     sampling = table.attrs.get("sampling")
     if sampling not in SAMPLINGS:
@@ -256,6 +261,9 @@ def _judge_force(
     source: str, unit: CrashUnit, triad: RecordedTriad, groups: tuple[AxisGroup, ...]
 ) -> list[Finding]:
     found = _over_range(source, triad, groups, "m/s²", "g instead of m/s²? 1 g is 9.80665 m/s²")
+    if triad.absent:
+        # Gravity may be along the axis that is not there.
+        return found
     length = float(np.linalg.norm(_quiet_mean(unit, groups)))
     if IN_G[0] <= length <= IN_G[1]:
         what = f"its specific force before the crash is {length:.3f} in length: gravity in g"

@@ -71,7 +71,8 @@ def check_unit(unit: CrashUnit) -> UnitArrays:
             file=unit.name,
             quantity="gyro",
             remedy="name a unit on the same vehicle in gyro_from and synchronise the units, so "
-            "that its gyro is borrowed: a rigid vehicle turns everywhere alike",
+            "that its gyro is borrowed: a rigid vehicle turns everywhere alike; or state how far "
+            "it may have turned, CrashUnit(assumed=Assumed(turn_sd_deg=...))",
         )
     forces = tuple(_values(unit, triad, ACCEL) for triad in unit.accelerometers)
     rates = _values(unit, unit.gyro, GYRO)
@@ -98,7 +99,12 @@ def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
             f"it has no {' and no '.join(missing)}; a motion in space needs three axes",
             file=source,
             quantity=missing[0],
-            remedy="give the missing axis from another part of the unit, or leave this part out",
+            remedy="give the missing axis from another part of the unit, leave this part out, or "
+            "state how far its velocity may have changed along it, "
+            "CrashUnit(assumed=Assumed(delta_v_sd=...))"
+            if columns == ACCEL
+            else "give the missing axis, or state how far the vehicle may have turned about it, "
+            "CrashUnit(assumed=Assumed(turn_sd_deg=...))",
         )
     if triad.table.attrs.get("sampling") not in SAMPLINGS:
         raise DataError(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
 from strapdown.exceptions import DataError, Finding
-from strapdown.sensors.crash_unit import CrashUnit
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.triad_channels import TriadChannels
 from strapdown.sensors.triad_numbers import check_sd
@@ -162,7 +162,8 @@ def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
     The widest range is used, as what is held at the end of a range has no shape.
     """
     pairs = [(FORCE, reference.accelerometers, u.accelerometers)]
-    if reference.gyro is not None and u.gyro is not None:
+    if not _lacks(reference.unit.gyro) and not _lacks(u.unit.gyro):
+        assert reference.gyro is not None and u.gyro is not None
         pairs.append((RATES, (reference.gyro,), (u.gyro,)))
     found, errors = [], []
     for what, first, second in pairs:
@@ -180,6 +181,11 @@ def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
             remedy="give its trigger and synchronise by trigger, or take another reference unit",
         )
     return min(found, key=lambda f: f[0].sd)
+
+
+def _lacks(gyro: RecordedTriad | None) -> bool:
+    """Whether there is no gyro, or none about all axes: the length of its rates is then another."""
+    return gyro is None or bool(gyro.absent)
 
 
 def _length(channels: TriadChannels) -> EvenSignal:

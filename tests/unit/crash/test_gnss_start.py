@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -125,3 +127,29 @@ def test_what_cannot_be_is_told(cases, options, words):
     _, fixes, *_ = cases[0]
     with pytest.raises(ConfigError, match=words):
         GnssEntry(fixes, **options)
+
+
+def test_priors_are_of_the_vehicles_axes(monkeypatch):
+    """A unit that is turned by 90 deg about down has its forward axis along the sensor's -y."""
+    unit, _ = record_crash(CRASH.motion, DESIGN, impact=IMPACT, seed=0)
+    turned = Mounting(unit.mounting.position, (0.0, 0.0, 90.0))
+    own = synchronise([replace(unit, mounting=turned)]).units[0].unit
+    low, gyro = own.accelerometers[0], own.gyro
+    told = replace(low.uncertainty, bias=(0.1, 0.2, 0.3))
+    own = replace(
+        own,
+        accelerometers=(replace(low, uncertainty=told), *own.accelerometers[1:]),
+        gyro=replace(gyro, uncertainty=replace(gyro.uncertainty, bias=(0.01, 0.02, 0.03))),
+    )
+    at = at_point(prepare_unit(own, levelling=(0.0, 0.0, 1.0)), (0.0, 0.0, 0.0))
+    seen = {}
+
+    def stop(*_, priors, **__):
+        seen["priors"] = priors
+        raise DataError("enough", quantity="test", remedy="none")
+
+    monkeypatch.setattr("strapdown.crash.gnss_start.entry_state_from_gnss", stop)
+    with pytest.raises(DataError, match="enough"):
+        start_from_gnss(at, GnssEntry(simulate_gnss(CRASH.motion, RECEIVER)), (0.0, 0.0, 0.0))
+    assert seen["priors"].accel.axis("bias") == pytest.approx((0.2, 0.1, 0.3))
+    assert seen["priors"].gyro.axis("bias") == pytest.approx((0.02, 0.01, 0.03))

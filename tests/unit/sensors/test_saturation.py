@@ -83,3 +83,32 @@ def test_any_number_of_axes():
     y[300:320] = 5.0
     found = find_limits(TIME, y, np.array([50.0]), np.array([0.1]))
     assert found.found.shape == found.upper.shape == (1,)
+
+
+@pytest.mark.parametrize("q", [0.0, 0.5])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_end_far_below_the_stated_range_is_found(q, sign):
+    # An amplifier that ends at 40 of a stated 980 m/s²: a run of 10 ms and more on one value.
+    y = sign * crash(300.0, full=40.0, q=q)
+    out = limits(y, 980.0, q)
+    assert out.found[0]
+    assert np.array_equal(out.clipped[:, 0], y[:, 0] == -sign * 40.0)
+    assert out.clipped[:, 0].sum() >= 10
+    assert not out.clipped[:, 2].any()
+
+
+def test_a_short_run_far_below_the_range_is_none():
+    y = crash(45.0, sd=0.0, full=42.0)
+    assert 3 <= (y[:, 0] == -42.0).sum() < 10
+    assert not limits(y, 980.0).found.any()
+
+
+def test_a_rest_between_two_pulses_is_no_end():
+    # Steps of 0.5 g and no noise: the rest of 80 ms is the largest value, and flat.
+    y = np.zeros((TIME.size, 3))
+    for at in (1.0, 1.15):
+        y[:, 0] -= 300.0 * np.sin(np.pi * np.clip((TIME - at) / 0.07, 0, 1)) ** 2
+    y = np.rint((y + 6.0) / 4.9) * 4.9
+    y[:150, 0] -= 4.9
+    y[300:, 0] -= 4.9
+    assert not limits(y, 980.0, 4.9).found.any()

@@ -1,0 +1,213 @@
+"""Units with axes that were not recorded, made whole by what is assumed of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
+from strapdown.sensors.triad_errors import Triad
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.tables import ACCEL, GYRO
+
+Array = NDArray[np.float64]
+
+__all__ = [
+    "AXES",
+    "TURNS",
+    "assumed_findings",
+    "axis_names",
+    "unmeasured_axes",
+    "unmeasured_turns",
+    "with_filled_axes",
+    "with_gyro",
+]
+
+AXES = ("forward", "right", "down")
+TURNS = ("roll", "pitch", "heading")
+ALL = (0, 1, 2)
+NO_GYRO = "no gyro"
+# A vehicle axis that a missing one has this part of is one of those assumed (squared cosine).
+PART = 0.1
+
+
+def with_filled_axes(unit: CrashUnit) -> CrashUnit:
+    """Put columns of zeros where axes are missing and something is assumed of them.
+
+    Parameters
+    ----------
+    unit : CrashUnit
+
+    Returns
+    -------
+    CrashUnit
+        Its triads say in `absent` which axes those are; their stated errors are none. Gravity's
+        part is put in where the attitude at rest is known (`prepare_unit`). A unit without missing
+        axes, or without `assumed`, is returned as it is.
+
+    Raises
+    ------
+    DataError
+        Not all of its ranges miss the same axes, or an accelerometer has none at all.
+    """
+    if unit.assumed is None:
+        return unit
+    gyro = unit.gyro
+    forces = unit.accelerometers
+    if unit.assumed.delta_v_sd is not None:
+        missing = {t.name: _missing(t, ACCEL) for t in forces}
+        if len(set(missing.values())) > 1:
+            name = next(n for n, m in missing.items() if m)
+            raise DataError(
+                f"it has no {ACCEL[missing[name][0]]}, and another range of the unit has",
+                file=f"{unit.name}, {name}",
+                quantity=ACCEL[missing[name][0]],
+                remedy="give the axis in all ranges, or in none; or leave out the range that "
+                "lacks it",
+            )
+        forces = tuple(_filled(t, ACCEL) for t in forces)
+    if gyro is not None and unit.assumed.turn_sd_deg is not None:
+        gyro = _filled(gyro, GYRO)
+    return replace(unit, accelerometers=forces, gyro=gyro)
+
+
+def with_gyro(unit: CrashUnit) -> CrashUnit:
+    """Put a gyro that does not turn where there is none and that is assumed."""
+    if unit.gyro is not None or unit.gyro_from is not None or not unit.accelerometers:
+        return unit
+    if unit.assumed is None or unit.assumed.turn_sd_deg is None:
+        return unit
+    like = unit.accelerometers[0].table
+    still = pd.DataFrame(np.zeros((len(like), 3)), index=like.index, columns=GYRO)
+    still.attrs = dict(like.attrs)
+    return replace(unit, gyro=RecordedTriad(still, TriadUncertainty(), NO_GYRO, absent=ALL))
+
+
+def unmeasured_axes(unit: CrashUnit) -> Array:
+    """Projection onto what no accelerometer of the unit measures, (3, 3), vehicle axes."""
+    absent = unit.accelerometers[0].absent if unit.accelerometers else ()
+    return _projection(unit.mounting.C_vs, absent)
+
+
+def unmeasured_turns(unit: CrashUnit) -> Array:
+    """Projection onto what no gyro of the unit, own or borrowed, measures, (3, 3)."""
+    lender = unit.lender or unit
+    absent = () if lender.gyro is None else lender.gyro.absent
+    return _projection(lender.mounting.C_vs, absent)
+
+
+def axis_names(axes: Array, turns: Array) -> tuple[str, ...]:
+    """Names of the vehicle's axes that are assumed: forward right down, roll pitch heading."""
+    return tuple(
+        name
+        for names, projection in ((AXES, axes), (TURNS, turns))
+        for name, part in zip(names, np.diagonal(projection), strict=True)
+        if part > PART
+    )
+
+
+def assumed_findings(unit: CrashUnit) -> list[Finding]:
+    """What is assumed of a unit, in words."""
+    found = []
+    assumed = unit.assumed
+    if assumed is None:
+        return []
+    begin, end = assumed.over
+    over = f"between {begin:g} and {end:g} s"
+    why = f", because {assumed.because}" if assumed.because else ""
+    absent = () if unit.gyro is None or unit.lender is not None else unit.gyro.absent
+    if absent:
+        names = [GYRO[k] for k in absent]
+        what = "gyro" if len(absent) == 3 else f"{' and no '.join(names)}"
+        kept = [
+            n for n, p in zip(TURNS, np.diagonal(unmeasured_turns(unit)), strict=True) if p > PART
+        ]
+        rollover = "; whether it rolled over cannot be told" if "roll" in kept else ""
+        found.append(
+            Finding(
+                f"it has no {what}: it is taken that the vehicle turned by 0 ± "
+                f"{_said(assumed.sd_of('turn_sd_deg'), kept, TURNS)} deg (1 sd) in "
+                f"{_listed(kept)} {over}{why}",
+                file=unit.name,
+                quantity="gyro",
+                remedy="a vehicle that turned more is not where the path says, nor came the force "
+                f"from where it says; turning before and after is in no bound{rollover}. Give a "
+                "gyro, or borrow one with gyro_from",
+            )
+        )
+    absent = unit.accelerometers[0].absent
+    if absent:
+        names = [ACCEL[k] for k in absent]
+        kept = [
+            n for n, p in zip(AXES, np.diagonal(unmeasured_axes(unit)), strict=True) if p > PART
+        ]
+        found.append(
+            Finding(
+                f"it has no {' and no '.join(names)}: it is taken that the vehicle changed its "
+                f"velocity by 0 ± {_said(assumed.sd_of('delta_v_sd'), kept, AXES)} m/s (1 sd) "
+                f"along {_listed(kept)} {over}, and that gravity's part stayed that at rest{why}",
+                file=unit.name,
+                quantity=names[0],
+                remedy="a change of velocity that was not recorded is in no resultant and in no "
+                "direction of force; give the axis from another part of the vehicle",
+            )
+        )
+    return found
+
+
+def _missing(triad: RecordedTriad, columns: Sequence[str]) -> tuple[int, ...]:
+    return triad.absent or tuple(k for k, c in enumerate(columns) if c not in triad.table.columns)
+
+
+def _filled(triad: RecordedTriad, columns: list[str]) -> RecordedTriad:
+    absent = _missing(triad, columns)
+    # Without any of its columns it is a triad of another kind, and is refused as such.
+    if not absent or triad.absent or len(absent) == 3:
+        return triad
+    table = triad.table.copy()
+    there = next(c for k, c in enumerate(columns) if k not in absent)
+    for k in absent:
+        # Rows that another axis does not have, this one has not either.
+        table[columns[k]] = table[there] * 0.0
+    table = table[[*columns, *(c for c in triad.table.columns if c not in columns)]]
+    table.attrs = dict(triad.table.attrs)
+    u = triad.uncertainty
+    keep = np.array([k not in absent for k in range(3)])
+
+    def left(name: str) -> Triad:
+        x, y, z = np.where(keep, u.axis(name), 0.0)
+        return float(x), float(y), float(z)
+
+    x, y, z = np.where(keep, u.axis("full_scale"), np.inf)
+    told = replace(
+        u,
+        full_scale=(float(x), float(y), float(z)),
+        noise_density=left("noise_density"),
+        bias=left("bias"),
+        scale=left("scale"),
+        misalignment=left("misalignment"),
+        nonlinearity_2=left("nonlinearity_2"),
+        g_sensitivity=left("g_sensitivity"),
+        vibration_rectification=left("vibration_rectification"),
+        quantization=left("quantization"),
+    )
+    return replace(triad, table=table, uncertainty=told, absent=absent)
+
+
+def _projection(C: Array, absent: Sequence[int]) -> Array:
+    columns = C[:, list(absent)]
+    return np.asarray(columns @ columns.T)
+
+
+def _said(sds: Triad, kept: Sequence[str], names: Sequence[str]) -> str:
+    numbers = [f"{sds[names.index(n)]:g}" for n in kept]
+    return numbers[0] if len(set(numbers)) == 1 else ", ".join(numbers)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

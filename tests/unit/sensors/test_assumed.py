@@ -1,0 +1,201 @@
+"""What is assumed of axes that are not there: its statement, its shape in time, its place."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from strapdown import rotation
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.assumed import Assumed, assumed_shapes
+from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+from strapdown.sensors.synchronise import synchronise
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.unmeasured import (
+    assumed_findings,
+    axis_names,
+    unmeasured_axes,
+    unmeasured_turns,
+    with_filled_axes,
+    with_gyro,
+)
+
+TOLD = TriadUncertainty(
+    noise_density=0.01, bias=1.0, scale=0.01, misalignment=0.02, full_scale=500.0, quantization=0.1
+)
+BOTH = Assumed(turn_sd_deg=5.0, delta_v_sd=1.0)
+
+
+def triad(axes, kind="accel", name="part", rate=100.0):
+    time = np.arange(-10, 30) / rate
+    values = np.outer(np.sin(time), np.ones(len(axes)))
+    table = pd.DataFrame(values, index=time, columns=[f"{kind}_{a}" for a in axes])
+    table.index.name = "time"
+    table.attrs = {"sampling": "mean"}
+    return RecordedTriad(table, TOLD, name)
+
+
+def unit(axes="xz", assumed=BOTH, **options):
+    return CrashUnit("EDR", (triad(axes),), trigger=0.0, assumed=assumed, **options)
+
+
+class TestStatement:
+    def test_one_number_is_three(self):
+        assert BOTH.turn_sd_deg == (5.0, 5.0, 5.0)
+        assert Assumed(delta_v_sd=(0.0, 1.0, 2.0)).sd_of("delta_v_sd") == (0.0, 1.0, 2.0)
+        assert Assumed(delta_v_sd=1.0).sd_of("turn_sd_deg") == (0.0, 0.0, 0.0)
+
+    @pytest.mark.parametrize(
+        ("given", "quantity"),
+        [
+            ({}, "assumed"),
+            ({"turn_sd_deg": -1.0}, "assumed, turn_sd_deg"),
+            ({"turn_sd_deg": 90.0}, "assumed, turn_sd_deg"),
+            ({"turn_sd_deg": "5"}, "assumed, turn_sd_deg"),
+            ({"turn_sd_deg": (1.0, 2.0)}, "assumed, turn_sd_deg"),
+            ({"delta_v_sd": float("nan")}, "assumed, delta_v_sd"),
+            ({"delta_v_sd": 1.0, "over": (0.15, 0.0)}, "assumed, over"),
+            ({"delta_v_sd": 1.0, "over": (0.0, 150.0)}, "assumed, over"),
+            ({"delta_v_sd": 1.0, "over": 0.15}, "assumed, over"),
+            ({"delta_v_sd": 1.0, "because": None}, "assumed, because"),
+        ],
+    )
+    def test_what_is_no_statement(self, given, quantity):
+        with pytest.raises(ConfigError) as error:
+            Assumed(**given)
+        assert error.value.finding.quantity == quantity
+        assert error.value.finding.remedy
+
+    def test_a_unit_takes_no_other_kind(self):
+        with pytest.raises(ConfigError, match="assumed"):
+            unit(assumed=5.0)
+
+
+class TestShapes:
+    @pytest.mark.parametrize("sampling", ["mean", "instantaneous"])
+    @pytest.mark.parametrize("rate", [10.0, 100.0, 1000.0])
+    def test_one_ends_at_one_and_one_comes_back(self, sampling, rate):
+        time = np.arange(-round(rate), round(rate)) / rate
+        shapes = assumed_shapes(time, (0.0, 0.15), sampling)
+        # Means over the steps: exact at every rate, to rounding.
+        assert shapes.sum(axis=1) / rate == pytest.approx([1.0, 0.0], abs=1e-12)
+
+    def test_half_way_a_random_walk_that_is_known_at_its_end_is_known_to_half(self):
+        time = np.arange(-100, 1000) / 1000.0
+        grown = np.cumsum(assumed_shapes(time, (0.0, 0.2), "mean"), axis=1) / 1000.0
+        middle = int(np.searchsorted(time, 0.1 - 1e-9))
+        assert grown[:, middle] == pytest.approx([0.5, 0.5], abs=1e-9)
+        # Of both together that of a random walk half way: 1/√2.
+        assert np.hypot(*grown[:, middle]) == pytest.approx(np.sqrt(0.5), abs=1e-9)
+        assert (grown[:, time < 0.0] == 0.0).all()
+
+
+class TestFilling:
+    def test_a_missing_axis_has_a_column_and_no_error_of_its_own(self):
+        (made,) = with_filled_axes(unit()).accelerometers
+        assert made.absent == (1,)
+        assert list(made.table.columns) == ["accel_x", "accel_y", "accel_z"]
+        assert (made.table["accel_y"] == 0.0).all()
+        assert made.table.attrs == {"sampling": "mean"}
+        for name in ("noise_density", "bias", "scale", "misalignment", "quantization"):
+            given = TOLD.axis(name)[0]
+            assert made.uncertainty.axis(name) == (given, 0.0, given)
+        assert made.uncertainty.axis("full_scale") == (500.0, np.inf, 500.0)
+
+    def test_it_is_done_once(self):
+        once = with_filled_axes(unit())
+        (first,), (again,) = once.accelerometers, with_filled_axes(once).accelerometers
+        assert again.absent == (1,)
+        assert again.table.equals(first.table)
+
+    def test_rows_that_another_axis_does_not_have(self):
+        given = unit()
+        given.accelerometers[0].table.iloc[::2] = np.nan
+        (made,) = with_filled_axes(given).accelerometers
+        assert made.table["accel_y"].isna().equals(made.table["accel_x"].isna())
+
+    def test_nothing_is_filled_where_nothing_is_assumed(self):
+        assert with_filled_axes(unit(assumed=None)).accelerometers[0].absent == ()
+        only_turn = unit(assumed=Assumed(turn_sd_deg=1.0))
+        assert "accel_y" not in with_filled_axes(only_turn).accelerometers[0].table
+        with pytest.raises(DataError, match="delta_v_sd"):
+            synchronise([only_turn], rate=100.0)
+
+    def test_ranges_must_lack_the_same_axes(self):
+        low, high = triad("xyz", name="low"), triad("xz", name="high")
+        with pytest.raises(DataError) as error:
+            with_filled_axes(CrashUnit("A", (low, high), assumed=BOTH))
+        assert error.value.finding.file == "A, high"
+        assert error.value.finding.quantity == "accel_y"
+
+    def test_a_table_without_any_of_its_columns_is_refused(self):
+        wrong = replace(unit(), accelerometers=(triad("xyz", "gyro"),))
+        with pytest.raises(DataError, match="accel_x"):
+            synchronise([wrong], rate=100.0)
+
+    def test_a_gyro_that_does_not_turn(self):
+        made = with_gyro(unit())
+        assert made.gyro.absent == (0, 1, 2)
+        assert (made.gyro.table == 0.0).all(axis=None)
+        assert with_gyro(unit(assumed=Assumed(delta_v_sd=1.0))).gyro is None
+        assert with_gyro(unit(gyro_from="IMU1")).gyro is None
+
+    def test_synchronising_keeps_what_was_recorded_and_what_was_not(self):
+        given = unit()
+        found = synchronise([given], rate=100.0, sampling="mean").units[0]
+        (made,) = found.unit.accelerometers
+        assert found.gyro is None
+        assert made.absent == (1,)
+        assert found.unit.gyro.absent == (0, 1, 2)
+        x = given.accelerometers[0].table["accel_x"]
+        assert made.table["accel_x"].to_numpy() == pytest.approx(x.to_numpy(), abs=0.0)
+
+
+class TestDirections:
+    def test_projections_and_names(self):
+        made = with_gyro(with_filled_axes(unit()))
+        assert unmeasured_axes(made) == pytest.approx(np.diag([0.0, 1.0, 0.0]))
+        assert unmeasured_turns(made) == pytest.approx(np.eye(3))
+        names = axis_names(unmeasured_axes(made), unmeasured_turns(made))
+        assert names == ("right", "roll", "pitch", "heading")
+
+    def test_they_are_the_vehicles_in_a_turned_unit(self):
+        # Heading 90 deg: the sensor's y points backward along the vehicle's forward axis.
+        turned = replace(unit("xz"), mounting=Mounting(angles_deg=(0.0, 0.0, 90.0)))
+        made = with_filled_axes(turned)
+        assert unmeasured_axes(made) == pytest.approx(np.diag([1.0, 0.0, 0.0]), abs=1e-15)
+        C = rotation.dcm_from_euler([0.0, 0.0, 90.0])
+        assert np.abs(C[:, 1]) == pytest.approx([1.0, 0.0, 0.0], abs=1e-15)
+
+    def test_of_a_gyro_of_the_heading_alone(self):
+        made = with_filled_axes(unit(gyro=triad("z", "gyro", "yaw")))
+        assert made.gyro.absent == (0, 1)
+        assert axis_names(unmeasured_axes(made), unmeasured_turns(made)) == (
+            "right",
+            "roll",
+            "pitch",
+        )
+
+
+class TestWords:
+    def test_what_is_assumed_is_told(self):
+        stated = Assumed(turn_sd_deg=(2.0, 2.0, 5.0), delta_v_sd=1.5, because="both marks agree")
+        turn, axis = assumed_findings(with_gyro(with_filled_axes(unit(assumed=stated))))
+        assert turn.what == (
+            "it has no gyro: it is taken that the vehicle turned by 0 ± 2, 2, 5 deg (1 sd) in "
+            "roll, pitch and heading between 0 and 0.15 s, because both marks agree"
+        )
+        assert "rolled over cannot be told" in turn.remedy
+        assert axis.what == (
+            "it has no accel_y: it is taken that the vehicle changed its velocity by 0 ± 1.5 m/s "
+            "(1 sd) along right between 0 and 0.15 s, and that gravity's part stayed that at rest, "
+            "because both marks agree"
+        )
+        assert (turn.file, turn.quantity, axis.quantity) == ("EDR", "gyro", "accel_y")
+
+    def test_a_whole_unit_has_nothing_to_tell(self):
+        whole = unit("xyz", gyro=triad("xyz", "gyro"))
+        assert assumed_findings(with_gyro(with_filled_axes(whole))) == []
