@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.config.shown import shown, shown_key
-from strapdown.config.toml_lines import KeyPath, key_lines, line_of
+from strapdown.config.toml_lines import DEEPEST, KeyPath, key_lines, line_of
 from strapdown.exceptions import ConfigError
 
 __all__ = ["TomlFile", "read_toml"]
@@ -90,7 +90,11 @@ def read_toml(path: Path, form: str) -> TomlFile:
     """
     text = _text(path)
     try:
-        return TomlFile(path, tomllib.loads(text), key_lines(text))
+        # Lines first: it is quick to see a depth that takes long to be read.
+        lines = key_lines(text)
+        if max(map(len, lines), default=0) > DEEPEST:
+            raise RecursionError
+        return TomlFile(path, tomllib.loads(text), lines)
     except RecursionError:
         raise ConfigError("it is nested too deep", file=path.name, remedy=form) from None
     except ValueError as error:
@@ -136,7 +140,7 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
     if number is not None:
         # What stands twice is known only once all of the line is read.
         twice = _twice("\n".join(rows[:number]), number)
-        if what.startswith("Cannot") and twice:
+        if what.startswith(("Cannot", "Duplicate")) and twice:
             key, first = twice
             return ConfigError(
                 f"it is written twice: in line {first} too",

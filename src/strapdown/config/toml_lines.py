@@ -7,10 +7,13 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Mapping
 
-__all__ = ["KeyPath", "key_lines", "line_of"]
+__all__ = ["DEEPEST", "KeyPath", "key_lines", "line_of"]
 
 #: Keys and numbers of elements, from the root: ``("units", 1, "accelerometers", 0, "unit")``.
 KeyPath = tuple[str | int, ...]
+
+#: Levels of a file that a person writes.
+DEEPEST = 50
 
 _BLANK = re.compile(r"[ \t]*")
 _BETWEEN = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
@@ -44,6 +47,11 @@ def key_lines(text: str) -> dict[KeyPath, list[int]]:
         By path, the lines from 1 where it is written: more than one for a key that stands twice,
         or a table that is opened again. What contains others and is not written itself, such as
         ``a`` of ``[a.b]``, stands where the first of them does.
+
+    Raises
+    ------
+    RecursionError
+        It is nested deeper than a person would write.
     """
     scan = _Scan(text)
     scan.document()
@@ -134,6 +142,8 @@ class _Scan:
             self._skip(_BLANK)
             if not self._follows("."):
                 return tuple(parts)
+            if len(parts) > DEEPEST:
+                raise RecursionError
 
     def _value(self, path: KeyPath) -> None:
         self._skip(_BLANK)
