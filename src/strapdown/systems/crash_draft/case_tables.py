@@ -5,12 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from strapdown.systems.crash_draft.group_units import Unit
+from strapdown.systems.crash_draft.heading_of_unit import Facing, direction
 from strapdown.systems.crash_draft.parts import Skipped
 from strapdown.systems.crash_draft.toml_text import ASK, Page, array, number, plain, string
 
-__all__ = ["case_table", "entry_table", "head", "left_out", "options_table", "vehicle_table"]
+__all__ = [
+    "agreement",
+    "case_table",
+    "entry_table",
+    "head",
+    "left_out",
+    "options_table",
+    "vehicle_table",
+]
 
 KMH = 3.6
+# Two units of one vehicle that differ by more are not explained by their places.
+FAR_APART = 1.5
 
 
 def head(page: Page) -> None:
@@ -107,6 +118,31 @@ def _fact(facts: Mapping[str, str], key: str) -> float | None:
     except ValueError:
         return None
     return value if value > 0.0 else None
+
+
+def agreement(page: Page, units: Sequence[Unit], facing: Sequence[Facing]) -> None:
+    """How far the units tell the same, as comments."""
+    told, sizes = [], []
+    for unit, faces in zip(units, facing, strict=True):
+        if not unit.impact.found or not unit.accelerometers[-1].clock.unit:
+            continue
+        came = None if faces.heading_deg is None else direction(unit, faces.heading_deg)
+        where = "" if came is None else f" from {came:.0f} deg"
+        told.append(f"'{plain(unit.name)}' {unit.impact.largest * KMH:.3g} km/h{where}")
+        sizes.append(unit.impact.largest)
+    if len(told) < 2:
+        return
+    page.blank()
+    page.say(
+        "---- the units beside each other",
+        f"found: horizontal change of velocity, each at its own place: {', '.join(told)} (0 is the "
+        "front, 90 the right). Places of a vehicle that turns do not gain the same.",
+    )
+    if max(sizes) > FAR_APART * min(sizes):
+        page.say(
+            "They are far apart: look at the unit, the range and the place of each, and whether "
+            "all are of one crash."
+        )
 
 
 def left_out(page: Page, skipped: Sequence[Skipped]) -> None:

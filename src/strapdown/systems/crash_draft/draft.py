@@ -9,6 +9,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 from strapdown.systems.crash_draft.case_tables import (
     KMH,
+    agreement,
     case_table,
     entry_table,
     head,
@@ -76,6 +77,7 @@ def write_draft(
     entry_table(page, facts or {})
     for k, unit in enumerate(units):
         unit_tables(page, unit, facing[k], units)
+    agreement(page, units, facing)
     left_out(page, skipped)
     options_table(page, units)
     return Draft(page.text, tuple(_found(units)), tuple(page.asked), tuple(findings))

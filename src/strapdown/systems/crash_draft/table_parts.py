@@ -57,7 +57,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
     Raises
     ------
     DataError
-        It holds fewer than eight samples.
+        It holds fewer than eight samples, time does not advance, or a value of a sensor is none.
     """
     table, skipped = _columns(path, record)
     rows = max((len(v) for v in table.columns.values()), default=0)
@@ -73,6 +73,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         clock = replace(clock, rate=likely_rate(whole))
         stamps = np.arange(rows, dtype=np.float64) / clock.rate
     else:
+        _check_advances(record.channel(clock.column), table.columns[clock.column])
         factor = 1.0 / (clock.rate * clock.step)
         origin = table.origins.get(clock.column, 0.0) * factor
         # As those are read who read the case: what counts from far away counts from its first.
@@ -91,9 +92,12 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             channels["xyz"[k]] = f"-{name}" if turned else name
         kept = np.isfinite(values[:, has]).all(axis=1)
         lost = rows - int(kept.sum())
+        names = tuple(group.columns.values())
         if rows - lost < LEAST_SAMPLES:
-            names = tuple(group.columns.values())
             skipped.append(Skipped(path, ", ".join(names), "hardly a row of it is whole", names))
+            continue
+        if not np.ptp(values[kept][:, has], axis=0).any():
+            skipped.append(Skipped(path, ", ".join(names), "they are constant", names))
             continue
         part = Part(
             path,
@@ -112,6 +116,21 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
     return parts, skipped
 
 
+def _check_advances(channel: CrashChannel, stamps: Array) -> None:
+    back = np.flatnonzero(np.diff(stamps) <= 0.0)
+    if not back.size:
+        return
+    k = int(back[0]) + 1
+    raise DataError(
+        f"time goes from {stamps[k - 1]:.9g} to {stamps[k]:.9g}"
+        + (f" ({back.size} times such)" if back.size > 1 else ""),
+        file=channel.file or None,
+        row=channel.row(k),
+        quantity=f"time ({channel.name})",
+        remedy="sort or correct the rows; if two records were joined, split them",
+    )
+
+
 def _sampling(record: CrashRecord, names: object) -> str:
     kinds = {c.sampling for c in record.channels if c.name in set(names)}  # type: ignore[call-overload]
     only = kinds.pop() if len(kinds) == 1 else None
@@ -128,6 +147,8 @@ def _columns(path: str, record: CrashRecord) -> tuple[_Table, list[Skipped]]:
         try:
             raw = channel.samples() if channel.samples is not None else channel.load()[1]
         except DataError as error:
+            if _heading(channel).quantity in _KINDS:
+                raise
             what = str(error.finding.what)
             row = f" in row {error.finding.row}" if error.finding.row is not None else ""
             skipped.append(Skipped(path, f"column '{channel.name}'", what + row, (channel.name,)))
