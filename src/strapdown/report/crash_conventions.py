@@ -18,8 +18,8 @@ from strapdown.report.svg_drawing import INK, SMALL, Drawing, shortened
 __all__ = ["MountingPoint", "conventions_picture"]
 
 _WIDTH, _HEIGHT = 640.0, 376.0
-_TOP_VIEW = (178.0, 196.0)
-_SIDE_VIEW, _REAR_VIEW = (472.0, 92.0), (472.0, 272.0)
+_TOP_VIEW = (172.0, 196.0)
+_SIDE_VIEW, _REAR_VIEW = (458.0, 92.0), (458.0, 272.0)
 _LONG, _ACROSS = 196.0, 96.0  # pixels that the longest side, and the width, may take
 _CLOCK = 150.0
 _SOFT, _BODY = "#4a525c", "#3d5166"
@@ -98,8 +98,8 @@ def conventions_picture(
     draw_behind(out, outline, behind)
     for words, x, y in (
         ("from above", 14.0, 12.0),
-        ("from the right", 362.0, 12.0),
-        ("from behind", 362.0, 198.0),
+        ("from the right", 348.0, 12.0),
+        ("from behind", 348.0, 198.0),
     ):
         out.text((x, y), words, 12.0, INK, bold=True)
     _axes(out, outline, above, side, behind)

@@ -25,7 +25,7 @@ __all__ = ["StatedDeltaV", "delta_v_chart", "delta_v_course", "delta_v_half_widt
 AXES = ("forward", "right", "down", "resultant")
 KMH = 3.6
 # Instants at which the bound is found; between them it is smooth.
-_INSTANTS = 61
+_INSTANTS = 31
 _SYMBOLS = ("square", "diamond", "triangle-up", "star", "pentagon", "cross")
 
 

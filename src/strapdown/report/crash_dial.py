@@ -78,7 +78,7 @@ def pdof_dial(
         shaded ring where no direction is contradicted.
     """
     rows = sorted(directions, key=lambda d: not d.main)
-    height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 17.0 for d in rows)
+    height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 33.0 for d in rows)
     height += 12.0 if not rows else 0.0 if len(rows) > 1 else -12.0
     said = [_words(d) for d in directions]
     alt = "Direction of force on a clock about the vehicle: " + "; ".join(said or ["no event"])
@@ -213,8 +213,9 @@ def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
     speed = f"{signed(d.delta_v, 1)} m/s ({signed(3.6 * d.delta_v, 1)} km/h)"
     if not d.main:
-        out.text((14.0, at), f"{_words(d)}; {speed}", SMALL, _SOFT)
-        return at + 17.0
+        out.text((14.0, at), _words(d), SMALL, _SOFT)
+        out.text((14.0, at + 14.0), f"change of velocity {speed}", SMALL, _SOFT)
+        return at + 33.0
     title = f"{d.name}: " if many else ""
     if ends == "undetermined":
         out.text((14.0, at), f"{title}undetermined", 17.0, INK, bold=True)

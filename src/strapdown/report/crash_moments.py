@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 __all__ = [
     "AROUND",
     "angle_words",
+    "assumed_axes",
     "crash_span",
     "event_marks",
     "interval_words",
@@ -53,6 +54,11 @@ def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
         return {"colour": BLACK, "dash": "solid", "symbol": "circle"}
     found = look(number)
     return {**found, "dash": "solid" if alone else _DASHES[number % len(_DASHES)]}
+
+
+def assumed_axes(unit: UnitReconstruction) -> tuple[str, ...]:
+    """What of forward, right, down, roll, pitch, heading no sensor of a unit has measured."""
+    return tuple(getattr(unit.at_point, "assumed_axes", ()))
 
 
 def main_event(unit: UnitReconstruction) -> int | None:

@@ -24,7 +24,13 @@ from strapdown.report.chart import (
     Panel,
     curve,
 )
-from strapdown.report.crash_moments import crash_span, event_marks, marks_apart, unit_look
+from strapdown.report.crash_moments import (
+    assumed_axes,
+    crash_span,
+    event_marks,
+    marks_apart,
+    unit_look,
+)
 from strapdown.report.recorded_lines import (
     BUCKETS,
     flags_in_vehicle_axes,
@@ -138,7 +144,10 @@ def _about_the_crash(
     name = (
         "merged, biases taken off" if len(recorded.accelerometers) > 1 else "at the common stamps"
     )
+    assumed = assumed_axes(unit)
     for k in range(3):
+        if _AXES[k] in assumed:
+            continue
         line = curve(name, 1e3 * time[inside], force[inside, k], look["colour"], width=2.0)
         rows[k].append(replace(line, legend=k == 0))
         if cut[:, k].any():
@@ -156,15 +165,26 @@ def _about_the_crash(
         "Shaded: the event.",
         "time from the trigger, ms",
         tuple(
-            Panel(f"{axis}, g", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
+            Panel(
+                f"{axis}, g",
+                tuple(_once(rows[k])),
+                title=_told(assumed, axis),
+                levels=tuple(levels[k]),
+                height=0.9,
+            )
             for k, axis in enumerate(_AXES)
         ),
     )
 
 
+def _told(assumed: Sequence[str], axis: str) -> str:
+    """Title of a panel."""
+    return "" if not assumed else f"{axis}: assumed, not recorded" if axis in assumed else axis
+
+
 def _once(lines: list[Line]) -> list[Line]:
     """Lines that hold something."""
-    return [line for line in lines if line.x.size]
+    return [line for line in lines if np.isfinite(line.y).any()]
 
 
 def _rates(
@@ -212,9 +232,10 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
     assert prepared is not None
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     panels = []
-    for label, columns, scale in (
-        ("specific force, g", ACCEL, STANDARD_GRAVITY),
-        ("rate, deg/s", GYRO, math.radians(1.0)),
+    assumed = assumed_axes(unit)
+    for label, columns, scale, named in (
+        ("specific force, g", ACCEL, STANDARD_GRAVITY, _AXES),
+        ("rate, deg/s", GYRO, math.radians(1.0), ("roll", "pitch", "heading")),
     ):
         values = prepared.imu[columns].to_numpy(dtype=np.float64) / scale
         lines = [
@@ -223,8 +244,9 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
                 legend=columns is ACCEL,
             )
             for k, (axis, dash) in enumerate(zip(_AXES, ("solid", "dash", "dot"), strict=True))
+            if named[k] not in assumed
         ]
-        if np.isfinite(values).any():
+        if lines and np.isfinite(values).any():
             panels.append(Panel(label, tuple(lines), height=0.9))
     bands = [Band(e.time_zero, e.end, "event") for e in events]
     rest = unit.at_point.rest
@@ -240,7 +262,8 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"overview-{number + 1}",
         f"{unit.name}: the whole record",
         "Merged specific force (−1 g downward at rest) and rates along and about the vehicle's "
-        f"axes. Shaded: the event; {said}.",
+        f"axes. Shaded: the event; {said}."
+        + (f" Not recorded but assumed, and not drawn: {', '.join(assumed)}." if assumed else ""),
         "time from the trigger, s",
         tuple(panels),
         marks=marks_apart(

@@ -25,7 +25,7 @@ _CLASS = 60
 _X = "time from the trigger, ms"
 
 
-def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart:
+def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart | None:
     """Chart how far the change of velocity of each unit is from that of all together.
 
     Parameters
@@ -33,22 +33,33 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
     comparison : UnitComparison
     names : sequence of str
         Of all units in the order of the report, for their colours.
+
+    Returns
+    -------
+    Chart or None
+        Of the axes that two or more units measure; None where there are none.
     """
     edges = 1e3 * comparison.edges
     panels = []
+    named: set[str] = set()
     for k, axis in enumerate(_AXES):
         lines: list[Line] = []
         fills: list[Fill] = []
-        for one in comparison.against:
+        measured = [one for one in comparison.against if np.isfinite(one.difference[:, k]).any()]
+        for one in measured:
             look = unit_look(list(names).index(one.name))
             y, half = one.difference[:, k], TWO_SIDED_95 * one.sd[:, k]
             made = curve(one.name, edges, y, look["colour"], look["dash"], 1.8)
-            lines.append(replace(made, legend=k == 0))
+            lines.append(replace(made, legend=one.name not in named))
+            named.add(one.name)
             for edge in (half, -half):
                 made = curve(one.name, edges, edge, look["colour"], "dot", 0.9)
                 lines.append(replace(made, legend=False))
             fills.append(Fill(one.name, edges, -half, half, look["colour"], 0.05, legend=False))
-        panels.append(Panel(f"{axis}, m/s", tuple(lines), fills=tuple(fills), height=0.9))
+        if measured:
+            panels.append(Panel(f"{axis}, m/s", tuple(lines), fills=tuple(fills), height=0.9))
+    if not panels:
+        return None
     said = "agree within" if comparison.agree else "do NOT agree within"
     return Chart(
         "units",

@@ -54,8 +54,10 @@ def triad_lines(
     C = unit.mounting.C_vs
     stamps = triad.table.index.to_numpy(dtype=np.float64) - offset
     inside = (stamps >= span[0]) & (stamps <= span[1])
-    columns = ACCEL if ACCEL[0] in triad.table.columns else GYRO
-    values = in_vehicle_axes(triad.table[columns].to_numpy(dtype=np.float64)[inside], C) / scale
+    columns = ACCEL if set(ACCEL) & set(triad.table.columns) else GYRO
+    # An axis that was not recorded has no column.
+    whole = triad.table.reindex(columns=columns).to_numpy(dtype=np.float64)
+    values = in_vehicle_axes(whole[inside], C) / scale
     at, ends = flags
     ends = flags_in_vehicle_axes(ends, C) & ((at >= span[0]) & (at <= span[1]))[:, None]
     out = []

@@ -1,0 +1,116 @@
+"""Cases of simulated crashes, run as a report has them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pandas as pd
+
+from strapdown.config.crash_case import (
+    CaseSpec,
+    EntrySpec,
+    PointSpec,
+    ReferenceSpec,
+    TriadSpec,
+    UnitSpec,
+)
+from strapdown.crash.entry import Entry
+from strapdown.crash.monte_carlo import sample_paths
+from strapdown.crash.reference_path import compare_with_reference
+from strapdown.crash.severity import find_severity_model
+from strapdown.crash.severity_model import injury_risk
+from strapdown.report.crash_figures import crash_figures
+from strapdown.sensors.crash_unit import Mounting
+from strapdown.simulation.crash_recording import record_crash
+from strapdown.simulation.crash_scenarios import find_crash
+from strapdown.simulation.mounted_motion import MountedMotion
+from strapdown.simulation.paper_recorders import paper_units
+from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer
+from strapdown.systems.crash_reconstruction import reconstruct_crash
+from strapdown.tables import NED
+
+HOSTILE = '<script>alert("&")</script>\x00'
+RUNS = 400
+SPEED_SD = 0.1
+
+
+def crash_case(name="pole", units=("IMU1", "IMU2"), window=None, end=None):
+    """As `_run`, kept."""
+    return _run(name, tuple(units), window, end)
+
+
+@cache
+def _run(name, units, window, end):
+    """Result of a simulated crash: of which recorders, over which path, cut at an instant."""
+    crash = find_crash(name)
+    impact = crash.impacts[0] if crash.impacts else crash.start
+    recorded = [
+        record_crash(
+            crash.motion,
+            design,
+            impact=impact,
+            seed=3,
+            start=impact - 2.5,
+            end=None if end is None else impact + end,
+        )[0]
+        for design in paper_units()
+        if design.name in units
+    ]
+    state = crash.motion.trajectory(np.array([impact])).iloc[0]
+    speed = float(np.hypot(state["VN"], state["VE"]))
+    entry = Entry.from_speed(speed, SPEED_SD)
+    found = reconstruct_crash(recorded, entry, window=window)
+    path = found.main.path
+    references = [_path_reference(crash, impact, path)]
+    severity = []
+    if found.main.body:
+        change = found.main.body[0].event
+        forward, end_time = float(change.delta_v.vector[0]), float(change.delta_v.end)
+        spec = ReferenceSpec(
+            kind="delta_v",
+            name="EDR",
+            delta_v_m_per_s=forward - 0.2,
+            delta_v_sd_m_per_s=0.3,
+            at_s=end_time,
+        )
+        references.append(ReferenceAnswer(spec, None, None, forward, 0.1, True))
+        model = find_severity_model("wang_2022_all_mais3")
+        sd = change.bound.along(change.delta_v.vector)
+        risk = injury_risk(model, {"delta_v": change.resultant}, {"delta_v": sd})
+        severity.append(SeverityAnswer(model.name, model.source, model.outcome, risk))
+    spec = CaseSpec(
+        title=f"simulated {name}",
+        point=PointSpec(name="centre of mass"),
+        entry=EntrySpec(speed_m_per_s=speed, speed_sd_m_per_s=SPEED_SD),
+        units=tuple(
+            UnitSpec(name=u.name, accelerometers=(TriadSpec(path="a.csv"),)) for u in recorded
+        ),
+    )
+    samples = sample_paths(path, runs=RUNS, seed=1)
+    return CaseResult(
+        spec,
+        (),
+        {},
+        tuple(recorded),
+        found,
+        samples,
+        tuple(severity),
+        tuple(references),
+        found.findings,
+    )
+
+
+def _path_reference(crash, impact, path):
+    time = np.arange(-0.05, min(0.3, path.time[-1]), 0.01)
+    truth = MountedMotion(crash.motion, Mounting()).kinematics_from(time + impact, epoch=impact)
+    table = pd.DataFrame(truth.position + 2.0, index=pd.Index(time, name="time"), columns=NED)
+    spec = ReferenceSpec(kind="path", name="cameras", path="cameras.csv")
+    compared = compare_with_reference(path, table)
+    return ReferenceAnswer(spec, table, compared, np.nan, np.nan, compared.consistent)
+
+
+@cache
+def figures_of(name="pole", units=("IMU1", "IMU2"), window=None, end=None):
+    """All figures of such a case."""
+    return crash_figures(crash_case(name, units, window, end))
