@@ -86,14 +86,18 @@ def test_any_number_of_axes():
 
 
 def test_noise_in_steps_that_repeats_its_extreme_is_no_end_of_a_range():
-    # The slow top of a slide, 3.4 m/s² of ±19.6, noise of three steps: three in a row are equal
-    # in one record of some hundred.
-    rng = np.random.Generator(np.random.PCG64(5))
-    time = np.arange(400) / 200.0
-    top = 3.4 * np.sin(np.pi * time / time[-1]) ** 2
-    for _ in range(600):
-        y = np.round((top + 0.03 * rng.standard_normal(time.size)) / 0.01) * 0.01
-        assert not find_limits(time, y[:, None], np.array([19.6]), np.array([0.01])).found.any()
+    # The slow top of a slide, 3.4 m/s² of ±19.6, in noise of three steps: three equal numbers on
+    # it, four steps above all others.
+    step, rng = 0.01, np.random.default_rng(5)
+    top = 3.4 * np.sin(np.pi * TIME / TIME[-1]) ** 2
+    y = np.rint((top + 0.03 * rng.normal(size=TIME.size)) / step) * step
+    y[200:203] = y.max() + 4.0 * step
+    assert not limits(y[:, None], 19.6, step).found.any()
+    # Far above the noise it is one.
+    y[200:203] += 0.5
+    assert limits(y[:, None], 19.6, step).found.all()
+
+
 @pytest.mark.parametrize("q", [0.0, 0.5])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_an_end_far_below_the_stated_range_is_found(q, sign):
