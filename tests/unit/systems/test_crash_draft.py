@@ -325,6 +325,9 @@ def test_a_table_of_an_event_data_recorder(tmp_path):
     (unit,) = table["units"]
     assert unit["trigger_s"] == 0.0
     assert unit["assumed"] == {"turn_sd_deg": "?", "delta_v_sd_m_per_s": "?", "because": "?"}
+    # The first mean ends at 10 ms; there the path can begin.
+    assert table["entry"]["time_s"] == pytest.approx(0.01)
+    assert table["options"]["sampling"] == "mean"
     # The last whole km/h of the forward change, with 1 km/h of the lateral.
     assert "26 km/h" in draft.found[0]
     spec = filled(draft, tmp_path)
@@ -343,6 +346,10 @@ def test_the_crash_test_of_nhtsa(recordings, tmp_path):
         {"x": "94", "z": "98"},
     ]
     assert left["trigger_s"] == 0.0
+    # Zeroed before the impact: all of the rest is bias, and the floor rings.
+    assert left["rest_s"] == [-0.05, -0.005]
+    assert left["accelerometers"][0]["uncertainty"]["bias_sd_mg"] > 1000.0
+    assert (table["options"]["rate_hz"], table["options"]["sampling"]) == (1000.0, "mean")
     assert left["assumed"]["delta_v_sd_m_per_s"] == "?"
     flat = " ".join(draft.text.split("\n# "))
     assert "channels 99: redundant at 'LEFT REAR SEAT CROSSMEMBER'" in flat

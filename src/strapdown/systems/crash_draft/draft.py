@@ -74,7 +74,7 @@ def write_draft(
     head(page)
     case_table(page, title, facts or {})
     vehicle_table(page, facts or {})
-    entry_table(page, facts or {})
+    entry_table(page, facts or {}, units)
     for k, unit in enumerate(units):
         unit_tables(page, unit, facing[k], units)
     agreement(page, units, facing)

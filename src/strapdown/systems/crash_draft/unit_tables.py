@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing
 from strapdown.systems.crash_draft.parts import Part
@@ -23,6 +24,8 @@ __all__ = ["unit_tables"]
 
 KMH = 3.6
 SHOWN_SENSORS = 8
+# Of a zeroed record: what is taken for the rest before the blow, s.
+LEAST_REST, LONGEST_REST, BEFORE_BLOW = 0.02, 1.0, 0.005
 ONLY = "only you know which way it faces: "
 
 
@@ -158,12 +161,10 @@ def _trigger(page: Page, unit: Unit) -> None:
         + (f"; {impact.more} more events follow" if impact.more else "")
     )
     if impact.rest is None:
-        page.say(
-            "found: no rest before the impact, so that it does not tell roll and pitch of the "
-            "vehicle there, deg"
-        )
+        page.say("found: nothing in it tells roll and pitch of the vehicle before the impact, deg")
         page.key("levelling_deg", "[0.0, 0.0]", "assumed: a level road")
-        page.key("levelling_sd_deg", "2.0", "assumed, deg")
+        page.key("levelling_sd_deg", "1.0", "assumed, deg")
+        _zeroed_rest(page, unit)
     else:
         kind = {"still": "at rest", "steady": "steady, though perhaps moving"}[impact.grade]
         length = impact.rest[1] - impact.rest[0]
@@ -171,6 +172,19 @@ def _trigger(page: Page, unit: Unit) -> None:
             f"found: it was {kind} from {impact.rest[0]:.6g} to {impact.rest[1]:.6g} s, "
             f"{length:.3g} s; to name another, counted from the trigger: rest_s = [from, to]"
         )
+
+
+def _zeroed_rest(page: Page, unit: Unit) -> None:
+    """Where gravity was taken off, the rest is bias: it is named, as none would be found."""
+    part, impact = unit.accelerometers[0], unit.impact
+    before = float(part.time[0]) - impact.trigger
+    if not part.zeroed or part.unit in FACTORS["velocity"] or before > -LEAST_REST:
+        return
+    page.key(
+        "rest_s",
+        f"[{number(max(before, -LONGEST_REST), 4)}, {number(-BEFORE_BLOW)}]",
+        "found: s from the trigger; there it was zeroed, gravity and all: that is its bias",
+    )
 
 
 def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) -> None:
