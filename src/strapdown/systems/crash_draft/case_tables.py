@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from strapdown.crash.event_rule import KMH
 from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing, direction
@@ -20,7 +21,6 @@ __all__ = [
     "vehicle_table",
 ]
 
-KMH = 3.6
 # Laboratories sample so fast that ringing is in their records.
 FAST = 5000.0  # Hz
 # Two units of one vehicle that differ by more are not explained by their places.
@@ -118,7 +118,7 @@ def entry_table(page: Page, facts: Mapping[str, str], units: Sequence[Unit]) -> 
             what="how the speed is known",
         )
         return
-    page.key("speed_km_per_h", number(speed * KMH), "found: in the record, km/h")
+    page.key("speed_km_per_h", number(speed / KMH), "found: in the record, km/h")
     page.key("speed_sd_km_per_h", "0.1", "assumed: of a speed trap of a laboratory, km/h")
     page.key("source", string("stated by the record"), "found")
 
@@ -139,7 +139,7 @@ def agreement(page: Page, units: Sequence[Unit], facing: Sequence[Facing]) -> No
             continue
         came = None if faces.heading_deg is None else direction(unit, faces.heading_deg)
         where = "" if came is None else f" from {came:.0f} deg"
-        told.append(f"'{plain(unit.name)}' {unit.impact.largest * KMH:.3g} km/h{where}")
+        told.append(f"'{plain(unit.name)}' {unit.impact.largest / KMH:.3g} km/h{where}")
         sizes.append(unit.impact.largest)
     if len(told) < 2:
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from strapdown.crash.event_rule import KMH
 from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing
@@ -22,7 +23,6 @@ from strapdown.systems.crash_draft.toml_text import (
 
 __all__ = ["unit_tables"]
 
-KMH = 3.6
 SHOWN_SENSORS = 8
 # Of a zeroed record: what is taken for the rest before the blow, s.
 LEAST_REST, LONGEST_REST, BEFORE_BLOW = 0.02, 1.0, 0.005
@@ -123,7 +123,7 @@ def _trigger(page: Page, unit: Unit) -> None:
     if not impact.found and cut.saturated:
         page.say(
             f"found: it was struck so hard that it stood at the end of its range, in {cut.samples} "
-            f"samples; what it shows of the change of velocity, {impact.largest * KMH:.2g} km/h "
+            f"samples; what it shows of the change of velocity, {impact.largest / KMH:.2g} km/h "
             "within 150 ms, is therefore too little"
         )
         page.key(
@@ -134,7 +134,7 @@ def _trigger(page: Page, unit: Unit) -> None:
     if not impact.found:
         page.say(
             "No crash was found: the largest change of the horizontal velocity within 150 ms is "
-            f"{impact.largest * KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
+            f"{impact.largest / KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
             f"acceleration, {in_words(impact.peak, 'acceleration')}, is at {impact.trigger:.6g} s."
         )
         page.key(
@@ -156,7 +156,7 @@ def _trigger(page: Page, unit: Unit) -> None:
         )
     page.key("trigger_sd_s", number(impact.trigger_sd, 2), "found: how well that is known, s")
     page.say(
-        f"found: from there the horizontal velocity changes by {impact.largest * KMH:.3g} km/h, "
+        f"found: from there the horizontal velocity changes by {impact.largest / KMH:.3g} km/h, "
         f"with a peak of {in_words(impact.peak, 'acceleration')}"
         + (f"; {impact.more} more events follow" if impact.more else "")
     )
