@@ -30,7 +30,14 @@ def test_dir_and_an_unknown_name_load_nothing_either():
 
 
 @pytest.mark.parametrize(
-    "arguments", [["--help"], ["attitude", "--help"], ["reproduce", "--help"], ["--version"]]
+    "arguments",
+    [
+        ["--help"],
+        ["attitude", "--help"],
+        ["reproduce", "--help"],
+        ["init", "crash", "--help"],
+        ["--version"],
+    ],
 )
 def test_help_loads_nothing_heavy(arguments):
     code = (

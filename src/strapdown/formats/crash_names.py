@@ -44,6 +44,8 @@ _WORDS = {
     "displacement": ("displacement", "crush"),
     "force": ("force", "load"),
 }
+# A gyro to the makers of phones, an acceleration in g to those of crash recorders.
+_EITHER = ("gx", "gy", "gz")
 _OF_TRIAD = {"accel": "acceleration", "gyro": "rate"}
 _TRIAD_NAMES = {name: triad for triad, names in TRIADS.items() for name in names if len(name) > 1}
 
@@ -132,6 +134,8 @@ def _quantity(words: list[str], triad: str | None, change: bool) -> str:
         return "time"
     if change:
         return "velocity"
+    if "".join(words) in _EITHER:
+        return "other"
     base = str(triad).partition("_")[0]
     if base in _OF_TRIAD:
         return _OF_TRIAD[base]

@@ -283,6 +283,16 @@ def test_a_gyro_whose_rest_is_as_long_as_gravity_stays_a_gyro(pole, tmp_path):
     assert unit["gyro"]["unit"] == "deg/s"
 
 
+def test_a_heading_of_one_letter_is_told_by_its_numbers(pole, tmp_path):
+    time, (low, _, _) = tables(pole["IMU1"])
+    path = write(tmp_path / "r.csv", "t,gx,gy,gz", np.column_stack([time, low / G]))
+    draft, _ = drafted(tmp_path, path)
+    spec = filled(draft, tmp_path)
+    # Written in steps of 0.0001 g.
+    read = triad(spec.units[0].accelerometers[0], "acceleration")
+    np.testing.assert_allclose(read.to_numpy(), low, atol=5.01e-5 * G)
+
+
 def test_without_time_the_rate_is_asked(pole, tmp_path):
     unit = pole["IMU1"]
     _, (low, _, gyro) = tables(unit)
@@ -325,6 +335,9 @@ def test_a_table_of_an_event_data_recorder(tmp_path):
     (unit,) = table["units"]
     assert unit["trigger_s"] == 0.0
     assert unit["assumed"] == {"turn_sd_deg": "?", "delta_v_sd_m_per_s": "?", "because": "?"}
+    # The first mean ends at 10 ms; there the path can begin.
+    assert table["entry"]["time_s"] == pytest.approx(0.01)
+    assert table["options"]["sampling"] == "mean"
     # The last whole km/h of the forward change, with 1 km/h of the lateral.
     assert "26 km/h" in draft.found[0]
     spec = filled(draft, tmp_path)
@@ -343,6 +356,10 @@ def test_the_crash_test_of_nhtsa(recordings, tmp_path):
         {"x": "94", "z": "98"},
     ]
     assert left["trigger_s"] == 0.0
+    # Zeroed before the impact: all of the rest is bias, and the floor rings.
+    assert left["rest_s"] == [-0.05, -0.005]
+    assert left["accelerometers"][0]["uncertainty"]["bias_sd_mg"] > 1000.0
+    assert (table["options"]["rate_hz"], table["options"]["sampling"]) == (1000.0, "mean")
     assert left["assumed"]["delta_v_sd_m_per_s"] == "?"
     flat = " ".join(draft.text.split("\n# "))
     assert "channels 99: redundant at 'LEFT REAR SEAT CROSSMEMBER'" in flat
@@ -423,13 +440,9 @@ def test_hostile_text_of_a_record_stays_text(names, title, fact):
         return
     table = tomllib.loads(draft.text)
     assert table["vehicle"]["name"] == fact
-    used = {
-        n.removeprefix("-")
-        for u in table["units"]
-        for p in u["accelerometers"]
-        for n in p["channels"].values()
-    }
-    assert used <= set(names)
+    used = [n for u in table["units"] for p in u["accelerometers"] for n in p["channels"].values()]
+    # A minus before a name turns its axis.
+    assert all(n in names or n[1:] in names for n in used)
 
 
 def test_a_draft_is_the_same_every_time(german):

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from strapdown.crash.event_rule import KMH
+from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing, direction
 from strapdown.systems.crash_draft.parts import Skipped
@@ -19,7 +21,8 @@ __all__ = [
     "vehicle_table",
 ]
 
-KMH = 3.6
+# Laboratories sample so fast that ringing is in their records.
+FAST = 5000.0  # Hz
 # Two units of one vehicle that differ by more are not explained by their places.
 FAR_APART = 1.5
 
@@ -77,7 +80,7 @@ def vehicle_table(page: Page, facts: Mapping[str, str]) -> None:
     page.key("position_m", array([0.0, 0.0, 0.0]), "assumed: it is the origin of all positions, m")
 
 
-def entry_table(page: Page, facts: Mapping[str, str]) -> None:
+def entry_table(page: Page, facts: Mapping[str, str], units: Sequence[Unit]) -> None:
     """Speed at the impact: found in a test's record, else asked."""
     page.table(
         "[entry]",
@@ -85,6 +88,14 @@ def entry_table(page: Page, facts: Mapping[str, str]) -> None:
         'the blow: kind = "standstill", and delete the speed and its sd.',
     )
     page.key("kind", '"speed"')
+    late = max(float(u.accelerometers[0].time[0]) - u.impact.trigger for u in units)
+    timed = all(u.impact.found and u.accelerometers[0].clock.unit for u in units)
+    if timed and late > 0.0:
+        page.key(
+            "time_s",
+            number(late),
+            "found: from the trigger, s: the first sample of the record is there; the speed then",
+        )
     speed = _fact(facts, "speed_m_per_s")
     if speed is None:
         page.key(
@@ -107,7 +118,7 @@ def entry_table(page: Page, facts: Mapping[str, str]) -> None:
             what="how the speed is known",
         )
         return
-    page.key("speed_km_per_h", number(speed * KMH), "found: in the record, km/h")
+    page.key("speed_km_per_h", number(speed / KMH), "found: in the record, km/h")
     page.key("speed_sd_km_per_h", "0.1", "assumed: of a speed trap of a laboratory, km/h")
     page.key("source", string("stated by the record"), "found")
 
@@ -128,7 +139,7 @@ def agreement(page: Page, units: Sequence[Unit], facing: Sequence[Facing]) -> No
             continue
         came = None if faces.heading_deg is None else direction(unit, faces.heading_deg)
         where = "" if came is None else f" from {came:.0f} deg"
-        told.append(f"'{plain(unit.name)}' {unit.impact.largest * KMH:.3g} km/h{where}")
+        told.append(f"'{plain(unit.name)}' {unit.impact.largest / KMH:.3g} km/h{where}")
         sizes.append(unit.impact.largest)
     if len(told) < 2:
         return
@@ -168,6 +179,14 @@ def options_table(page: Page, units: Sequence[Unit]) -> None:
             if own
             else "assumed: the clocks are laid over each other by what the units felt",
         )
+    rate = min(u.accelerometers[-1].clock.rate for u in units)
+    mean = all(p.unit in FACTORS["velocity"] for u in units for p in u.accelerometers)
+    if mean:
+        page.key("rate_hz", number(rate), "found: steps of the table, as samples a second")
+        page.key("sampling", '"mean"', "found: changes over a step are means")
+    elif rate >= FAST and all(u.gyro is None for u in units):
+        page.key("rate_hz", "1000.0", "assumed: common samples a second, for a floor that rings")
+        page.key("sampling", '"mean"', "assumed: means over a step lose nothing of what is faster")
     page.key("monte_carlo_runs", "2000")
     page.say(
         "window_s = [-0.1, 0.75]   of the path, from the trigger; severity, references (another "

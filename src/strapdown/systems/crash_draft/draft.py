@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.event_rule import KMH
 from strapdown.exceptions import Finding
 from strapdown.systems.crash_draft.case_tables import (
-    KMH,
     agreement,
     case_table,
     entry_table,
@@ -74,7 +74,7 @@ def write_draft(
     head(page)
     case_table(page, title, facts or {})
     vehicle_table(page, facts or {})
-    entry_table(page, facts or {})
+    entry_table(page, facts or {}, units)
     for k, unit in enumerate(units):
         unit_tables(page, unit, facing[k], units)
     agreement(page, units, facing)
@@ -98,14 +98,14 @@ def _found(units: Sequence[Unit]) -> list[str]:
             what = f"its largest blow begins near sample {at:.0f}; it has no clock"
         elif impact.found:
             what = (
-                f"struck at {impact.trigger:.6g} s of its clock, {impact.largest * KMH:.3g} km/h, "
+                f"struck at {impact.trigger:.6g} s of its clock, {impact.largest / KMH:.3g} km/h, "
                 f"peak {impact.peak / STANDARD_GRAVITY:.3g} g"
             )
         elif unit.ends[len(unit.accelerometers) - 1].saturated:
             what = f"struck at {impact.trigger:.6g} s of its clock, beyond the end of its range"
         else:
             what = (
-                f"no crash found: {impact.largest * KMH:.2g} km/h within 150 ms at most, of the 8 "
+                f"no crash found: {impact.largest / KMH:.2g} km/h within 150 ms at most, of the 8 "
                 "that 49 CFR 563 asks for"
             )
         told.append(f"{plain(unit.name)}: {with_}; {what}")

@@ -21,7 +21,9 @@ __all__ = ["laboratory_parts"]
 _AXIS_WORD = re.compile(r"(?<![A-Za-z])([XYZ])[RGL]?(?![A-Za-z])(?:[ -]?AXIS)?", re.I)
 _FAILED = ("failed", "no data", "questionable", "meaningless")
 # Of the accelerometers of crash laboratories, after their calibration by SAE J211.
-LABORATORY = {"bias_sd_mg": 100.0, "scale_sd_percent": 1.0, "misalignment_sd_deg": 1.0}
+# Zeroed channels have lost gravity with their bias.
+LABORATORY = {"bias_sd_mg": 1020.0, "scale_sd_percent": 1.0, "misalignment_sd_deg": 1.0}
+LABORATORY_GYRO = {"bias_sd_deg_per_s": 1.0, "scale_sd_percent": 1.0, "misalignment_sd_deg": 1.0}
 
 
 def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
@@ -117,7 +119,7 @@ def _part(
     scales = [c.full_scale for c in chosen.values() if c.full_scale]
     kind = STANDARD_GRAVITY if quantity == "acceleration" else GYRO_UNITS["deg/s"]
     name = "full_scale_g" if quantity == "acceleration" else "full_scale_deg_per_s"
-    uncertainty = dict(LABORATORY)
+    uncertainty = dict(LABORATORY if quantity == "acceleration" else LABORATORY_GYRO)
     if scales:
         uncertainty[name] = round(min(scales) / kind, 6)
     notes = [
@@ -141,8 +143,8 @@ def _part(
             named=True,
             place=place,
             uncertainty=uncertainty,
-            basis="of a sensor of a crash laboratory, calibrated by SAE J211; its full scale is "
-            "that of the record",
+            basis="of a sensor of a crash laboratory, calibrated by SAE J211; zeroed before the "
+            "impact, so that gravity is in its bias; its full scale is that of the record",
             notes=tuple(notes),
         ),
         skipped,

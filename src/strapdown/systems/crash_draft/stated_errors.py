@@ -19,6 +19,8 @@ GYRO_SCALES = (90.0, 125.0, 250.0, 300.0, 500.0, 1000.0, 2000.0, 4000.0, 8000.0,
 # two (MPU-6050 and LSM6DSO), 20 to 100 mg and 1 to 20 deg/s of zero error.
 SCALE_PERCENT, MISALIGNMENT_DEG = 2.0, 1.0
 BIAS_MG, BIAS_DEG_PER_S, G_SENSITIVITY = 60.0, 5.0, 0.1
+# A record that was zeroed at rest has lost gravity with its bias.
+ZEROED_G = 1.0
 # An end is not looked for below the largest reading and this part of it.
 HEADROOM = 1.01
 
@@ -67,6 +69,9 @@ def stated_of(
         off = quiet.mean - impact.base
         offset = float(np.abs(off).max()) / g
         told = f"; at rest it is {offset:.2g} g off the finer range, which corrects it"
+    elif part.zeroed:
+        offset = ZEROED_G
+        told = "; it was zeroed at rest, so that gravity is in its bias"
     full = _next(max([reached * HEADROOM, *known]) / g, FULL_SCALES)
     numbers = {
         "noise_density_ug_per_sqrt_hz": density / (1e-6 * g),

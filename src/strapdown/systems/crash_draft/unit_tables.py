@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from strapdown.crash.event_rule import KMH
+from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing
 from strapdown.systems.crash_draft.parts import Part
@@ -21,8 +23,9 @@ from strapdown.systems.crash_draft.toml_text import (
 
 __all__ = ["unit_tables"]
 
-KMH = 3.6
 SHOWN_SENSORS = 8
+# Of a zeroed record: what is taken for the rest before the blow, s.
+LEAST_REST, LONGEST_REST, BEFORE_BLOW = 0.02, 1.0, 0.005
 ONLY = "only you know which way it faces: "
 
 
@@ -120,7 +123,7 @@ def _trigger(page: Page, unit: Unit) -> None:
     if not impact.found and cut.saturated:
         page.say(
             f"found: it was struck so hard that it stood at the end of its range, in {cut.samples} "
-            f"samples; what it shows of the change of velocity, {impact.largest * KMH:.2g} km/h "
+            f"samples; what it shows of the change of velocity, {impact.largest / KMH:.2g} km/h "
             "within 150 ms, is therefore too little"
         )
         page.key(
@@ -131,7 +134,7 @@ def _trigger(page: Page, unit: Unit) -> None:
     if not impact.found:
         page.say(
             "No crash was found: the largest change of the horizontal velocity within 150 ms is "
-            f"{impact.largest * KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
+            f"{impact.largest / KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
             f"acceleration, {in_words(impact.peak, 'acceleration')}, is at {impact.trigger:.6g} s."
         )
         page.key(
@@ -153,17 +156,15 @@ def _trigger(page: Page, unit: Unit) -> None:
         )
     page.key("trigger_sd_s", number(impact.trigger_sd, 2), "found: how well that is known, s")
     page.say(
-        f"found: from there the horizontal velocity changes by {impact.largest * KMH:.3g} km/h, "
+        f"found: from there the horizontal velocity changes by {impact.largest / KMH:.3g} km/h, "
         f"with a peak of {in_words(impact.peak, 'acceleration')}"
         + (f"; {impact.more} more events follow" if impact.more else "")
     )
     if impact.rest is None:
-        page.say(
-            "found: no rest before the impact, so that it does not tell roll and pitch of the "
-            "vehicle there, deg"
-        )
+        page.say("found: nothing in it tells roll and pitch of the vehicle before the impact, deg")
         page.key("levelling_deg", "[0.0, 0.0]", "assumed: a level road")
-        page.key("levelling_sd_deg", "2.0", "assumed, deg")
+        page.key("levelling_sd_deg", "1.0", "assumed, deg")
+        _zeroed_rest(page, unit)
     else:
         kind = {"still": "at rest", "steady": "steady, though perhaps moving"}[impact.grade]
         length = impact.rest[1] - impact.rest[0]
@@ -171,6 +172,19 @@ def _trigger(page: Page, unit: Unit) -> None:
             f"found: it was {kind} from {impact.rest[0]:.6g} to {impact.rest[1]:.6g} s, "
             f"{length:.3g} s; to name another, counted from the trigger: rest_s = [from, to]"
         )
+
+
+def _zeroed_rest(page: Page, unit: Unit) -> None:
+    """Where gravity was taken off, the rest is bias: it is named, as none would be found."""
+    part, impact = unit.accelerometers[0], unit.impact
+    before = float(part.time[0]) - impact.trigger
+    if not part.zeroed or part.unit in FACTORS["velocity"] or before > -LEAST_REST:
+        return
+    page.key(
+        "rest_s",
+        f"[{number(max(before, -LONGEST_REST), 4)}, {number(-BEFORE_BLOW)}]",
+        "found: s from the trigger; there it was zeroed, gravity and all: that is its bias",
+    )
 
 
 def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) -> None:
