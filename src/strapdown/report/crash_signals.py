@@ -162,24 +162,26 @@ def _about_the_crash(
         "m/s². It is what an accelerometer feels: −1 g downward at rest. Thin: the ranges as "
         "recorded, at their own rate; strong: at the common stamps, merged, biases taken off. "
         "Triangles: a range at its end. Dashed levels: ends of ranges that were come near. "
-        "Shaded: the event.",
+        f"Shaded: the event.{_not_drawn([a for a in assumed if a in _AXES])}",
         "time from the trigger, ms",
         tuple(
             Panel(
                 f"{axis}, g",
                 tuple(_once(rows[k])),
-                title=_told(assumed, axis),
                 levels=tuple(levels[k]),
                 height=0.9,
             )
             for k, axis in enumerate(_AXES)
+            if axis not in assumed
         ),
     )
 
 
-def _told(assumed: Sequence[str], axis: str) -> str:
-    """Title of a panel."""
-    return "" if not assumed else f"{axis}: assumed, not recorded" if axis in assumed else axis
+def _not_drawn(assumed: Sequence[str]) -> str:
+    """A sentence of the caption."""
+    if not assumed:
+        return ""
+    return f" Not recorded but assumed, and not drawn: {', '.join(assumed)}."
 
 
 def _once(lines: list[Line]) -> list[Line]:
@@ -223,6 +225,7 @@ def _rates(
         tuple(
             Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
             for k, turn in enumerate(_TURNS)
+            if {"yaw": "heading"}.get(turn, turn) not in assumed_axes(unit)
         ),
     )
 
@@ -263,7 +266,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"{unit.name}: the whole record",
         "Merged specific force (−1 g downward at rest) and rates along and about the vehicle's "
         f"axes. Shaded: the event; {said}."
-        + (f" Not recorded but assumed, and not drawn: {', '.join(assumed)}." if assumed else ""),
+        f"{_not_drawn(assumed)}",
         "time from the trigger, s",
         tuple(panels),
         marks=marks_apart(

@@ -12,6 +12,7 @@ from tests.unit.report.crash_results import crash_case, figures_of
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.pdof_sensitivity import pdof_by_shift
+from strapdown.report import crash_signals
 from strapdown.report.chart import SERIES_COLOURS
 from strapdown.report.crash_budget import delta_v_budget
 from strapdown.report.crash_delta_v import delta_v_chart, delta_v_half_widths
@@ -130,6 +131,26 @@ def test_signals_are_turned_into_vehicle_axes_and_missing_axes_spoil_no_other():
     assert math.isnan(turned[1, 0])
     flags = flags_in_vehicle_axes(np.array([[False, True, False]]), C)
     np.testing.assert_array_equal(flags, [[True, False, False]])
+
+
+def test_what_was_assumed_is_not_drawn_as_recorded(monkeypatch):
+    monkeypatch.setattr(crash_signals, "assumed_axes", lambda _: ("right", "roll"))
+    result = crash_case(units=ALONE)
+    found = result.reconstruction
+    recorded = result.units[0]
+    low = recorded.accelerometers[0]
+    bare = replace(low, table=low.table.drop(columns="accel_y"))
+    signals = crash_signals.unit_signals(
+        replace(recorded, accelerometers=(bare, *recorded.accelerometers[1:])),
+        found.synchronised.units[0],
+        found.units[0],
+        0,
+        found.units[0].events.events,
+    )
+    assert [p.y_label for p in signals.crash.panels] == ["forward, g", "down, g"]
+    assert [p.y_label for p in signals.rates.panels] == ["pitch, deg/s", "yaw, deg/s"]
+    assert [one.name for one in signals.overview.panels[0].lines] == ["forward", "down"]
+    assert "Not recorded but assumed, and not drawn: right." in signals.crash.caption
 
 
 def test_the_direction_by_window_goes_through_the_answer():
