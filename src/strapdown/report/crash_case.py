@@ -9,11 +9,13 @@ from typing import Any
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
+from strapdown.formats.mme_writer import write_mme
 from strapdown.report.crash_assumptions import CONVENTIONS
 from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
 from strapdown.report.crash_document import crash_document, drawings
 from strapdown.report.crash_figures import crash_figures
 from strapdown.report.crash_json import crash_json
+from strapdown.report.crash_signal_record import signal_record
 from strapdown.report.document import Animation, ChartBlock, Document, Picture
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
@@ -135,10 +137,15 @@ def _write_numbers(result: CaseResult, folder: Path) -> None:
     told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
     main = result.reconstruction.main
     write_table(trajectory_table(main.path), folder / "trajectory.csv", told)
+    answers, formats = result.reconstruction.answers, result.spec.options.formats
     made: set[str] = set()
-    for unit in result.reconstruction.answers:
+    for unit in answers if "csv" in formats else ():
         own = file_name(unit.name, made)
         write_table(signals_table(unit), folder / f"signals-{own}.csv", told)
+    if "mme" in formats:
+        spec = result.spec
+        record = signal_record(spec.title, spec.point.name, answers, spec.options.rate_hz)
+        write_mme(folder / "mme", record)
 
 
 def file_name(name: str, made: set[str]) -> str:

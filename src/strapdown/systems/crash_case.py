@@ -203,7 +203,10 @@ def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
     if entry.kind == "gnss":
         assert entry.path is not None
         return GnssEntry(
-            read_fixes(entry.path), impact=entry.time_s, antenna=entry.antenna_m or (0.0, 0.0, 0.0)
+            read_fixes(entry.path),
+            impact=entry.time_s,
+            antenna=entry.antenna_m or (0.0, 0.0, 0.0),
+            priors={"antenna_sd": entry.antenna_sd_m},
         )
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     return Entry.from_speed(
