@@ -38,8 +38,8 @@ WINDOWS = ("first sign", "detection", "largest 30 ms", "event")
 LENGTH = 0.030  # s
 SHOWN = (0.012, 0.14)  # s, from time zero
 GRAVITY = 9.80665
-#: Within this two directions are the same to a reader of Table 2, deg.
-SAME = 1.0
+#: Within this two directions are the same in Table 2, which has whole degrees.
+SAME = 0.5
 
 
 @dataclass(frozen=True)

@@ -36,6 +36,7 @@ LABS, IMUS = ("LAB1", "LAB2"), ("IMU1", "IMU2")
 SCALE_SD = 2.0  # %, of the MEMS triads of the experiment
 SHEET_SCALE = 10.0 / np.sqrt(3.0)  # %, a bound of ±10 %
 PHASES = 3
+FRAMES = 5  # of 1000 a second, from one point that is drawn to the next
 
 
 def figure(made: Experiment) -> Figure:
@@ -44,13 +45,13 @@ def figure(made: Experiment) -> Figure:
     for k, axis in enumerate(NED):
         for name in PLATFORMS:
             error = made.against_cameras[name].errors[axis]
-            error = error[error.index >= 0.0]
+            error = error[error.index >= 0.0].iloc[::FRAMES]
             panels[k].append(
                 Trace(name, error.index.to_numpy(dtype=np.float64), error.to_numpy(np.float64))
             )
         for name in ("LAB1", "IMU1"):
             half = made.against_cameras[name].bound[axis]
-            half = half[half.index >= 0.0].iloc[::5]
+            half = half[half.index >= 0.0].iloc[::FRAMES]
             time, size = half.index.to_numpy(dtype=np.float64), half.to_numpy(dtype=np.float64)
             # One curve: there along the upper edge, a break, and along the lower one.
             panels[k].append(
