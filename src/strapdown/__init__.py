@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from strapdown.evaluation.trajectory_differences import trajectory_differences
     from strapdown.evaluation.trajectory_summary import summarise_differences
     from strapdown.formats import read_log
+    from strapdown.formats.crash_records import read_crash_record
     from strapdown.formats.nhtsa import read_nhtsa
     from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.formats.trajectory_writers import write_trajectory
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
     from strapdown.nav_state import NavState
     from strapdown.report.attitude import write_attitude
+    from strapdown.report.crash_case import reconstruct_case
     from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
@@ -64,9 +66,11 @@ __all__ = [
     "__version__",
     "bench_attitude",
     "motion_increments",
+    "read_crash_record",
     "read_log",
     "read_nhtsa",
     "read_trajectory",
+    "reconstruct_case",
     "reconstruct_crash",
     "reproduce",
     "run_mechanization",
@@ -93,8 +97,10 @@ _HOMES = {
     "bench_attitude": "strapdown.systems.attitude_bench",
     "motion_increments": "strapdown.increments",
     "read_log": "strapdown.formats",
+    "read_crash_record": "strapdown.formats.crash_records",
     "read_nhtsa": "strapdown.formats.nhtsa",
     "read_trajectory": "strapdown.formats.trajectory_readers",
+    "reconstruct_case": "strapdown.report.crash_case",
     "reconstruct_crash": "strapdown.systems.crash_reconstruction",
     "reproduce": "strapdown.report.reproduction",
     "run_mechanization": "strapdown.mechanization",

@@ -22,7 +22,7 @@ from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
 from strapdown.systems.crash_case import CaseResult, run_case
 
-__all__ = ["crash", "file_name", "rerun_crash", "write_crash"]
+__all__ = ["file_name", "reconstruct_case", "rerun_crash", "write_crash"]
 
 Progress = Callable[[str, float], None]
 
@@ -31,7 +31,7 @@ def _silent(stage: str, share: float) -> None:
     """Report progress to nobody."""
 
 
-def crash(
+def reconstruct_case(
     case: str | Path, out: str | Path, *, force: bool = False, progress: Progress = _silent
 ) -> Seal:
     """Reconstruct a crash from its case file and write the report as a sealed bundle.
