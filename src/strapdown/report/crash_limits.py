@@ -146,7 +146,7 @@ def _assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
         if given.turn_sd_deg is not None:
             parts.append(
                 "it has no gyro: the vehicle is taken not to have turned, with a standard "
-                f"deviation of {given.turn_sd_deg:g}° of each angle {span}"
+                f"deviation of {_each(given.turn_sd_deg, '°')} {span}"
             )
         if given.delta_v_sd_m_per_s is not None:
             missing = [
@@ -157,7 +157,7 @@ def _assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
             parts.append(
                 f"it has no accelerometer along its axis {' and '.join(missing) or 'that is told'}:"
                 " nothing is taken to have changed there, with a standard deviation of "
-                f"{given.delta_v_sd_m_per_s:g} m/s {span}"
+                f"{_each(given.delta_v_sd_m_per_s, ' m/s')} {span}"
             )
         why = f" Reason stated: {given.because}" if given.because else ""
         yield (
@@ -165,6 +165,13 @@ def _assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
             f"{'; '.join(parts).capitalize()}. The bounds have it; they are wrong where the "
             f"assumption is.{why}",
         )
+
+
+def _each(sd: float | tuple[float, float, float], unit: str) -> str:
+    """One standard deviation for all axes, or one for each."""
+    if isinstance(sd, float):
+        return f"{sd:g}{unit} of each"
+    return f"{sd[0]:g}, {sd[1]:g} and {sd[2]:g}{unit} of the three"
 
 
 def _rest(result: CaseResult) -> Iterator[tuple[str, str]]:
