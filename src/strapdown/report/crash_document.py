@@ -111,7 +111,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         subtitle="Crash reconstruction from inertial records",
         facts=tuple((head, text) for head, text in facts if text),
         front=(
-            KeyFigures(key_figures(result), (figures.pdof, figures.path)),
+            KeyFigures(key_figures(result), figures.front),
             Paragraph(lead(result), "lead"),
             *((Paragraph(f"Mind: {_worst(result)}", "warning"),) if _worst(result) else ()),
         ),

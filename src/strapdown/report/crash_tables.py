@@ -9,7 +9,7 @@ import numpy as np
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.pdof import NedPdof, Pdof
 from strapdown.crash.velocity_change import VelocityChange
-from strapdown.report.crash_values import KMH, about, angle_range, instant, plain, speed
+from strapdown.report.crash_values import KMH, about, angle_range, instant, plain, recorder, speed
 from strapdown.report.document import TableBlock
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.systems.case_severity import main_event
@@ -43,7 +43,7 @@ def answers_table(result: CaseResult) -> TableBlock:
                 strong.append(len(rows))
             rows.append(
                 (
-                    unit.name,
+                    recorder(unit, result),
                     f"{k + 1}, {kind.name}",
                     f"{instant(event.time_zero)} to {instant(event.end)}",
                     *(
@@ -86,7 +86,7 @@ def _direction_cells(change: VelocityChange) -> tuple[str, str, str]:
         at = f"{plain(angle.horizontal_deg, 1)}°"
     if across.undetermined:
         return "not determined", "all", "–"
-    return at, angle_range(across).removesuffix(" with 95 %"), f"{plain(angle.vertical_deg, 1)}°"
+    return at, angle_range(across).split(" with ")[0], f"{plain(angle.vertical_deg, 1)}°"
 
 
 def direction_table(result: CaseResult) -> TableBlock:
@@ -102,7 +102,7 @@ def direction_table(result: CaseResult) -> TableBlock:
                 if isinstance(change.pdof, Pdof) and not change.interval.horizontal.undetermined:
                     hour = str(change.pdof.clock)
                 window = "event" if change.window == "event" else "largest window"
-                rows.append((unit.name, str(k + 1), window, frame, *_direction_cells(change), hour))
+                rows.append((recorder(unit, result), str(k + 1), window, frame, *_direction_cells(change), hour))
     return TableBlock(
         ("recorder", "event", "window", "axes", "horizontal", "95 %", "vertical", "clock"),
         tuple(rows),
@@ -119,7 +119,7 @@ def path_table(result: CaseResult) -> TableBlock:
         table, sd = unit.path.table.iloc[-1], unit.path.sd.iloc[-1]
         rows.append(
             (
-                unit.name,
+                recorder(unit, result),
                 instant(unit.path.time[-1]),
                 *(about(float(table[a]), TWO_SIDED_95 * float(sd[a]), "") for a in NED),
                 *(
@@ -169,7 +169,7 @@ def budget_table(result: CaseResult) -> TableBlock | None:
             "down at the end, m",
         ),
         (*lines, ("all together", *_sizes(np.sqrt(sums)))),
-        caption=f"{unit.name}: one standard deviation; their squares add up to that of the last "
+        caption=f"{recorder(unit, result)}: one standard deviation; their squares add up to that of the last "
         "line. The 95 % bounds are 1.96 times it.",
         strong=(len(lines),),
     )
