@@ -22,9 +22,7 @@ _CAR = 0.53  # of the dial's radius that the farthest corner of the vehicle reac
 _RING = 0.86  # of it, where the ring of the intervals begins
 Point = tuple[float, float]
 _SOFT = "#4a525c"
-_SMALL_CAPTION = (
-    "Where the force came from, seen from above: 0° the front, clockwise; wedge: 95 %."
-)
+_SMALL_CAPTION = "Where the force came from, seen from above: 0° the front, clockwise; wedge: 95 %."
 # The least that is drawn of an interval, deg: a stroke that can be seen.
 _LEAST_WEDGE = 1.0
 

@@ -9,11 +9,14 @@ from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = [
+    "GAP",
     "KMH",
     "MEAN",
     "about",
     "angle_range",
+    "axis_names",
     "instant",
+    "moment",
     "plain",
     "recorder",
     "side_words",
@@ -88,9 +91,8 @@ def speed_range(value: float, half: float) -> str:
     """Write the bound of a speed in m/s as a range, in km/h and m/s."""
     places = _places(KMH * half)
     low, high = KMH * (value - half), KMH * (value + half)
-    return (
-        f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%; {about(value, half, 'm/s')}"
-    )
+    ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
+    return f"{ends}; {about(value, half, 'm/s')}"
 
 
 def instant(time: float) -> str:
@@ -104,6 +106,13 @@ def angle_range(interval: AngleInterval) -> str:
     if interval.undetermined:
         return "not determined: no direction is excluded with 95 %"
     return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95{GAP}%"
+
+
+def moment(time: float) -> str:
+    """Say when an instant is: ``0.7 ms before the trigger``."""
+    if abs(time) < 5e-5:
+        return "the trigger"
+    return f"{plain(1e3 * abs(time), 1)}{GAP}ms {'before' if time < 0.0 else 'after'} the trigger"
 
 
 def recorder(unit: UnitReconstruction, result: CaseResult) -> str:
@@ -120,3 +129,11 @@ def side_words(forward: float, right: float) -> str:
     if abs(right) > 2.5 * abs(forward):
         return aside
     return f"{ahead} and {aside}"
+
+
+def axis_names(result: CaseResult) -> tuple[str, str, str]:
+    """Return the names of the axes of the path: over ground where a heading is known."""
+    entry = result.spec.entry
+    if entry.kind == "gnss" or entry.heading_deg:
+        return ("north", "east", "down")
+    return ("forward", "right", "down")
