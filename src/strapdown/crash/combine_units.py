@@ -94,7 +94,8 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
     weights = _inverse_weights(at) if method == "weighted" else _median_weights(force)
     counted = _turning_measured(at)
     turning = _rate_weights(at, counted)
-    name = f"{method} of {', '.join(u.name for u in units)}"
+    kind = "weighted mean" if method == "weighted" else method
+    name = f"{kind} of {', '.join(u.name for u in units)}"
     imu = imu_table(
         time,
         np.tensordot(turning, np.array([u.rate for u in at]), axes=1),

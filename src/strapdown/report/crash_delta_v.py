@@ -17,6 +17,7 @@ from strapdown.crash.velocity_course import VelocityCourse
 from strapdown.crash.window_weights import window_weights
 from strapdown.report.chart import GREY, PURPLE, Chart, Fill, Line, Panel, curve
 from strapdown.report.crash_moments import AROUND, event_marks, signed, unit_look
+from strapdown.report.crash_values import MEAN
 
 Array = NDArray[np.float64]
 
@@ -155,7 +156,7 @@ def delta_v_chart(
             _add_course(lines, unit, (zero, *span), unit.name, look, 2.2 if unit is main else 1.3)
     own = unit_look(None if combined is not None else 0)["colour"]
     if combined is not None:
-        _add_course(lines, combined, (zero, *span), "mean of the units", unit_look(None), 2.2)
+        _add_course(lines, combined, (zero, *span), MEAN, unit_look(None), 2.2)
     last = min(span[1], main.acceleration.end)
     instants = np.unique(np.r_[np.linspace(zero, last, _INSTANTS)[1:], end])
     half = KMH * delta_v_half_widths(main, zero, found.time_zero_sd, instants, gravity)

@@ -17,11 +17,12 @@ from strapdown.report.svg_drawing import INK, SMALL, Drawing, shortened
 
 __all__ = ["Direction", "pdof_dial"]
 
-_WIDTH, _RADIUS, _TOP = 330.0, 118.0, 142.0
+_WIDTH, _SMALL_WIDTH, _RADIUS, _TOP = 330.0, 304.0, 118.0, 142.0
 _CAR = 0.53  # of the dial's radius that the farthest corner of the vehicle reaches
 _RING = 0.86  # of it, where the ring of the intervals begins
 Point = tuple[float, float]
 _SOFT = "#4a525c"
+_SMALL_CAPTION = "Where the force came from, seen from above: 0° the front, clockwise; wedge: 95 %."
 # The least that is drawn of an interval, deg: a stroke that can be seen.
 _LEAST_WEDGE = 1.0
 
@@ -58,6 +59,7 @@ def pdof_dial(
     *,
     point: Sequence[float] = (0.0, 0.0),
     point_name: str = "reference point",
+    small: bool = False,
 ) -> Picture:
     """Draw directions of force about a vehicle, seen from above, its front upward.
 
@@ -70,6 +72,8 @@ def pdof_dial(
     point : sequence of float, m
         The reference point in vehicle axes, which the dial is about.
     point_name : str
+    small : bool
+        The dial alone, for a page that tells the numbers beside it.
 
     Returns
     -------
@@ -80,10 +84,13 @@ def pdof_dial(
     rows = sorted(directions, key=lambda d: not d.main)
     height = 2.0 * _TOP + 26.0 + sum(64.0 if d.main else 33.0 for d in rows)
     height += 12.0 if not rows else 0.0 if len(rows) > 1 else -12.0
+    width = _SMALL_WIDTH if small else _WIDTH
+    if small:
+        height = 2.0 * _TOP + 14.0
     said = [_words(d) for d in directions]
     alt = "Direction of force on a clock about the vehicle: " + "; ".join(said or ["no event"])
-    out = Drawing(_WIDTH, height, alt)
-    centre = (0.5 * _WIDTH, _TOP)
+    out = Drawing(width, height, alt)
+    centre = (0.5 * width, _TOP)
     for d in sorted(directions, key=lambda d: d.main):
         _wedge(out, centre, d)
     _clock(out, centre)
@@ -95,6 +102,8 @@ def pdof_dial(
     out.circle((14.0, at), 3.6, None, fill=INK)
     name = shortened(point_name, 160.0, SMALL)
     out.text((23.0, at), f"{name}; the front is up", SMALL, _SOFT)
+    if small:
+        return Picture("pdof-front", out.svg(), "Direction of force", _SMALL_CAPTION, alt, 74.0)
     at += 26.0
     if not rows:
         out.text((14.0, at), "no event, no direction of force", 13.0, INK, bold=True)

@@ -14,6 +14,7 @@ from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.exceptions import DataError
 from strapdown.report.chart import BLACK, Chart, Line, Mark, Panel
 from strapdown.report.crash_moments import unit_look
+from strapdown.report.crash_values import MEAN
 from strapdown.rotation import within_half_turn
 
 Array = NDArray[np.float64]
@@ -130,7 +131,7 @@ def _lines(
             continue
         look = unit_look(number, len(units) == 1)
         line = Line(
-            "mean of the units" if number is None else unit.name,
+            MEAN if number is None else unit.name,
             1e3 * found.index.to_numpy(dtype=np.float64),
             _near(found["horizontal_deg"].to_numpy(dtype=np.float64), middle),
             look["colour"],

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from strapdown import __version__
+from strapdown.report import crash_check_tables as checks
+from strapdown.report import crash_source_tables as sources
 from strapdown.report import crash_tables as tables
 from strapdown.report.chart import Chart
 from strapdown.report.crash_assumptions import CONVENTIONS, assumptions, how_to_verify, method
 from strapdown.report.crash_figures import CrashFigures
 from strapdown.report.crash_limits import limitations
+from strapdown.report.crash_notes import notes, record_facts
+from strapdown.report.crash_values import plain
 from strapdown.report.crash_words import headline, key_figures, lead
 from strapdown.report.document import (
     Animation,
@@ -21,6 +25,7 @@ from strapdown.report.document import (
     Picture,
     Section,
 )
+from strapdown.systems.case_remedies import case_finding
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["crash_document", "drawings"]
@@ -44,7 +49,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
     facts = [
         ("Case", spec.number),
         ("Vehicle", _vehicle(result)),
-        ("Reference point", f"{spec.point.name}, {_place(spec.point.position_m)}"),
+        ("Reference point", spec.point.name + _place(spec.point.position_m)),
         ("Recorders", ", ".join(u.name for u in result.units)),
         ("Author", spec.author),
         ("Made with", f"strapdown {__version__}"),
@@ -99,7 +104,9 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
             ),
         ),
         Section(
-            "sensors", "Sensors", _blocks(tables.units_table(result), tables.sensors_table(result))
+            "sensors",
+            "Sensors",
+            _blocks(sources.units_table(result), sources.sensors_table(result)),
         ),
         Section("conventions", "Conventions", _blocks(figures.conventions, Facts(CONVENTIONS))),
         Section("limitations", "Limitations", _limitations(result)),
@@ -111,7 +118,7 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         subtitle="Crash reconstruction from inertial records",
         facts=tuple((head, text) for head, text in facts if text),
         front=(
-            KeyFigures(key_figures(result), (figures.pdof, figures.path)),
+            KeyFigures(key_figures(result), figures.front),
             Paragraph(lead(result), "lead"),
             *((Paragraph(f"Mind: {_worst(result)}", "warning"),) if _worst(result) else ()),
         ),
@@ -135,8 +142,9 @@ def _signals(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
 
 
 def _place(position: tuple[float, float, float]) -> str:
-    forward, right, down = position
-    return f"{forward:g} m forward, {right:g} m right, {down:g} m down of the vehicle's origin"
+    if not any(position):
+        return ""
+    return f" ({', '.join(plain(v, 2) for v in position)} m from the origin)"
 
 
 def _vehicle(result: CaseResult) -> str:
@@ -148,42 +156,30 @@ def _vehicle(result: CaseResult) -> str:
 
 def _worst(result: CaseResult) -> str:
     """The heads of what is grave: what makes an answer wrong, and not only less precise."""
-    grave = ("do not agree", "end of its range", "not measured", "not determined", "beyond the")
+    grave = ("do not agree", "end of its range", "not everything", "not determined", "the record")
     found = [head for head, _ in limitations(result) if any(word in head for word in grave)]
     return "; ".join(found) + " (see Limitations)." if found else ""
 
 
 def _case(result: CaseResult) -> tuple[Block, ...]:
     described = [Paragraph(text) for text in result.spec.description.split("\n\n") if text.strip()]
-    records = [
-        (record.path.name, "; ".join([record.title, *_told(record.facts)]).strip("; "))
-        for record in result.records.values()
-    ]
+    facts: list[Block] = []
+    for record in result.records.values():
+        rows = record_facts(record)
+        if rows:
+            facts += [Paragraph(f"What {record.path.name} says of itself:"), Facts(rows)]
     return _blocks(
-        *described,
-        Paragraph(headline(result), "note"),
-        Facts(
-            tuple((name, text or "a record without a word of its own") for name, text in records)
-        ),
+        *described, Paragraph(headline(result), "note"), sources.records_table(result), *facts
     )
 
 
-def _told(facts: object) -> list[str]:
-    from collections.abc import Mapping
-
-    assert isinstance(facts, Mapping)
-    return [f"{str(k).replace('_', ' ')}: {v}" for k, v in facts.items()]
-
-
 def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = tables.comparison_table(result)
+    table = checks.comparison_table(result)
     if table is None:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
     comparison = result.reconstruction.comparison
     assert comparison is not None
-    words = tuple(
-        (f"{f.file or ''} {f.quantity or ''}".strip(), f.what) for f in comparison.findings
-    )
+    words = notes([case_finding(f) for f in comparison.findings], result)
     return _blocks(
         table,
         *_charts(figures.units, figures.accelerations),
@@ -192,7 +188,7 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
 
 
 def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = tables.severity_table(result)
+    table = checks.severity_table(result)
     if table is None:
         return (Paragraph("Without an event there is no severity to tell."),)
     notes = dict.fromkeys(a.model.note for a in result.severity if a.model.note)
@@ -200,7 +196,7 @@ def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
 
 
 def _references(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = tables.reference_table(result)
+    table = checks.reference_table(result)
     if table is None:
         return (Paragraph("No reference was given."),)
     sources = tuple((r.name, r.source) for r in result.spec.references if r.source)
@@ -215,21 +211,20 @@ def _limitations(result: CaseResult) -> tuple[Block, ...]:
 
 
 def _findings(result: CaseResult) -> tuple[Block, ...]:
-    if not result.findings:
+    comparison = result.reconstruction.comparison
+    told = [] if comparison is None else [case_finding(f) for f in comparison.findings]
+    rows = notes([f for f in result.findings if f not in told], result)
+    if not rows:
         return (Paragraph("Nothing was noticed in the records that a reader should know."),)
-    rows = []
-    for finding in result.findings:
-        place = ", ".join(
-            p
-            for p in (
-                finding.file,
-                None if finding.row is None else f"row {finding.row}",
-                finding.quantity,
-            )
-            if p
-        )
-        rows.append((place, finding.what))
-    return (Items(tuple(rows)),)
+    more = (Paragraph("What recorders differ in stands under Sensors against each other."),)
+    return (
+        Paragraph(
+            "What was noticed while the records were read and worked through, in this order, and "
+            "what can be done about it. What weighs on the answers stands under Limitations."
+        ),
+        Items(rows),
+        *(more if told else ()),
+    )
 
 
 def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
@@ -238,7 +233,7 @@ def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
     return (
         Items(tuple(r for r in rows if r[0] != "Command")),
         Paragraph(command, "mono"),
-        tables.inputs_table(result),
+        sources.inputs_table(result),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -47,9 +48,9 @@ class CrashFigures:
 
     Attributes
     ----------
-    pdof : Picture
-        Direction of force of every event on a clock about the vehicle: where it came from, 0 the
-        front, positive clockwise; 95 % as a wedge. Says so where there is no event.
+    front : tuple of Picture
+        For page one: direction of force of every event on a clock about the vehicle, where it came
+        from, 0 the front, positive clockwise, 95 % as a wedge; and the path, small.
     path : Picture
         From above, m; ellipses of 95 %; outlines at the entry, time zero, event ends and end.
     signals : tuple of UnitSignals
@@ -79,7 +80,7 @@ class CrashFigures:
         Axes, signs, origin, units and reference point on this vehicle.
     """
 
-    pdof: Picture
+    front: tuple[Picture, ...]
     path: Picture
     signals: tuple[UnitSignals, ...]
     delta_v: tuple[Chart, ...]
@@ -121,7 +122,7 @@ class CrashFigures:
     @property
     def pictures(self) -> tuple[Picture, ...]:
         """All pictures, those of the animation on paper with them."""
-        return (self.pdof, self.path, self.motion.stills, self.conventions)
+        return (*self.front, self.path, self.motion.stills, self.conventions)
 
 
 def crash_figures(result: CaseResult) -> CrashFigures:
@@ -146,6 +147,13 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     first = paths[0] if paths else None
     reference = None if first is None else reference_in_path_axes(path, first)
     shown = "reference" if first is None else first.spec.name
+    seen: Any = {
+        "events": events,
+        "point": point,
+        "names": names,
+        "reference": reference,
+        "reference_name": shown,
+    }
     several = len(found.units) > 1
     stated = _stated(result, main)
     charts = [
@@ -160,16 +168,17 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     ]
     by_name = {unit.name: unit for unit in result.units}
     return CrashFigures(
-        pdof=pdof_dial(outline, _directions(main, which), point=point, point_name=spec.point.name),
-        path=path_plan(
-            path,
-            outline,
-            events=events,
-            point=point,
-            names=names,
-            reference=reference,
-            reference_name=shown,
+        front=(
+            pdof_dial(
+                outline,
+                _directions(main, which),
+                point=point,
+                point_name=spec.point.name,
+                small=True,
+            ),
+            path_plan(path, outline, small=True, **seen),
         ),
+        path=path_plan(path, outline, **seen),
         signals=tuple(
             unit_signals(by_name[u.name], found.synchronised.unit(u.name), u, k, events)
             for k, u in enumerate(found.units)
@@ -181,15 +190,7 @@ def crash_figures(result: CaseResult) -> CrashFigures:
         pdof_by_time_zero=None
         if which is None
         else pdof_by_shift_chart(found.units, found.combined, which),
-        motion=path_animation(
-            path,
-            outline,
-            events=events,
-            point=point,
-            names=names,
-            reference=reference,
-            reference_name=shown,
-        ),
+        motion=path_animation(path, outline, **seen),
         place=place_chart(
             path,
             names,

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.report.crash_values import about, instant, plain
 from strapdown.sensors.prepared_unit import PreparedUnit
@@ -35,15 +36,17 @@ def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """
     return (
         *_event(result),
-        *_disagreement(result),
         *_clipping(result),
+        *_disagreement(result),
+        *_contradicted(result),
         *_assumed(result),
         *_rest(result),
+        *_borrowed(result),
         *_alone(result),
         *_ringing(result),
         *_levers(result),
         *_entry(result),
-        *_references(result),
+        *_no_reference(result),
     )
 
 
@@ -89,7 +92,10 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str]]:
     comparison = made.comparison
     if comparison is None or comparison.agree:
         return
-    pairs = [f"{p.first} and {p.second}" for p in comparison.pairs if not p.agree]
+    apart = [p for p in comparison.pairs if not p.agree]
+    pairs = [f"{p.first} and {p.second}" for p in apart]
+    if len(pairs) == len(comparison.pairs) > 1:
+        pairs = ["No two of them agree"]
     mean = (
         "The weighted mean lies between them, and its bound is too narrow: it takes each at its "
         "word. "
@@ -100,8 +106,9 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str]]:
         "The recorders do not agree",
         f"{'; '.join(pairs) or 'All together'}: they differ by more than what is stated of them "
         f"allows with 95 %. {mean}At least one of them has an error that is not stated: a wrong "
-        "axis, mounting point, angle, scale or clock, or a place that was deformed. Do not rely on "
-        "the answers before it is found; see Sensors against each other.",
+        "axis, mounting point, angle, scale or clock, a sensor at the end of its range, or a place "
+        "that was deformed or rang. Do not rely on the answers before it is found; see Sensors "
+        "against each other.",
     )
 
 
@@ -129,7 +136,8 @@ def _clipping(result: CaseResult) -> Iterator[tuple[str, str]]:
                 f"{instant(time[rows[-1]])}, with no wider range behind it. What was cut off is "
                 "missing, and no bound here knows how much: "
                 + (
-                    "the delta-V is too small, and the path too long."
+                    "the true delta-V along that axis is larger than what is told here, and every "
+                    "place after it is off by what is missing."
                     if what == "accelerometer"
                     else "the attitude after it, and what is resolved with it, is not to be "
                     "relied on."
@@ -138,15 +146,17 @@ def _clipping(result: CaseResult) -> Iterator[tuple[str, str]]:
 
 
 def _assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
-    for spec, unit in zip(result.spec.units, result.units, strict=True):
-        if spec.assumed is None:
-            continue
+    """What was not measured, said once of all recorders of which the same is true."""
+    told: dict[str, list[str]] = {}
+    for spec in result.spec.units:
         given, parts = spec.assumed, []
+        if given is None:
+            continue
         span = f"between {instant(given.over_s[0])} and {instant(given.over_s[1])}"
         if given.turn_sd_deg is not None:
             parts.append(
-                "it has no gyro: the vehicle is taken not to have turned, with a standard "
-                f"deviation of {given.turn_sd_deg:g}° of each angle {span}"
+                "There is no gyro: the vehicle is taken not to have turned, with a standard "
+                f"deviation of {_each(given.turn_sd_deg, '°', 'roll, pitch and heading')} {span}."
             )
         if given.delta_v_sd_m_per_s is not None:
             missing = [
@@ -155,47 +165,68 @@ def _assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
                 if all(column not in t.channels for t in spec.accelerometers)
             ]
             parts.append(
-                f"it has no accelerometer along its axis {' and '.join(missing) or 'that is told'}:"
-                " nothing is taken to have changed there, with a standard deviation of "
-                f"{given.delta_v_sd_m_per_s:g} m/s {span}"
+                f"There is no accelerometer along {' and '.join(missing) or 'an axis'}: nothing is "
+                "taken to have changed there, with a standard deviation of "
+                f"{_each(given.delta_v_sd_m_per_s, ' m/s', 'x, y and z')} {span}."
             )
-        why = f" Reason stated: {given.because}" if given.because else ""
-        yield (
-            f"{unit.name}: something is assumed that was not measured",
-            f"{'; '.join(parts).capitalize()}. The bounds have it; they are wrong where the "
-            f"assumption is.{why}",
-        )
+        parts.append("The bounds have it; they are wrong where the assumption is.")
+        if given.because:
+            parts.append(f"Reason stated: {given.because.rstrip('.')}.")
+        told.setdefault(" ".join(parts), []).append(spec.name)
+    for text, names in told.items():
+        yield f"{', '.join(names)}: not everything was measured", text
+
+
+def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
+    """One standard deviation for all axes, or one for each."""
+    if isinstance(sd, float):
+        return f"{sd:g}{unit}"
+    return f"{sd[0]:g}, {sd[1]:g} and {sd[2]:g}{unit} ({names})"
 
 
 def _rest(result: CaseResult) -> Iterator[tuple[str, str]]:
+    told: dict[tuple[str, str], list[str]] = {}
     for unit, prepared in _prepared(result):
         rest, level = prepared.rest, prepared.levelling
         if rest is None:
-            yield (
-                f"{unit.name}: no stationary stretch before the crash",
-                f"Roll and pitch are stated, {about(level.roll_deg, 1.96 * level.sd_deg, '°')} and "
-                f"{about(level.pitch_deg, 1.96 * level.sd_deg, '°')}, or carried over from another "
-                "recorder; biases are as stated of the sensors.",
+            half = TWO_SIDED_95 * level.sd_deg
+            said = (
+                "no stationary stretch before the crash",
+                f"Roll and pitch are stated, {about(level.roll_deg, half, '°')} and "
+                f"{about(level.pitch_deg, half, '°')}, or carried over from another recorder; "
+                "biases are as stated of the sensors.",
             )
         elif rest.grade == "steady":
-            yield (
-                f"{unit.name}: quiet before the crash, but perhaps at speed",
+            said = (
+                "quiet before the crash, but perhaps at speed",
                 f"The stretch from {instant(rest.start)} to {instant(rest.end)} may have been "
                 "driven; acceleration and turning over it are taken as zero with a bound.",
             )
         elif rest.end - rest.start < SHORT_REST:
-            yield (
-                f"{unit.name}: a short stationary stretch",
+            said = (
+                "a short stationary stretch",
                 f"{instant(rest.end - rest.start)} before the crash, from {instant(rest.start)}: "
                 "biases and levelling are known the less the shorter it is, and the bounds are so "
                 "much wider.",
             )
-    for recorder in result.units:
-        if recorder.gyro is None and recorder.gyro_from is not None:
-            yield (
-                f"{recorder.name} has no gyro",
-                f"It borrows that of {recorder.gyro_from}: a rigid vehicle turns everywhere alike.",
-            )
+        else:
+            continue
+        told.setdefault(said, []).append(unit.name)
+    for (head, text), names in told.items():
+        yield f"{', '.join(names)}: {head}", text
+
+
+def _borrowed(result: CaseResult) -> Iterator[tuple[str, str]]:
+    told: dict[str, list[str]] = {}
+    for unit in result.units:
+        if unit.gyro is None and unit.gyro_from is not None:
+            told.setdefault(unit.gyro_from, []).append(unit.name)
+    for lender, names in told.items():
+        yield (
+            f"{', '.join(names)}: no gyro",
+            f"The turning is that of {lender}: a rigid vehicle turns everywhere alike. An error of "
+            "that gyro is in all of them, and the comparison of recorders does not show it.",
+        )
 
 
 def _alone(result: CaseResult) -> Iterator[tuple[str, str]]:
@@ -228,15 +259,15 @@ def _ringing(result: CaseResult) -> Iterator[tuple[str, str]]:
 
 def _levers(result: CaseResult) -> Iterator[tuple[str, str]]:
     point = np.asarray(result.spec.point.position_m)
-    longest = max(
+    longest, name = max(
         (float(np.linalg.norm(point - unit.mounting.position)), unit.name) for unit in result.units
     )
-    if longest[0] > 0.0:
+    if longest > 0.0:
         yield (
             "The vehicle is taken as rigid",
-            f"between each recorder and the {result.spec.point.name}, up to "
-            f"{plain(longest[0], 2)} m ({longest[1]}). A floor or pillar that folded in between "
-            "moved otherwise.",
+            f"That holds between each recorder and the {result.spec.point.name}, up to "
+            f"{plain(longest, 2)} m ({name}). A floor or pillar that folded in between moved "
+            "otherwise.",
         )
 
 
@@ -249,16 +280,20 @@ def _entry(result: CaseResult) -> Iterator[tuple[str, str]]:
         )
 
 
-def _references(result: CaseResult) -> Iterator[tuple[str, str]]:
+def _contradicted(result: CaseResult) -> Iterator[tuple[str, str]]:
+    for answer in result.references:
+        if answer.unit == result.reconstruction.main.name and not answer.consistent:
+            source = f" That is known from: {answer.spec.source}." if answer.spec.source else ""
+            yield (
+                f"Not within the bounds of what else is known: {answer.spec.name}",
+                "The difference is larger than the bounds of both together allow with 95 %; see "
+                f"Reference comparison.{source}",
+            )
+
+
+def _no_reference(result: CaseResult) -> Iterator[tuple[str, str]]:
     if not result.references:
         yield (
             "Nothing to compare with",
             "No film, no survey and no other measurement of the crash was given.",
         )
-    for answer in result.references:
-        if answer.unit == result.reconstruction.main.name and not answer.consistent:
-            yield (
-                f"{answer.spec.name}: not within the bounds",
-                "The difference is larger than the bounds of both together allow with 95 %; see "
-                "Reference comparison.",
-            )

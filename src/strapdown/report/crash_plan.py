@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 __all__ = ["path_plan"]
 
-_WIDTH, _LEFT, _TOP = 640.0, 58.0, 12.0
+_WIDTH, _SMALL_WIDTH, _LEFT, _TOP = 640.0, 370.0, 58.0, 12.0
 _HEIGHTS = (170.0, 380.0)
 _UNDER = 36.0  # ticks and name of the axis
 _ENLARGED = 270.0  # width of the second view
@@ -38,6 +38,7 @@ _LOOKS = (
     *(("#882255", "solid"), ("#7f6000", "dash")),
 )
 _ARROW = 44.0  # pixels
+_SMALL_CAPTION = "The vehicle at the instants named, in m from its place at the entry."
 _SLOW = 0.05  # m/s: below it there is no arrow
 _EVERY = 0.1  # s between dots
 
@@ -70,6 +71,7 @@ def path_plan(
     names: tuple[str, str] = ("forward", "right"),
     reference: pd.DataFrame | None = None,
     reference_name: str = "reference",
+    small: bool = False,
 ) -> Picture:
     """Draw a path from above.
 
@@ -86,18 +88,22 @@ def path_plan(
     reference : DataFrame, optional
         ``north east`` of the point in the axes of the path, m, indexed by time.
     reference_name : str
+    small : bool
+        For half a page's width, in letters as large as of the whole width.
 
     Returns
     -------
     Picture
-        Where the path is short against the vehicle, it is drawn a second time, larger.
+        Where the path is short against the vehicle, it is drawn a second time, larger, if there is
+        the width.
     """
     plan = _plan(path, events, reference)
+    whole = _SMALL_WIDTH if small else _WIDTH
     cars = [outline.placed(m.place, m.heading_deg, point) for m in plan.moments]
-    short = float(np.ptp(np.vstack(plan.areas), axis=0).max()) < _SHORT * float(
+    short = not small and float(np.ptp(np.vstack(plan.areas), axis=0).max()) < _SHORT * float(
         np.ptp(outline.body, axis=0).max()
     )
-    width = _WIDTH - _LEFT - 8.0 - (_ENLARGED + 62.0 if short else 0.0)
+    width = whole - _LEFT - 8.0 - (_ENLARGED + 62.0 if short else 0.0)
     points = np.vstack([*plan.areas, *(c.body for c in cars), *_given(plan)])
     tail = np.empty((0, 2))
     for _ in range(3):
@@ -107,11 +113,11 @@ def path_plan(
     beside = None
     if short:
         heights = (view.height, max(view.height, 0.7 * _ENLARGED))
-        small = np.vstack([*plan.areas, *_given(plan)])
+        near = np.vstack([*plan.areas, *_given(plan)])
         left = _LEFT + width + 62.0
-        beside = PlanView.of(small, names, (left, _TOP), _ENLARGED, heights, 22.0)
+        beside = PlanView.of(near, names, (left, _TOP), _ENLARGED, heights, 22.0)
         view = replace(view, height=beside.height)
-    legend = _legend_rows(plan, reference_name)
+    legend = _legend_rows(plan, reference_name, whole)
     bottom = _TOP + view.height + _UNDER
     end = path.table[NED].iloc[-1]
     alt = (
@@ -119,7 +125,7 @@ def path_plan(
         f"{names[0]}, {signed(float(end['east']), 2)} m {names[1]} of its place at the entry"
     )
     speed = math.hypot(*path.entry.velocity[:2])
-    out = Drawing(_WIDTH, bottom + 17.0 * len(legend) + 4.0, alt)
+    out = Drawing(whole, bottom + 17.0 * len(legend) + 4.0, alt)
     view.draw_grid(out)
     _draw_band(out, view, plan)
     for k, (moment, car) in enumerate(zip(plan.moments, cars, strict=True)):
@@ -160,6 +166,8 @@ def path_plan(
         told = f"the path alone, {beside.scale / view.scale:.2g} times larger"
         out.text((beside.left + 5.0, _TOP + 9.0), told, SMALL, "#4a525c", halo=True)
     _draw_legend(out, legend, bottom + 8.0)
+    if small:
+        return Picture("path-front", out.svg(), "Path from above", _SMALL_CAPTION, alt, 92.0)
     return Picture("path", out.svg(), "Path from above", _caption(names, short), alt)
 
 
@@ -247,7 +255,9 @@ def _draw_path(out: Drawing, view: PlanView, plan: _Plan, faint: bool) -> None:
         out.circle(at, 2.6 if faint else 4.2, "#ffffff", 1.0, fill=moment.colour)
 
 
-def _legend_rows(plan: _Plan, reference_name: str) -> list[list[tuple[float, str, str, str]]]:
+def _legend_rows(
+    plan: _Plan, reference_name: str, width: float
+) -> list[list[tuple[float, str, str, str]]]:
     """Rows of entries: place from the left, kind, colour, words."""
     speed = math.hypot(*plan.path.entry.velocity[:2])
     told = (
@@ -267,7 +277,7 @@ def _legend_rows(plan: _Plan, reference_name: str) -> list[list[tuple[float, str
     x = _LEFT
     for kind, colour, words in entries:
         wide = 26.0 + text_width(words, 10.0) + 14.0
-        if rows[-1] and x + wide > _WIDTH:
+        if rows[-1] and x + wide > width:
             rows.append([])
             x = _LEFT
         rows[-1].append((x, kind, colour, words))

@@ -6,30 +6,23 @@ import math
 
 import numpy as np
 
-from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.pdof import NedPdof, Pdof
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.pdof import Pdof
+from strapdown.crash.pdof_interval import AngleInterval
 from strapdown.crash.velocity_change import VelocityChange
-from strapdown.report.crash_values import KMH, about, angle_range, instant, plain, speed
+from strapdown.report.crash_values import KMH, about, axis_names, instant, plain, recorder
 from strapdown.report.document import TableBlock
-from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.systems.case_severity import main_event
 from strapdown.systems.crash_case import CaseResult
 from strapdown.tables import NED
 
-__all__ = [
-    "answers_table",
-    "budget_table",
-    "comparison_table",
-    "direction_table",
-    "inputs_table",
-    "path_table",
-    "reference_table",
-    "sensors_table",
-    "severity_table",
-    "units_table",
-]
-
-DEG = math.degrees(1.0)
+__all__ = ["answers_table", "budget_table", "direction_table", "path_table"]
+ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
+AXES_WORDS = {
+    "north": "Axes: over ground.",
+    "forward": "Axes: forward and right as the vehicle stood at the entry; the heading counts from "
+    "there.",
+}
 
 
 def answers_table(result: CaseResult) -> TableBlock:
@@ -43,9 +36,9 @@ def answers_table(result: CaseResult) -> TableBlock:
                 strong.append(len(rows))
             rows.append(
                 (
-                    unit.name,
+                    recorder(unit, result),
                     f"{k + 1}, {kind.name}",
-                    f"{instant(event.time_zero)} to {instant(event.end)}",
+                    f"{plain(event.time_zero, 4)} to {plain(event.end, 4)}",
                     *(
                         about(KMH * v, KMH * h, "")
                         for v, h in zip(
@@ -61,7 +54,7 @@ def answers_table(result: CaseResult) -> TableBlock:
         (
             "recorder",
             "event",
-            "from, to",
+            "from, to, s",
             "forward, km/h",
             "right, km/h",
             "down, km/h",
@@ -77,39 +70,66 @@ def answers_table(result: CaseResult) -> TableBlock:
     )
 
 
-def _direction_cells(change: VelocityChange) -> tuple[str, str, str]:
-    angle = change.pdof
-    across = change.interval.horizontal
-    if isinstance(angle, NedPdof):
-        at = f"{plain(angle.azimuth_deg, 1)}°"
-    else:
-        at = f"{plain(angle.horizontal_deg, 1)}°"
-    if across.undetermined:
-        return "not determined", "all", "–"
-    return at, angle_range(across).removesuffix(" with 95 %"), f"{plain(angle.vertical_deg, 1)}°"
-
-
 def direction_table(result: CaseResult) -> TableBlock:
-    """Directions of force by window and axes."""
+    """Directions of force by window, along the axes of the vehicle and of the path."""
     rows: list[tuple[str, ...]] = []
+    ground = axis_names(result)[0] == "north"
     for unit in result.reconstruction.answers:
         for k, (body, ned) in enumerate(zip(unit.body, unit.ned, strict=True)):
-            pairs = [("vehicle", body.event), ("vehicle", body.peak)]
-            if ned is not None:
-                pairs += [("over ground", ned.event), ("over ground", ned.peak)]
-            for frame, change in pairs:
-                hour = "–"
-                if isinstance(change.pdof, Pdof) and not change.interval.horizontal.undetermined:
-                    hour = str(change.pdof.clock)
-                window = "event" if change.window == "event" else "largest window"
-                rows.append((unit.name, str(k + 1), window, frame, *_direction_cells(change), hour))
-    return TableBlock(
-        ("recorder", "event", "window", "axes", "horizontal", "95 %", "vertical", "clock"),
-        tuple(rows),
-        text=(0, 1, 2, 3, 5),
-        caption="Where the force came from. Horizontal: from the front of the vehicle clockwise "
-        "seen from above, or azimuth over ground; vertical: positive from above.",
+            for window in ("event", "peak"):
+                change: VelocityChange = getattr(body, window)
+                angle, across = change.pdof, change.interval.horizontal
+                assert isinstance(angle, Pdof)
+                known = not across.undetermined
+                path = ("–", "–")
+                if ned is not None:
+                    path = _over_ground(getattr(ned, window), ground)
+                rows.append(
+                    (
+                        recorder(unit, result),
+                        str(k + 1),
+                        "event" if window == "event" else "largest",
+                        f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
+                        _ends(across) if known else "all",
+                        str(angle.clock) if known else "–",
+                        f"{plain(angle.vertical_deg, 1)}°" if known else "–",
+                        *path,
+                    )
+                )
+    axes = "over ground, azimuth" if ground else "against the entry"
+    told = (
+        "the same over ground, from north"
+        if ground
+        else "the same in axes that do not turn with it, from where it pointed at the entry"
     )
+    ms = 1e3 * result.spec.options.peak_window_s
+    return TableBlock(
+        (
+            *("recorder", "event", "window", "horizontal", "95 %", "o'clock", "vertical"),
+            *(axes, "95 %"),
+        ),
+        tuple(rows),
+        text=(0, 1, 2),
+        caption="Where the force came from, over the event and over the "
+        f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle clockwise, "
+        f"seen from above; vertical: positive from above; {axes}: {told}.",
+    )
+
+
+def _over_ground(change: VelocityChange, azimuth: bool) -> tuple[str, str]:
+    """Direction and its interval: an azimuth, or an angle from the entry's heading."""
+    angle, across = change.pdof, change.interval.horizontal
+    if across.undetermined:
+        return "not determined", "all"
+    at = math.remainder(getattr(angle, "azimuth_deg", math.nan), 360.0)
+    at += 360.0 * (azimuth and at < 0.0)
+    shift = 360.0 * round((at - 0.5 * (across.low_deg + across.high_deg)) / 360.0)
+    return f"{plain(at, 1)}°", _ends(across, shift)
+
+
+def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
+    low, high = interval.low_deg + shift, interval.high_deg + shift
+    return f"{plain(low, 1)}° to {plain(high, 1)}°"
 
 
 def path_table(result: CaseResult) -> TableBlock:
@@ -119,7 +139,7 @@ def path_table(result: CaseResult) -> TableBlock:
         table, sd = unit.path.table.iloc[-1], unit.path.sd.iloc[-1]
         rows.append(
             (
-                unit.name,
+                recorder(unit, result),
                 instant(unit.path.time[-1]),
                 *(about(float(table[a]), TWO_SIDED_95 * float(sd[a]), "") for a in NED),
                 *(
@@ -129,11 +149,11 @@ def path_table(result: CaseResult) -> TableBlock:
             )
         )
     return TableBlock(
-        ("recorder", "at", "north, m", "east, m", "down, m", "roll, °", "pitch, °", "heading, °"),
+        ("recorder", "at", *(f"{name}, m" for name in axis_names(result)), *ANGLES),
         tuple(rows),
         text=(0,),
         caption="Place of the reference point from that at the entry, and attitude; bounds hold "
-        "95 %. Where no heading is stated, north is forward at the entry and east right of it.",
+        "95 %. " + AXES_WORDS[axis_names(result)[0]],
     )
 
 
@@ -164,13 +184,11 @@ def budget_table(result: CaseResult) -> TableBlock | None:
             "contributor",
             "delta-V forward, km/h",
             "delta-V right, km/h",
-            "north at the end, m",
-            "east at the end, m",
-            "down at the end, m",
+            *(f"{name} at the end, m" for name in axis_names(result)),
         ),
         (*lines, ("all together", *_sizes(np.sqrt(sums)))),
-        caption=f"{unit.name}: one standard deviation; their squares add up to that of the last "
-        "line. The 95 % bounds are 1.96 times it.",
+        caption=f"{recorder(unit, result)}: one standard deviation; their squares add "
+        "up to that of the last line. The 95 % bounds are 1.96 times it.",
         strong=(len(lines),),
     )
 
@@ -178,207 +196,3 @@ def budget_table(result: CaseResult) -> TableBlock | None:
 def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
     scaled = sizes * np.array([KMH, KMH, 1.0, 1.0, 1.0])
     return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
-
-
-def units_table(result: CaseResult) -> TableBlock:
-    """Where each recorder sits and how its clock is tied."""
-    rows = []
-    for unit, at in zip(result.units, result.reconstruction.synchronised.units, strict=True):
-        mounting = unit.mounting
-        rows.append(
-            (
-                unit.name,
-                " ".join(plain(v, 3) for v in mounting.position)
-                + f" ± {TWO_SIDED_95 * mounting.position_sd:.2g}",
-                " ".join(plain(v, 1) for v in mounting.angles_deg)
-                + f" ± {TWO_SIDED_95 * mounting.angles_sd_deg:.2g}",
-                "–" if unit.trigger is None else instant(unit.trigger),
-                f"{1e3 * TWO_SIDED_95 * at.time_sd:.2g}",
-                at.how,
-                unit.gyro_from or ("own" if unit.gyro is not None else "none: assumed"),
-            )
-        )
-    return TableBlock(
-        (
-            "recorder",
-            "forward right down, m",
-            "roll pitch heading, °",
-            "trigger on its clock",
-            "± ms",
-            "clock",
-            "gyro",
-        ),
-        tuple(rows),
-        text=(0, 1, 2, 5, 6),
-        caption="Mounting points from the vehicle's origin; angles turn vehicle axes into the "
-        "recorder's. Bounds hold 95 %.",
-    )
-
-
-def sensors_table(result: CaseResult) -> TableBlock:
-    """What is stated of each triad of sensors."""
-    rows = []
-    for spec, unit in zip(result.spec.units, result.units, strict=True):
-        for triad_spec, triad in zip(spec.accelerometers, unit.accelerometers, strict=True):
-            rows.append(_sensor(unit.name, triad_spec.sensor, triad, STANDARD_GRAVITY, "g"))
-        if spec.gyro is not None and unit.gyro is not None:
-            rows.append(_sensor(unit.name, spec.gyro.sensor, unit.gyro, 1.0 / DEG, "°/s"))
-    return TableBlock(
-        (
-            "recorder",
-            "triad",
-            "sensor",
-            "rate, Hz",
-            "range, ±",
-            "bias",
-            "scale, %",
-            "misalignment, mrad",
-            "noise of a sample",
-        ),
-        tuple(rows),
-        text=(0, 1, 2),
-        caption="Standard deviations as stated in the case or its sensors' data sheets, before a "
-        "rest has told more; the largest of the three axes.",
-    )
-
-
-def _sensor(
-    unit: str, sensor: str | None, triad: RecordedTriad, size: float, symbol: str
-) -> tuple[str, ...]:
-    stated = triad.uncertainty
-    step = float(np.median(np.diff(triad.table.index.to_numpy())))
-    full = max(stated.axis("full_scale"))
-    return (
-        unit,
-        triad.name,
-        "stated in the case" if sensor is None else sensor.replace("\\", "/").rsplit("/", 1)[-1],
-        f"{1.0 / step:.4g}",
-        "not stated" if math.isinf(full) else f"{full / size:.3g} {symbol}",
-        f"{max(stated.axis('bias')) / size:.2g} {symbol}",
-        f"{100.0 * max(stated.axis('scale')):.2g}",
-        f"{1e3 * max(stated.axis('misalignment')):.2g}",
-        f"{max(stated.axis('noise_density')) / math.sqrt(step) / size:.2g} {symbol}",
-    )
-
-
-def comparison_table(result: CaseResult) -> TableBlock | None:
-    """Return how pairs of recorders agree."""
-    comparison = result.reconstruction.comparison
-    if comparison is None:
-        return None
-    rows = []
-    for pair in comparison.pairs:
-        difference, sd = pair.difference[-1], pair.sd[-1]
-        rows.append(
-            (
-                f"{pair.first} less {pair.second}",
-                *(
-                    about(KMH * float(d), KMH * TWO_SIDED_95 * float(s), "")
-                    if math.isfinite(float(d))
-                    else "not measured"
-                    for d, s in zip(difference, sd, strict=True)
-                ),
-                f"{pair.chi_square / max(pair.freedom, 1):.2f}",
-                "below 0.0001" if pair.probability < 1e-4 else f"{pair.probability:.2g}",
-                "yes" if pair.agree else "NO",
-            )
-        )
-    start, end = float(comparison.edges[0]), float(comparison.edges[-1])
-    return TableBlock(
-        (
-            "recorders",
-            "forward, km/h",
-            "right, km/h",
-            "down, km/h",
-            "chi-square per degree of freedom",
-            "probability",
-            "agree",
-        ),
-        tuple(rows),
-        text=(0, 6),
-        caption="Difference of what two recorders say of the velocity at the "
-        f"{result.spec.point.name}, {instant(start)} to {instant(end)}, beside the 95 % bound of "
-        "such a difference. Probability: of differences as large or larger where everything that "
-        "is stated is right.",
-    )
-
-
-def severity_table(result: CaseResult) -> TableBlock | None:
-    """Return what models of injury risk say."""
-    if not result.severity:
-        return None
-    rows = []
-    for answer in result.severity:
-        risk = answer.risk
-        rows.append(
-            (
-                answer.model.outcome,
-                "–" if risk is None else f"{100.0 * risk.probability:.2g} %",
-                answer.because
-                if risk is None
-                else f"{100.0 * risk.low:.2g} to {100.0 * risk.high:.2g} %",
-                answer.model.source,
-            )
-        )
-    return TableBlock(
-        ("outcome", "probability", "by the bound of delta-V", "source"),
-        tuple(rows),
-        text=(0, 2, 3),
-        caption="Probability that an occupant is hurt at least so, by published models; the bound "
-        "is that of the delta-V alone and not of the model.",
-    )
-
-
-def reference_table(result: CaseResult) -> TableBlock | None:
-    """Return the answers beside what else is known."""
-    rows = []
-    for answer in result.references:
-        spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
-        if answer.path is not None:
-            found = answer.path
-            rows.append(
-                (
-                    spec.name,
-                    answer.unit,
-                    "path",
-                    " ".join(plain(v, 3) for v in found.rms) + " m RMS",
-                    " ".join(plain(v, 3) for v in found.largest) + " m largest",
-                    verdict,
-                )
-            )
-            continue
-        assert spec.delta_v_m_per_s is not None
-        half = TWO_SIDED_95 * answer.sd
-        other = TWO_SIDED_95 * spec.delta_v_sd_m_per_s
-        rows.append(
-            (
-                spec.name,
-                answer.unit,
-                f"delta-V {spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
-                speed(answer.delta_v, half),
-                speed(spec.delta_v_m_per_s, other),
-                verdict,
-            )
-        )
-    if not rows:
-        return None
-    return TableBlock(
-        ("reference", "recorder", "of", "this report, or its error", "reference", "within 95 %"),
-        tuple(rows),
-        text=(0, 1, 2, 3, 4, 5),
-        caption="Errors of a path: north, east, down, this report less the reference.",
-    )
-
-
-def inputs_table(result: CaseResult) -> TableBlock:
-    """Return the files that the report rests on."""
-    rows = []
-    for item in result.inputs:
-        for file, digest in zip(item.files, item.digests, strict=True):
-            rows.append((item.role, file.name, digest))
-    return TableBlock(
-        ("role", "file", "SHA-256"),
-        tuple(rows),
-        text=(0, 1, 2),
-        caption="Copies stand in the folder of the report under inputs/.",
-    )

@@ -15,6 +15,7 @@ from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.dsp.channel_class import LEAST_RATE, cfc_filter
 from strapdown.report.chart import Band, Chart, Fill, Line, Panel, curve
 from strapdown.report.crash_moments import crash_span, event_marks, unit_look
+from strapdown.report.crash_values import MEAN
 
 Array = NDArray[np.float64]
 
@@ -107,7 +108,7 @@ def accelerations_chart(
             values, filtered = cfc_filter(values, step, _CLASS), True
         inside = (time >= span[0]) & (time <= span[1])
         look = unit_look(number, len(units) == 1)
-        name = "mean of the units" if number is None else unit.name
+        name = MEAN if number is None else unit.name
         for k in range(3):
             made = curve(
                 name,

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 
-from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.pdof_interval import AngleInterval
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.systems.crash_case import CaseResult
 
 __all__ = [
+    "GAP",
     "KMH",
+    "MEAN",
     "about",
     "angle_range",
+    "axis_names",
     "instant",
+    "moment",
     "plain",
+    "recorder",
     "side_words",
     "speed",
     "speed_range",
@@ -20,8 +26,11 @@ __all__ = [
 
 #: m/s in km/h.
 KMH = 3.6
-G = STANDARD_GRAVITY
+#: Name of what is combined of all recorders, in every table and chart.
+MEAN = "mean of the recorders"
 MINUS = "\u2212"
+# Between a number, its bound and their unit: they stay in one line.
+GAP = "\u00a0"
 # A bound is told to this many digits, and its value to the same place.
 DIGITS = 2
 
@@ -66,10 +75,11 @@ def about(value: float, half: float, unit: str) -> str:
     Returns
     -------
     str
-        As ``7.34 ± 0.27 m/s``.
+        As ``7.34 ± 0.27 m/s``, with spaces at which no line breaks.
     """
     places = _places(half)
-    return f"{plain(value, places)} ± {plain(half, places)} {unit}".rstrip()
+    both = f"{plain(value, places)}{GAP}±{GAP}{plain(half, places)}"
+    return both + (unit if unit == "°" else GAP + unit if unit else "")
 
 
 def speed(value: float, half: float) -> str:
@@ -81,21 +91,33 @@ def speed_range(value: float, half: float) -> str:
     """Write the bound of a speed in m/s as a range, in km/h and m/s."""
     places = _places(KMH * half)
     low, high = KMH * (value - half), KMH * (value + half)
-    return (
-        f"{plain(low, places)} to {plain(high, places)} km/h with 95 %; {about(value, half, 'm/s')}"
-    )
+    ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
+    return f"{ends}; {about(value, half, 'm/s')}"
 
 
 def instant(time: float) -> str:
     """Write an instant or a length of time in s, to a tenth of a millisecond."""
-    return f"{plain(time, 4).rstrip('0').rstrip('.')} s"
+    text = plain(time, 4).rstrip("0").rstrip(".")
+    return f"{'0' if text == MINUS + '0' else text}{GAP}s"
 
 
 def angle_range(interval: AngleInterval) -> str:
     """Write the bound of a direction."""
     if interval.undetermined:
         return "not determined: no direction is excluded with 95 %"
-    return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95 %"
+    return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95{GAP}%"
+
+
+def moment(time: float) -> str:
+    """Say when an instant is: ``0.7 ms before the trigger``."""
+    if abs(time) < 5e-5:
+        return "the trigger"
+    return f"{plain(1e3 * abs(time), 1)}{GAP}ms {'before' if time < 0.0 else 'after'} the trigger"
+
+
+def recorder(unit: UnitReconstruction, result: CaseResult) -> str:
+    """Name whose answer it is: a recorder's, or the mean's."""
+    return MEAN if unit is result.reconstruction.combined else unit.name
 
 
 def side_words(forward: float, right: float) -> str:
@@ -107,3 +129,11 @@ def side_words(forward: float, right: float) -> str:
     if abs(right) > 2.5 * abs(forward):
         return aside
     return f"{ahead} and {aside}"
+
+
+def axis_names(result: CaseResult) -> tuple[str, str, str]:
+    """Return the names of the axes of the path: over ground where a heading is known."""
+    entry = result.spec.entry
+    if entry.kind == "gnss" or entry.heading_deg:
+        return ("north", "east", "down")
+    return ("forward", "right", "down")

@@ -13,7 +13,9 @@ from strapdown.report.crash_values import (
     KMH,
     about,
     angle_range,
+    axis_names,
     instant,
+    moment,
     plain,
     side_words,
     speed,
@@ -25,7 +27,6 @@ from strapdown.systems.crash_case import CaseResult
 from strapdown.tables import NED
 
 __all__ = [
-    "axis_names",
     "direction",
     "entry_words",
     "headline",
@@ -138,7 +139,7 @@ def lead(result: CaseResult) -> str:
         forward, right = float(whole.delta_v.vector[0]), float(whole.delta_v.vector[1])
         length = 1e3 * (event.end - event.time_zero)
         parts.append(
-            f"Within {length:.0f} ms from {instant(event.time_zero)} the velocity of the "
+            f"Within {length:.0f} ms from {moment(event.time_zero)} on, the velocity of the "
             f"{result.spec.point.name} changed by "
             f"{speed(whole.resultant, whole.resultant_bound)} ("
             f"{about(whole.resultant, whole.resultant_bound, 'm/s')}; all bounds hold 95 %), "
@@ -201,7 +202,7 @@ def units_words(result: CaseResult) -> str:
     told = "agree within what is stated of them" if made.comparison.agree else "DO NOT AGREE"
     mean = "the weighted mean of" if made.combined is not None else f"{made.main.name}, one of"
     return (
-        f"It is {mean} {len(names)} recorders ({', '.join(names)}), which {told} "
+        f"All this is {mean} {len(names)} recorders ({', '.join(names)}), which {told} "
         f"(probability {_probability(made.comparison.probability)} of differences as large or "
         "larger)."
     )
@@ -209,14 +210,6 @@ def units_words(result: CaseResult) -> str:
 
 def _probability(value: float) -> str:
     return "below 0.0001" if value < 1e-4 else f"{value:.2g}"
-
-
-def axis_names(result: CaseResult) -> tuple[str, str, str]:
-    """Return the names of the axes of the path: over ground where a heading is known."""
-    entry = result.spec.entry
-    if entry.kind == "gnss" or entry.heading_deg:
-        return ("north", "east", "down")
-    return ("forward", "right", "down")
 
 
 def _axes(result: CaseResult) -> str:

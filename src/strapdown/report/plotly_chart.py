@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 
 from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span, steady_range
+from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.plotly_areas import bar_labels, bar_traces, fill_traces, see_through
 from strapdown.report.plotly_numbers import numbers
 
 _GRID, _RED, _INK, _FAINT = "#e6e9ed", "#b42318", "#1b1f24", "#8a939e"
 FONT = {"family": "Inter, Segoe UI, Helvetica, Arial, sans-serif", "size": 13, "color": _INK}
 LOOK = {"font": FONT, "paper_bgcolor": "#ffffff", "plot_bgcolor": "#ffffff"}
+_LETTER = 0.008  # of the axis, a letter of a mark's name
 _ROW = 30  # pixels a category
 _UNDER_PLANE = 58  # pixels
 _SPACE = {False: 0.06, True: 0.09}  # between panels, above or beside each other
@@ -44,12 +46,16 @@ def figure(chart: Chart) -> dict[str, Any]:
         "shapes": [],
         "annotations": [],
     }
-    if any(panel.title for panel in chart.panels):
-        # The panels' titles stand where the legend would.
+    if chart.marks or any(panel.title for panel in chart.panels):
+        # The panels' titles or the names of marks stand where the legend would.
         layout["legend"] |= {"y": -60.0 / layout["height"] - 0.06, "yanchor": "top"}
     traces: list[dict[str, Any]] = []
     named: set[str] = set()
     domains = _domains(chart)
+    rows = 0
+    longest = max((len(v.label) for p in chart.panels for v in p.levels), default=0)
+    if 0 < longest <= LONGEST_BESIDE:
+        layout["margin"]["r"] = 14 + 6 * longest
     for number, panel in enumerate(chart.panels):
         suffix = _suffix(number)
         own = chart.beside or number < planes
@@ -65,10 +71,12 @@ def figure(chart: Chart) -> dict[str, Any]:
                 if not panel.categories:
                     layout[f"yaxis{suffix}"]["matches"] = "y"
             if not panel.x_label:
-                _mark(layout, chart, x_suffix, domain[1])
+                rows = _mark(layout, chart, x_suffix, domain[1])
+                layout["margin"]["t"] += max(0, 15 * (rows - 1))
         if panel.x_label:
             layout[f"yaxis{suffix}"] |= {"scaleanchor": f"x{x_suffix}", "scaleratio": 1}
-        _decorate(layout, panel, f"x{x_suffix}", f"y{suffix}", chart.log_x)
+        lifted = 6 + (15 * rows if number == planes else 0)
+        _decorate(layout, panel, f"x{x_suffix}", f"y{suffix}", chart.log_x, lifted)
         axes = (f"x{x_suffix}", f"y{suffix}")
         traces += fill_traces(panel, axes, named)
         traces += bar_traces(panel, axes, named)
@@ -178,20 +186,37 @@ def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:
     return axis
 
 
-def _mark(layout: dict[str, Any], chart: Chart, suffix: str, top: float) -> None:
-    """Draw what stands at one value, or between two, of a horizontal axis."""
+def _mark(layout: dict[str, Any], chart: Chart, suffix: str, top: float) -> int:
+    """Draw what stands at one value, or between two, of a horizontal axis; rows of its names."""
     axis = f"x{suffix}"
     for band in chart.bands:
         layout["shapes"].append(
             _upright("rect", axis, band.start, band.end, top)
             | {"fillcolor": "#0072B2", "opacity": 0.07, "line": {"width": 0}}
         )
-    for mark in chart.marks:
+    shares = _shares(chart)
+    rows = label_rows(shares, [mark.label for mark in chart.marks], _LETTER)
+    for mark, share, row in zip(chart.marks, shares, rows, strict=True):
         layout["shapes"].append(
             _upright("line", axis, mark.x, mark.x, top)
             | {"line": {"width": 1.4, "color": _RED, "dash": "dot"}}
         )
-        layout["annotations"].append(_mark_label(mark, axis, chart.log_x, top))
+        side = label_side(share, mark.label, _LETTER)
+        place = {"yshift": 1 + 15 * row, "xanchor": side}
+        layout["annotations"].append(_mark_label(mark, axis, chart.log_x, top) | place)
+    return 1 + max(rows, default=-1)
+
+
+def _shares(chart: Chart) -> list[float]:
+    """Where each mark lies on the horizontal axis, as a share of what is drawn."""
+    panels = [panel for panel in chart.panels if not panel.x_label]
+    drawn = [area.x for p in panels for area in (*p.lines, *p.fills) if area.x.size]
+    marks = np.array([mark.x for mark in chart.marks])
+    found = np.concatenate([*drawn, marks])
+    ends = np.array([np.nanmin(found), np.nanmax(found)]) if found.size else np.array([0.0, 1.0])
+    if chart.log_x:
+        marks, ends = np.log10(marks), np.log10(ends)
+    return ((marks - ends[0]) / max(float(ends[1] - ends[0]), 1e-12)).tolist()
 
 
 def _upright(kind: str, axis: str, x0: float, x1: float, top: float) -> dict[str, Any]:
@@ -206,16 +231,16 @@ def _mark_label(mark: Mark, axis: str, log: bool, top: float) -> dict[str, Any]:
         "xref": axis,
         "y": top,
         "yref": "paper",
-        "yanchor": "top",
-        "xanchor": "left",
+        "yanchor": "bottom",
         "showarrow": False,
         "text": html.escape(mark.label),
         "font": {"size": 11, "color": _RED},
-        "bgcolor": "rgba(255,255,255,0.8)",
     }
 
 
-def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool) -> None:
+def _decorate(
+    layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool, lifted: int
+) -> None:
     """Draw a panel's title and its levels."""
     if panel.title:
         layout["annotations"].append(
@@ -226,7 +251,7 @@ def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool)
                 "yref": f"{y} domain",
                 "xanchor": "left",
                 "yanchor": "bottom",
-                "yshift": 6,
+                "yshift": lifted,
                 "showarrow": False,
                 "text": f"<b>{html.escape(panel.title)}</b>",
             }
@@ -248,14 +273,15 @@ def _decorate(layout: dict[str, Any], panel: Panel, x: str, y: str, log_x: bool)
                 "layer": "below",
             }
         )
+        beside = len(level.label) <= LONGEST_BESIDE
         layout["annotations"].append(
             {
                 "x": 1,
                 "xref": f"{x} domain",
                 "y": math.log10(level.y) if panel.log else level.y,
                 "yref": y,
-                "xanchor": "right",
-                "yanchor": "bottom",
+                "xanchor": "left" if beside else "right",
+                "yanchor": "middle" if beside else "bottom",
                 "showarrow": False,
                 "text": html.escape(level.label),
                 "font": {"size": 11, "color": _RED},

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from strapdown.report.chart import Chart, Line, Panel, steady_range
+from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.svg_areas import draw_bars, draw_fills, fill_outline, set_ticks
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ _STYLE: Any = {
 _WIDTH, _PAPER_WIDTH = 9.0, 6.7  # inches
 _PAPER = {"font.size": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6}
 _DPI = 160
+_MARK = 7.0  # points, of the names of marks and levels
 _TITLE, _CAPTION = 90, 155  # characters a line
 
 
@@ -120,7 +122,7 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
                 return stream.getvalue()
 
     width = _PAPER_WIDTH if paper else _WIDTH
-    height = _height(chart) * (_PAPER_WIDTH / _WIDTH if paper else 1.0)
+    height = _paper_height(chart) if paper else _height(chart)
     figure = Picture(figsize=(width, height), layout=RoundedLayout())
     FigureCanvasAgg(figure)
     axes = _axes(chart, figure)
@@ -130,17 +132,8 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
         if not chart.panels[-1].x_label:
             axis.set_xlabel(chart.x_label)
     timed = [a for p, a in zip(chart.panels, axes, strict=True) if not p.x_label]
-    for mark in chart.marks if timed else ():
-        timed[0].annotate(
-            mark.label,
-            (mark.x, 1.0),
-            xycoords=("data", "axes fraction"),
-            color=_RED,
-            fontsize=7,
-            va="top",
-            rotation=90,
-            ha="right",
-        )
+    if timed:
+        _label_marks(chart, timed[0], width)
     if not paper:
         figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
     entries: dict[str, Any] = {}
@@ -194,6 +187,49 @@ def _height(chart: Chart) -> float:
     return 1.4 + 2.0 * sum(panel.height for panel in chart.panels) + (len(chart.panels) == 1)
 
 
+def _paper_height(chart: Chart) -> float:
+    """Of a chart in a column of print: two of three panels, with what is said, fill a page."""
+    rows = max(len(panel.categories) for panel in chart.panels)
+    if rows:
+        return 0.8 + 0.19 * rows
+    if chart.beside:
+        return 3.2
+    titles = 0.18 * sum(bool(panel.title) for panel in chart.panels)
+    alone = 0.6 * (len(chart.panels) == 1)
+    return 0.85 + 0.95 * sum(panel.height for panel in chart.panels) + titles + alone
+
+
+def _label_marks(chart: Chart, axis: Axes, width: float) -> None:
+    """Name the marks above the first axes, one above the other where they are close."""
+    from matplotlib.transforms import blended_transform_factory
+
+    if not chart.marks:
+        return
+    shares = axis.transLimits.transform(
+        axis.transScale.transform([(mark.x, 1.0) for mark in chart.marks])
+    )[:, 0]
+    letter = 0.56 * _MARK / (72.0 * 0.87 * width)
+    rows = label_rows(shares.tolist(), [mark.label for mark in chart.marks], letter)
+    across = blended_transform_factory(axis.transData, axis.transAxes)
+    for mark, share, row in zip(chart.marks, shares.tolist(), rows, strict=True):
+        axis.annotate(
+            mark.label,
+            (mark.x, 1.0),
+            xycoords=across,
+            xytext=(0, 2 + (_MARK + 1.5) * row),
+            textcoords="offset points",
+            color=_RED,
+            fontsize=_MARK,
+            va="bottom",
+            ha=label_side(share, mark.label, letter),
+            annotation_clip=False,
+        )
+    if title := axis.get_title(loc="left"):
+        # The panel's title gives way upward.
+        pad = 6.0 + (_MARK + 1.5) * (1 + max(rows))
+        axis.set_title(title, loc="left", fontsize=9, fontweight="bold", pad=pad)
+
+
 def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
     draw_fills(panel, axis)
     draw_bars(panel, axis)
@@ -213,15 +249,17 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
         axis.set_title(panel.title, loc="left", fontsize=9, fontweight="bold")
     for level in panel.levels:
         axis.axhline(level.y, color=_RED, ls="--", lw=1.2, zorder=1.5)
+        beside = len(level.label) <= LONGEST_BESIDE
         axis.annotate(
             level.label,
             (1.0, level.y),
             xycoords=("axes fraction", "data"),
-            xytext=(0, 2),
+            xytext=(3, 0) if beside else (0, 2),
             textcoords="offset points",
             color=_RED,
-            fontsize=7,
-            ha="right",
+            fontsize=_MARK,
+            ha="left" if beside else "right",
+            va="center" if beside else "baseline",
         )
     if (ends := steady_range(panel)) is not None:
         axis.set_ylim(*ends)

@@ -20,6 +20,7 @@ from strapdown.results import InputFiles
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.case_references import ReferenceAnswer, compare_reference
+from strapdown.systems.case_remedies import case_finding
 from strapdown.systems.case_severity import SeverityAnswer, case_severity
 from strapdown.systems.case_units import case_unit
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
@@ -139,7 +140,7 @@ def run_case(
         samples,
         case_severity(spec, made.main),
         references,
-        tuple(dict.fromkeys(findings)),
+        tuple(dict.fromkeys(map(case_finding, findings))),
     )
 
 

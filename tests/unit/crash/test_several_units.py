@@ -69,7 +69,7 @@ def four():
 def test_four_units_end_to_end(four):
     _, found = four
     assert [u.name for u in found.units] == ["LAB1", "LAB2", "IMU1", "IMU2"]
-    assert found.main.name == "weighted of LAB1, LAB2, IMU1, IMU2"
+    assert found.main.name == "weighted mean of LAB1, LAB2, IMU1, IMU2"
     for unit in (*found.units, found.combined):
         z = error(unit.path)[-1] / unit.path.sd[NED].iloc[-1].to_numpy()
         # Fifteen normal deviates: one beyond four has a chance of 1e-3.

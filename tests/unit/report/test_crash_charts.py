@@ -39,7 +39,7 @@ def test_the_curves_of_delta_v_end_at_the_answer():
     halves = [*change.bound.half_width, change.resultant_bound]
     end = 1e3 * change.delta_v.end
     for panel, value, half in zip(chart.panels, values, halves, strict=True):
-        curve = line(panel, "mean of the units")
+        curve = line(panel, "mean of the recorders")
         # Between samples the integral is drawn straight: an eighth of the step, 5 ms, times what
         # the acceleration changes over it, at most 4 m/s² at the end: 2.5 mm/s.
         assert np.interp(end, curve.x, curve.y) == pytest.approx(3.6 * value, abs=0.01)
@@ -157,7 +157,7 @@ def test_the_direction_by_window_goes_through_the_answer():
     found = crash_case().reconstruction
     chart = figures_of().pdof_by_window
     answer = found.main.types[0].direction.horizontal_deg
-    mean = line(chart.panels[0], "mean of the units")
+    mean = line(chart.panels[0], "mean of the recorders")
     assert np.interp(chart.marks[0].x, mean.x, mean.y) == pytest.approx(answer, abs=1e-6)
     bar = line(chart.panels[0], "bar")
     interval = found.main.body[0].event.interval.horizontal

@@ -1,0 +1,86 @@
+"""What was noticed in the records of a case, and what a record says of itself."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from strapdown.exceptions import Finding
+from strapdown.formats.crash_record import CrashRecord
+from strapdown.report.crash_values import MEAN
+from strapdown.systems.crash_case import CaseResult
+
+__all__ = ["notes", "record_facts"]
+
+# A number whose digits beyond the sixth tell nothing, as 15.858333333.
+LONG = re.compile(r"-?\d+\.\d{5,}")
+# Keys of a record that end with their unit.
+UNITS = {"_m_per_s": "m/s", "_kg": "kg", "_m": "m", "_deg": "deg"}
+
+
+def notes(findings: Sequence[Finding], result: CaseResult) -> tuple[tuple[str, str], ...]:
+    """Return findings as items, one for all files and recorders of which the same is said.
+
+    Parameters
+    ----------
+    findings : sequence of Finding
+    result : CaseResult
+        Whose mean of the recorders is called that.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Where, and what, with what can be done about it.
+    """
+    combined = result.reconstruction.combined
+    told: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        file = finding.file or ""
+        if combined is not None:
+            file = file.replace(combined.name, MEAN)
+        rest = [
+            None if finding.row is None else f"row {finding.row}",
+            None if finding.line is None else f"line {finding.line}",
+            finding.quantity,
+        ]
+        remedy = finding.remedy or ""
+        text = _sentence(finding.what) + (f" {_sentence(remedy)}" if remedy else "")
+        told.setdefault((", ".join(r for r in rest if r), text), []).append(file)
+    return tuple(
+        (": ".join(p for p in (", ".join(f for f in files if f), place) if p), text)
+        for (place, text), files in told.items()
+    )
+
+
+def _sentence(text: str) -> str:
+    found = text.strip()
+    return found[:1].upper() + found[1:] + ("" if found.endswith((".", "!", "?")) else ".")
+
+
+def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
+    """Return what a record says of the test, once, with units.
+
+    Parameters
+    ----------
+    record : CrashRecord
+
+    Returns
+    -------
+    tuple of (str, str)
+        Empty where it says nothing but the name of its file.
+    """
+    rows = []
+    if record.title and record.title != record.path.stem:
+        rows.append(("title", record.title))
+    for key, value in record.facts.items():
+        name, unit = str(key), ""
+        for ending, symbol in UNITS.items():
+            if name.endswith(ending):
+                name, unit = name.removesuffix(ending), f" {symbol}"
+                break
+        rows.append((name.replace("_", " "), LONG.sub(_short, str(value)) + unit))
+    return tuple(rows)
+
+
+def _short(found: re.Match[str]) -> str:
+    return f"{float(found.group()):.6g}"
