@@ -291,7 +291,9 @@ def names_file(key: str, value: Any) -> bool:
 
 
 def _files(root: Path) -> list[str]:
-    return sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file())
+    """Everything but folders; a link to one is no folder of the bundle."""
+    found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
+    return sorted(p.relative_to(root).as_posix() for p in found)
 
 
 def _move(staging: Path, out: Path) -> None:
@@ -377,6 +379,8 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
             path, refers = Path(item["name"]), item.get("kept") == "reference"
             if not isinstance(item["sha256"], str) or path.is_absolute() != refers:
                 raise ValueError
+            if not isinstance(item["bytes"], int):
+                raise ValueError
             if ".." in path.parts:
                 raise ValueError
         _refuse_unsealed_paths(manifest)
@@ -432,5 +436,7 @@ def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
             changes.append(f"{item['name']}: missing")
         elif sha256(path) != item["sha256"]:
             changes.append(f"{item['name']}: changed after it was sealed")
+        elif path.stat().st_size != item["bytes"]:
+            changes.append(f"{item['name']}: not of the {item['bytes']} bytes of the manifest")
     changes += [f"{name}: not in the manifest" for name in _files(bundle) if name not in expected]
     return changes
