@@ -29,6 +29,7 @@ __all__ = ["Seal", "read_manifest", "sha256", "unsealed_changes", "write_bundle"
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
 SCHEMA = "strapdown bundle 1"
+KEPT = ("copy", "reference")
 # Inputs up to this size together are copied into the bundle, which then stands on its own.
 COPY_LIMIT = 64 * 1024 * 1024  # bytes
 PACKAGES = (
@@ -379,7 +380,7 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
             path, refers = Path(item["name"]), item.get("kept") == "reference"
             if not isinstance(item["sha256"], str) or path.is_absolute() != refers:
                 raise ValueError
-            if not isinstance(item["bytes"], int):
+            if not isinstance(item["bytes"], int) or item.get("kept", "copy") not in KEPT:
                 raise ValueError
             if ".." in path.parts:
                 raise ValueError
@@ -407,8 +408,11 @@ def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
 
 
 def _paths(value: Any) -> Iterator[str]:
+    if isinstance(value, list):
+        for item in value:
+            yield from _paths(item)
     for key, item in value.items() if isinstance(value, dict) else ():
-        if key.endswith("path") and isinstance(item, str):
+        if names_file(key, item):
             yield item
         yield from _paths(item)
 

@@ -17,14 +17,14 @@ from strapdown.exceptions import DataError
 from strapdown.report.verify import verify
 
 
-class RunAgain(Exception):
+class RunAgainError(Exception):
     """Verify found nothing to name, and would run the case again."""
 
 
 @pytest.fixture
 def no_run(monkeypatch):
     def refuse(configuration, out, sealed):
-        raise RunAgain
+        raise RunAgainError
 
     monkeypatch.setitem(module.RERUNS, "crash", refuse)
 
@@ -57,7 +57,7 @@ def test_a_byte_flipped_anywhere_in_any_file_is_found_and_the_file_named(copy, n
             path.write_bytes(whole[:place] + bytes([whole[place] ^ 0x01]) + whole[place + 1 :])
             assert found(copy)[0] == f"{name}: changed after it was sealed", place
         path.write_bytes(whole)
-    with pytest.raises(RunAgain):
+    with pytest.raises(RunAgainError):
         verify(copy)
 
 
@@ -99,11 +99,29 @@ def test_files_that_are_added_removed_or_renamed_are_named(copy, no_run, tmp_pat
 
 
 OPTIONS = [
-    ("monte_carlo_runs = 2000", "monte_carlo_runs = 2001", "options, monte_carlo_runs", "2000", "2001"),
-    ('source = "simulated light gate"', 'source = "a guess"', "entry, source", "'simulated light gate'", "'a guess'"),
+    (
+        "monte_carlo_runs = 2000",
+        "monte_carlo_runs = 2001",
+        "options, monte_carlo_runs",
+        "2000",
+        "2001",
+    ),
+    (
+        'source = "simulated light gate"',
+        'source = "a guess"',
+        "entry, source",
+        "'simulated light gate'",
+        "'a guess'",
+    ),
     ("speed_m_per_s = 7.08", "speed_km_per_h = 36", "entry, speed_m_per_s", "7.08", "10.0"),
-    ("position_m = [0.6, 0.5, 0.2]", "position_m = [0.6, 0.5, 0.3]", "unit 'IMU2', position_m", "[0.6, 0.5, 0.2]", "[0.6, 0.5, 0.3]"),
-]  # fmt: skip
+    (
+        "position_m = [0.6, 0.5, 0.2]",
+        "position_m = [0.6, 0.5, 0.3]",
+        "unit 'IMU2', position_m",
+        "[0.6, 0.5, 0.2]",
+        "[0.6, 0.5, 0.3]",
+    ),
+]
 
 
 @pytest.mark.parametrize(("old", "new", "where", "before", "now"), OPTIONS)
@@ -175,7 +193,7 @@ def test_what_is_changed_in_the_manifest_is_refused_named_or_run_again(copy, no_
             assert verify(copy).verdict == "changed"
         except DataError as error:
             assert error.finding.file == "manifest.json"
-        except RunAgain:
+        except RunAgainError:
             silent.add(" ".join(str(k) for k in place if not isinstance(k, int)))
     (copy / "manifest.json").write_bytes(whole)
     assert {re.sub(r"^(versions|platform) .*", r"\1", name) for name in silent} == {
@@ -187,6 +205,21 @@ def test_what_is_changed_in_the_manifest_is_refused_named_or_run_again(copy, no_
         "versions",
         "platform",
     }
+
+
+@pytest.mark.parametrize("place", [("units", 0, "gyro", "path"), ("references", 0, "path")])
+@pytest.mark.parametrize("path", ["/etc/hostname", "../outside.csv", "trajectory.csv"])
+def test_a_case_that_reads_what_is_not_sealed_is_refused(copy, no_run, place, path):
+    change_manifest(copy, lambda m: put(m, ("configuration", "case", *place), path))
+    with pytest.raises(DataError, match="outside the seal"):
+        verify(copy)
+
+
+def test_a_sensor_outside_of_the_seal_is_refused(copy, no_run):
+    place = ("configuration", "case", "units", 0, "gyro", "sensor")
+    change_manifest(copy, lambda m: put(m, place, "/tmp/mine.toml"))
+    with pytest.raises(DataError, match="outside the seal"):
+        verify(copy)
 
 
 def test_whatever_is_changed_in_the_manifest_changes_the_printed_seal(copy, no_run, sealed_crash):
