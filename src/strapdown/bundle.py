@@ -29,6 +29,7 @@ __all__ = ["Seal", "read_manifest", "sha256", "unsealed_changes", "write_bundle"
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
 SCHEMA = "strapdown bundle 1"
+KEPT = ("copy", "reference")
 # Inputs up to this size together are copied into the bundle, which then stands on its own.
 COPY_LIMIT = 64 * 1024 * 1024  # bytes
 PACKAGES = (
@@ -291,7 +292,9 @@ def names_file(key: str, value: Any) -> bool:
 
 
 def _files(root: Path) -> list[str]:
-    return sorted(p.relative_to(root).as_posix() for p in root.rglob("*") if p.is_file())
+    """Everything but folders; a link to one is no folder of the bundle."""
+    found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
+    return sorted(p.relative_to(root).as_posix() for p in found)
 
 
 def _move(staging: Path, out: Path) -> None:
@@ -377,6 +380,8 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
             path, refers = Path(item["name"]), item.get("kept") == "reference"
             if not isinstance(item["sha256"], str) or path.is_absolute() != refers:
                 raise ValueError
+            if not isinstance(item["bytes"], int) or item.get("kept", "copy") not in KEPT:
+                raise ValueError
             if ".." in path.parts:
                 raise ValueError
         _refuse_unsealed_paths(manifest)
@@ -403,8 +408,11 @@ def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
 
 
 def _paths(value: Any) -> Iterator[str]:
+    if isinstance(value, list):
+        for item in value:
+            yield from _paths(item)
     for key, item in value.items() if isinstance(value, dict) else ():
-        if key.endswith("path") and isinstance(item, str):
+        if names_file(key, item):
             yield item
         yield from _paths(item)
 
@@ -432,5 +440,7 @@ def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
             changes.append(f"{item['name']}: missing")
         elif sha256(path) != item["sha256"]:
             changes.append(f"{item['name']}: changed after it was sealed")
+        elif path.stat().st_size != item["bytes"]:
+            changes.append(f"{item['name']}: not of the {item['bytes']} bytes of the manifest")
     changes += [f"{name}: not in the manifest" for name in _files(bundle) if name not in expected]
     return changes

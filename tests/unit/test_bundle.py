@@ -126,7 +126,8 @@ def test_numbers_that_differ_are_told_by_how_much(copy, shift, verdict):
     final["roll_deg"] += shift
     path.write_text(json.dumps(content))
     manifest = json.loads((copy / MANIFEST).read_text())
-    next(o for o in manifest["outputs"] if o["name"] == path.name)["sha256"] = sha256(path)
+    item = next(o for o in manifest["outputs"] if o["name"] == path.name)
+    item |= {"sha256": sha256(path), "bytes": path.stat().st_size}
     manifest["platform"]["cpu"] = "another"
     (copy / MANIFEST).write_text(json.dumps(manifest))
     found = verify(copy)
@@ -210,7 +211,8 @@ def reseal(folder, name, data, *, elsewhere=False):
     """Change a file and its digest in the manifest, as a forger would."""
     (folder / name).write_bytes(data)
     manifest = json.loads((folder / MANIFEST).read_text())
-    next(o for o in manifest["outputs"] if o["name"] == name)["sha256"] = sha256(folder / name)
+    item = next(o for o in manifest["outputs"] if o["name"] == name)
+    item |= {"sha256": sha256(folder / name), "bytes": (folder / name).stat().st_size}
     if elsewhere:
         manifest["platform"]["cpu"] = "another"
     (folder / MANIFEST).write_text(json.dumps(manifest))

@@ -21,6 +21,7 @@ from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
 from strapdown.systems.crash_case import CaseResult, run_case
+from strapdown.systems.one_thread import one_thread
 
 __all__ = ["file_name", "reconstruct_case", "rerun_crash", "write_crash"]
 
@@ -72,6 +73,7 @@ def rerun_crash(configuration: dict[str, Any], out: Path) -> Seal:
     return write_crash(run_case(spec, None if path is None else Path(path)), out, name=name)
 
 
+@one_thread()
 def write_crash(
     result: CaseResult,
     out: str | Path,

@@ -166,10 +166,13 @@ def _resolved(value: Any, root: Path) -> Any:
 
 
 def _compare(root: Path, again: Path, manifest: dict[str, Any], digest: str) -> Verification:
-    written = {item["name"] for item in read_manifest(again)["outputs"]}
+    now = read_manifest(again)
+    written = {item["name"] for item in now["outputs"]}
     sealed = {item["name"]: item["sha256"] for item in manifest["outputs"]}
     details = [f"{name}: not written any more" for name in sorted(sealed.keys() - written)]
     details += [f"{name}: written now, and not sealed" for name in sorted(written - sealed.keys())]
+    if _read(manifest) != _read(now):
+        details.append(f"{MANIFEST}: the inputs are not in the roles in which they are read")
     conditions = _other_conditions(manifest)
     changed, within = bool(details), 0.0
     for name in sorted(sealed.keys() & written):
@@ -195,6 +198,10 @@ def _compare(root: Path, again: Path, manifest: dict[str, Any], digest: str) -> 
         return Verification("identical", 0.0, digest, ())
     verdict = "changed" if changed else "numerically equal"
     return Verification(verdict, within, digest, (*details, *conditions))
+
+
+def _read(manifest: dict[str, Any]) -> list[tuple[str, str]]:
+    return sorted((str(item["role"]), str(item["sha256"])) for item in manifest["inputs"])
 
 
 def _difference(a: Path, b: Path) -> float | None:

@@ -24,6 +24,7 @@ from strapdown.systems.case_remedies import case_finding
 from strapdown.systems.case_severity import SeverityAnswer, case_severity
 from strapdown.systems.case_units import case_unit
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
+from strapdown.systems.one_thread import one_thread
 
 __all__ = ["CaseResult", "run_case", "whole_records"]
 
@@ -72,6 +73,7 @@ def _silent(stage: str, share: float) -> None:
     """Report progress to nobody."""
 
 
+@one_thread()
 def run_case(
     spec: CaseSpec, case_file: Path | None = None, progress: Progress = _silent
 ) -> CaseResult:

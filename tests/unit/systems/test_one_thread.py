@@ -1,0 +1,47 @@
+"""Sums of linear algebra that do not depend on the number of threads."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from strapdown.systems.one_thread import _controls, one_thread
+
+SUM = """
+import numpy as np
+from strapdown.systems.one_thread import one_thread
+random = np.random.default_rng(1)
+a = random.normal(size=(300, 300))
+b = a @ a.T + np.eye(300)
+free = np.linalg.solve(b, a).tobytes()
+with one_thread():
+    held = np.linalg.solve(b, a).tobytes()
+import hashlib
+print(hashlib.sha256(free).hexdigest(), hashlib.sha256(held).hexdigest())
+"""
+
+
+def test_the_number_of_threads_is_one_inside_and_as_before_outside():
+    controls = _controls()
+    if not controls:
+        pytest.skip("numpy rests on no OpenBLAS here")
+    for _, put in controls:
+        put(2)
+    before = [get() for get, _ in controls]
+    with pytest.raises(ZeroDivisionError), one_thread():
+        assert [get() for get, _ in controls] == [1] * len(controls)
+        _ = 1 / 0
+    assert [get() for get, _ in controls] == before
+
+
+def test_every_environment_gives_the_same_bytes(monkeypatch):
+    said = []
+    for count in ("1", "2"):
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", count)
+        done = subprocess.run(
+            [sys.executable, "-c", SUM], capture_output=True, text=True, check=True
+        )
+        said.append(done.stdout.split())
+    assert said[0][1] == said[1][1] == said[0][0]
