@@ -9,6 +9,7 @@ import numpy as np
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.report.crash_apart import apart, apart_figures, apart_headline
 from strapdown.report.crash_values import (
     KMH,
     about,
@@ -48,6 +49,8 @@ TYPES = {
 
 def headline(result: CaseResult) -> str:
     """Return the answer in one sentence."""
+    if apart(result):
+        return apart_headline(result)
     unit = result.reconstruction.main
     number = main_event(unit)
     if number is None:
@@ -78,8 +81,12 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     """Return the numbers of page one."""
     unit = result.reconstruction.main
     number = main_event(unit)
-    figures = []
-    if number is None:
+    figures: list[KeyFigure] = []
+    of = ""
+    if apart(result):
+        figures += apart_figures(result)
+        of = f" by {unit.name}"
+    elif number is None:
         figures.append(KeyFigure("Delta-V", "no event", headline(result)))
     else:
         changes = unit.body[number]
@@ -111,7 +118,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     place, half = _end(unit)
     figures.append(
         KeyFigure(
-            "Place at the end",
+            f"Place at the end{of}",
             f"{plain(math.hypot(place[0], place[1]), 2)} m",
             ", ".join(
                 f"{name} {about(p, h, 'm')}"
@@ -130,6 +137,8 @@ def lead(result: CaseResult) -> str:
     unit = result.reconstruction.main
     number = main_event(unit)
     parts = []
+    if apart(result):
+        parts.append(f"{apart_headline(result)} What follows is of {unit.name}.")
     if number is None:
         parts.append(headline(result))
     else:
