@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.report.crash_values import KMH, MEAN, about, instant, plain, speed
+from strapdown.report.crash_values import KMH, MEAN, about, axis_names, instant, plain, speed
 from strapdown.report.document import TableBlock
 from strapdown.systems.case_references import ReferenceAnswer
 from strapdown.systems.crash_case import CaseResult
@@ -123,7 +123,14 @@ def reference_table(result: CaseResult) -> TableBlock | None:
         ("reference", "recorder", "of", "this report, or its error", "reference", "within 95 %"),
         tuple(rows),
         text=(0, 1, 2, 3, 4, 5),
-        caption="Errors of a path: north, east, down, this report less the reference.",
+        caption="What else is known of the crash, beside the answers; bounds hold 95 %."
+        + (
+            " Errors of a path: "
+            + ", ".join(axis_names(result))
+            + ", this report less the reference."
+            if any(a.path is not None for a in result.references)
+            else ""
+        ),
     )
 
 

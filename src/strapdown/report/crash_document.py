@@ -74,8 +74,9 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
             "path",
             "Path",
             _blocks(
-                figures.motion,
                 tables.path_table(result),
+                figures.path,
+                figures.motion,
                 *_charts(figures.place, figures.velocity, figures.attitude),
             ),
         ),
@@ -179,11 +180,14 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
     comparison = result.reconstruction.comparison
     assert comparison is not None
-    words = notes([case_finding(f) for f in comparison.findings], result)
+    found = [case_finding(f) for f in comparison.findings]
+    words = notes(found, result, remedies=False)
+    remedies = dict.fromkeys(f.remedy for f in found if f.remedy)
     return _blocks(
         table,
         *_charts(figures.units, figures.accelerations),
         Items(words) if words else None,
+        Paragraph(f"What can be done: {'; '.join(remedies)}.") if remedies else None,
     )
 
 

@@ -158,28 +158,30 @@ def _about_the_crash(
     return Chart(
         f"signals-{number + 1}",
         f"{unit.name}: specific force about the crash",
-        "Specific force at the unit's own place, vehicle axes forward, right, down; 1 g = 9.80665 "
+        "Specific force at the recorder's own place, vehicle axes forward, right, down; 1 g = 9.80665 "
         "m/s². It is what an accelerometer feels: −1 g downward at rest. Thin: the ranges as "
         "recorded, at their own rate; strong: at the common stamps, merged, biases taken off. "
         "Triangles: a range at its end. Dashed levels: ends of ranges that were come near. "
-        "Shaded: the event.",
+        "Shaded: the event." + _told([axis for axis in _AXES if axis in assumed]),
         "time from the trigger, ms",
         tuple(
             Panel(
                 f"{axis}, g",
                 tuple(_once(rows[k])),
-                title=_told(assumed, axis),
                 levels=tuple(levels[k]),
                 height=0.9,
             )
             for k, axis in enumerate(_AXES)
+            if axis not in assumed
         ),
     )
 
 
-def _told(assumed: Sequence[str], axis: str) -> str:
-    """Title of a panel."""
-    return "" if not assumed else f"{axis}: assumed, not recorded" if axis in assumed else axis
+def _told(assumed: Sequence[str]) -> str:
+    """What is not drawn, for a caption."""
+    if not assumed:
+        return ""
+    return f" Not recorded but assumed, and not drawn: {', '.join(assumed)}."
 
 
 def _once(lines: list[Line]) -> list[Line]:
@@ -262,8 +264,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"overview-{number + 1}",
         f"{unit.name}: the whole record",
         "Merged specific force (−1 g downward at rest) and rates along and about the vehicle's "
-        f"axes. Shaded: the event; {said}."
-        + (f" Not recorded but assumed, and not drawn: {', '.join(assumed)}." if assumed else ""),
+        f"axes. Shaded: the event; {said}." + _told(assumed),
         "time from the trigger, s",
         tuple(panels),
         marks=marks_apart(
