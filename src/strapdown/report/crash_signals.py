@@ -158,10 +158,7 @@ def _about_the_crash(
     return Chart(
         f"signals-{number + 1}",
         f"{unit.name}: specific force about the crash",
-        "Specific force at the recorder's own place, vehicle axes forward, right, down; 1 g = 9.80665 "
-        "m/s². It is what an accelerometer feels: −1 g downward at rest. Thin: the ranges as "
-        "recorded, at their own rate; strong: at the common stamps, merged, biases taken off. "
-        "Triangles: a range at its end. Dashed levels: ends of ranges that were come near. "
+        "Specific force at the recorder's own place. Thin: as recorded; strong: as it was used. "
         "Shaded: the event." + _told([axis for axis in _AXES if axis in assumed]),
         "time from the trigger, ms",
         tuple(

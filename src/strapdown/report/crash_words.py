@@ -10,6 +10,7 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.report.crash_values import (
+    GAP,
     KMH,
     about,
     angle_range,
@@ -114,10 +115,10 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
             "Place at the end",
             f"{plain(math.hypot(place[0], place[1]), 2)} m",
             ", ".join(
-                f"{name} {about(p, h, 'm')}"
+                f"{name}{GAP}{about(p, h, 'm')}"
                 for name, p, h in zip(axis_names(result), place, half, strict=True)
             )
-            + " with 95 %",
+            + f" with 95{GAP}%",
             f"from the place at {instant(unit.path.entry.time)} to that at "
             f"{instant(unit.path.time[-1])}, {_axes(result)}",
         )

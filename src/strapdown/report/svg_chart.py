@@ -142,7 +142,7 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
             entries.setdefault(label, handle)
     if entries or caption:
         widest = max(map(len, entries), default=0)
-        columns = max(1, min(6, (80 if paper else 110) // (widest + 6)))
+        columns = max(1, min(6, (96 if paper else 110) // (widest + 7)))
         if paper:
             # Panels do not give way to a long legend.
             more = 0.15 * (-(-len(entries) // columns) - 1)
