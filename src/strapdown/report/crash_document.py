@@ -146,7 +146,7 @@ def _charts(*found: Chart | None) -> tuple[ChartBlock, ...]:
 
 def _signals(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
     charts = _charts(
-        *(c for unit in figures.signals for c in (unit.crash, unit.rates, unit.overview))
+        *(c for unit in figures.signals for c in (unit.overview, unit.crash, unit.rates))
     )
     return (Paragraph(SIGNALS), *charts)
 

@@ -75,8 +75,8 @@ def risk_chart(
         "severity",
         "Risk of injury against the change of velocity",
         "Published logistic models, each drawn within the range that it is valid in; marked: this "
-        "crash with the 95 % bound of its change of velocity and what that makes of the risk. The bound "
-        "has nothing of the model's own uncertainty.",
+        "crash with the 95 % bound of its change of velocity and what that makes of the risk. The "
+        "bound has nothing of the model's own uncertainty.",
         "change of velocity (resultant of the main event), km/h",
         (Panel("probability, %", tuple(lines)),),
     )

@@ -67,8 +67,8 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
         "Recorders against each other",
         "Change of velocity at the reference point by each recorder less that of their best "
         "weighted mean, vehicle axes, since the first instant shown. Dotted, in its colour: what "
-        "holds 95 % of such a difference, as stated of the recorders; what a recorder shares with the "
-        "mean is taken into account. "
+        "holds 95 % of such a difference, as stated of the recorders; what a recorder shares with "
+        "the mean is taken into account. "
         f"Together they {said} their bounds (chi-square {comparison.chi_square:.4g} of "
         f"{comparison.freedom} degrees of freedom, probability {comparison.probability:.2g}).",
         _X,
