@@ -98,8 +98,7 @@ def path_animation(
         f"The vehicle on its path, seen in space; {names[0]}, {names[1]} and down in m from the "
         "reference point's place at the entry, to one scale on all axes. Orange: the front. Its "
         "length and width are the vehicle's, its height is for the eye alone; the ground is drawn "
-        f"half a metre below the vehicle's origin at the entry. Played {slower:.2g} times slower "
-        "than it was; drag to look from elsewhere."
+        "half a metre below the vehicle's origin at the entry."
     )
     stills = crash_stills(path, body, events=events, point=point, ground=ground)
     layout = _layout((low, high), names, [str(f["name"]) for f in frames])
@@ -109,6 +108,7 @@ def path_animation(
         caption,
         {"data": [*still, *first], "layout": layout, "frames": frames},
         stills,
+        f"Played {slower:.2g} times slower than it was; drag to look from elsewhere.",
     )
 
 

@@ -106,9 +106,12 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
                 "from the impact on.",
             )
         )
+    reasons: dict[str, list[str]] = {}
     for unit in spec.units:
         if unit.assumed is not None and unit.assumed.because:
-            found.append((unit.name, f"Assumed because: {unit.assumed.because}"))
+            reasons.setdefault(unit.assumed.because, []).append(unit.name)
+    for because, names in reasons.items():
+        found.append((", ".join(names), f"What was not measured is assumed because: {because}"))
     return tuple(found)
 
 

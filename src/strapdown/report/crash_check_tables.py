@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.report.crash_values import KMH, MEAN, about, instant, plain, speed
+from strapdown.report.crash_values import KMH, MEAN, about, axis_names, instant, plain, speed
 from strapdown.report.document import TableBlock
 from strapdown.systems.case_references import ReferenceAnswer
 from strapdown.systems.crash_case import CaseResult
 
-__all__ = ["comparison_table", "reference_table", "severity_table"]
+__all__ = ["comparison_table", "reference_tables", "severity_table"]
 
 
 def comparison_table(result: CaseResult) -> TableBlock | None:
@@ -86,45 +86,48 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     )
 
 
-def reference_table(result: CaseResult) -> TableBlock | None:
-    """Return the answers beside what else is known."""
-    rows = []
+def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
+    """Return the answers beside what else is known: changes of velocity, and paths."""
+    changes: list[tuple[str, ...]] = []
+    paths: list[tuple[str, ...]] = []
     for answer in result.references:
         spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
+        who = (spec.name, _name(answer, result))
         if answer.path is not None:
-            found = answer.path
-            rows.append(
-                (
-                    spec.name,
-                    _name(answer, result),
-                    "path",
-                    " ".join(plain(v, 3) for v in found.rms) + " m RMS",
-                    " ".join(plain(v, 3) for v in found.largest) + " m largest",
-                    verdict,
-                )
-            )
+            errors = (*answer.path.rms, *answer.path.largest)
+            paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
             continue
         assert spec.delta_v_m_per_s is not None
-        half = TWO_SIDED_95 * answer.sd
-        other = TWO_SIDED_95 * spec.delta_v_sd_m_per_s
-        rows.append(
+        changes.append(
             (
-                spec.name,
-                _name(answer, result),
-                f"delta-V {spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
-                speed(answer.delta_v, half),
-                speed(spec.delta_v_m_per_s, other),
+                *who,
+                f"{spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
+                speed(answer.delta_v, TWO_SIDED_95 * answer.sd),
+                speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s),
                 verdict,
             )
         )
-    if not rows:
-        return None
-    return TableBlock(
-        ("reference", "recorder", "of", "this report, or its error", "reference", "within 95 %"),
-        tuple(rows),
-        text=(0, 1, 2, 3, 4, 5),
-        caption="Errors of a path: north, east, down, this report less the reference.",
+    names = axis_names(result)
+    tables = (
+        TableBlock(
+            ("reference", "recorder", "delta-V", "this report", "reference", "within 95 %"),
+            tuple(changes),
+            text=(0, 1, 2, 5),
+            caption="Changes of velocity beside those that are known otherwise; bounds hold 95 %.",
+        ),
+        TableBlock(
+            (
+                *("reference", "recorder"),
+                *(f"{name}, RMS" for name in names),
+                *(f"{name}, largest" for name in names),
+                "within 95 %",
+            ),
+            tuple(paths),
+            text=(0, 1, 8),
+            caption="Errors of the path, m: this report less the reference.",
+        ),
     )
+    return tuple(table for table in tables if table.rows)
 
 
 def _name(answer: ReferenceAnswer, result: CaseResult) -> str:

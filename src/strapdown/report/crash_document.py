@@ -30,6 +30,14 @@ from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["crash_document", "drawings"]
 
+SIGNALS = (
+    "Specific force is what an accelerometer feels: −1 g downward at rest, 1 g = 9.80665 m/s². It "
+    "is drawn along the axes of the vehicle (forward, right, down), and rates about them; as "
+    "recorded, each range at its own rate, and as used: at the stamps that all recorders share, "
+    "ranges merged, biases taken off. Triangles mark a range at its end, dashed levels the ends of "
+    "ranges that were come near."
+)
+
 
 def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Document:
     """Return the report of a case.
@@ -74,8 +82,9 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
             "path",
             "Path",
             _blocks(
-                figures.motion,
                 tables.path_table(result),
+                figures.path,
+                figures.motion,
                 *_charts(figures.place, figures.velocity, figures.attitude),
             ),
         ),
@@ -136,9 +145,10 @@ def _charts(*found: Chart | None) -> tuple[ChartBlock, ...]:
 
 
 def _signals(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    return _charts(
-        *(c for unit in figures.signals for c in (unit.crash, unit.rates, unit.overview))
+    charts = _charts(
+        *(c for unit in figures.signals for c in (unit.overview, unit.crash, unit.rates))
     )
+    return (Paragraph(SIGNALS), *charts)
 
 
 def _place(position: tuple[float, float, float]) -> str:
@@ -179,11 +189,14 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
     comparison = result.reconstruction.comparison
     assert comparison is not None
-    words = notes([case_finding(f) for f in comparison.findings], result)
+    found = [case_finding(f) for f in comparison.findings]
+    words = notes(found, result, remedies=False)
+    remedies = dict.fromkeys(f.remedy for f in found if f.remedy)
     return _blocks(
         table,
         *_charts(figures.units, figures.accelerations),
         Items(words) if words else None,
+        Paragraph(f"What can be done: {'; '.join(remedies)}.") if remedies else None,
     )
 
 
@@ -196,11 +209,11 @@ def _severity(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
 
 
 def _references(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
-    table = checks.reference_table(result)
-    if table is None:
+    tables = checks.reference_tables(result)
+    if not tables:
         return (Paragraph("No reference was given."),)
     sources = tuple((r.name, r.source) for r in result.spec.references if r.source)
-    return _blocks(table, *_charts(*figures.references), Facts(sources) if sources else None)
+    return _blocks(*tables, *_charts(*figures.references), Facts(sources) if sources else None)
 
 
 def _limitations(result: CaseResult) -> tuple[Block, ...]:

@@ -6,20 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.report.crash_values import about, instant, plain
-from strapdown.sensors.prepared_unit import PreparedUnit
+from strapdown.report.crash_sensor_limits import assumed, borrowed, clipping, rest, ringing
+from strapdown.report.crash_values import instant, plain
 from strapdown.systems.case_severity import main_event
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["limitations"]
-
-# A rest that is shorter leaves biases that a longer one would have told.
-SHORT_REST = 2.0  # s
-# Below this rate a structure that rings is not integrated: a quarter of the rate is the fastest.
-RINGS = 1000.0  # Hz
-AXES = ("forward", "right", "down")
 
 
 def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
@@ -36,14 +28,14 @@ def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """
     return (
         *_event(result),
-        *_clipping(result),
+        *clipping(result),
         *_disagreement(result),
         *_contradicted(result),
-        *_assumed(result),
-        *_rest(result),
-        *_borrowed(result),
+        *assumed(result),
+        *rest(result),
+        *borrowed(result),
         *_alone(result),
-        *_ringing(result),
+        *ringing(result),
         *_levers(result),
         *_entry(result),
         *_no_reference(result),
@@ -112,148 +104,12 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str]]:
     )
 
 
-def _prepared(result: CaseResult) -> Iterator[tuple[UnitReconstruction, PreparedUnit]]:
-    for unit in result.reconstruction.units:
-        if unit.at_point.prepared is not None:
-            yield unit, unit.at_point.prepared
-
-
-def _clipping(result: CaseResult) -> Iterator[tuple[str, str]]:
-    for unit, prepared in _prepared(result):
-        time = unit.at_point.time
-        for what, clipped in (
-            ("accelerometer", prepared.clipped),
-            ("gyro", prepared.gyro_clipped),
-        ):
-            axes = [k for k in range(3) if clipped[:, k].any()]
-            if not axes:
-                continue
-            rows = np.flatnonzero(clipped.any(axis=1))
-            names = ", ".join("xyz"[k] for k in axes)
-            yield (
-                f"{unit.name}: the {what} was at the end of its range",
-                f"Axis {names}, {len(rows)} samples between {instant(time[rows[0]])} and "
-                f"{instant(time[rows[-1]])}, with no wider range behind it. What was cut off is "
-                "missing, and no bound here knows how much: "
-                + (
-                    "the true delta-V along that axis is larger than what is told here, and every "
-                    "place after it is off by what is missing."
-                    if what == "accelerometer"
-                    else "the attitude after it, and what is resolved with it, is not to be "
-                    "relied on."
-                ),
-            )
-
-
-def _assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
-    """What was not measured, said once of all recorders of which the same is true."""
-    told: dict[str, list[str]] = {}
-    for spec in result.spec.units:
-        given, parts = spec.assumed, []
-        if given is None:
-            continue
-        span = f"between {instant(given.over_s[0])} and {instant(given.over_s[1])}"
-        if given.turn_sd_deg is not None:
-            parts.append(
-                "There is no gyro: the vehicle is taken not to have turned, with a standard "
-                f"deviation of {_each(given.turn_sd_deg, '°', 'roll, pitch and heading')} {span}."
-            )
-        if given.delta_v_sd_m_per_s is not None:
-            missing = [
-                name
-                for name, column in zip(AXES, ("x", "y", "z"), strict=True)
-                if all(column not in t.channels for t in spec.accelerometers)
-            ]
-            parts.append(
-                f"There is no accelerometer along {' and '.join(missing) or 'an axis'}: nothing is "
-                "taken to have changed there, with a standard deviation of "
-                f"{_each(given.delta_v_sd_m_per_s, ' m/s', 'x, y and z')} {span}."
-            )
-        parts.append("The bounds have it; they are wrong where the assumption is.")
-        if given.because:
-            parts.append(f"Reason stated: {given.because.rstrip('.')}.")
-        told.setdefault(" ".join(parts), []).append(spec.name)
-    for text, names in told.items():
-        yield f"{', '.join(names)}: not everything was measured", text
-
-
-def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
-    """One standard deviation for all axes, or one for each."""
-    if isinstance(sd, float):
-        return f"{sd:g}{unit}"
-    return f"{sd[0]:g}, {sd[1]:g} and {sd[2]:g}{unit} ({names})"
-
-
-def _rest(result: CaseResult) -> Iterator[tuple[str, str]]:
-    told: dict[tuple[str, str], list[str]] = {}
-    for unit, prepared in _prepared(result):
-        rest, level = prepared.rest, prepared.levelling
-        if rest is None:
-            half = TWO_SIDED_95 * level.sd_deg
-            said = (
-                "no stationary stretch before the crash",
-                f"Roll and pitch are stated, {about(level.roll_deg, half, '°')} and "
-                f"{about(level.pitch_deg, half, '°')}, or carried over from another recorder; "
-                "biases are as stated of the sensors.",
-            )
-        elif rest.grade == "steady":
-            said = (
-                "quiet before the crash, but perhaps at speed",
-                f"The stretch from {instant(rest.start)} to {instant(rest.end)} may have been "
-                "driven; acceleration and turning over it are taken as zero with a bound.",
-            )
-        elif rest.end - rest.start < SHORT_REST:
-            said = (
-                "a short stationary stretch",
-                f"{instant(rest.end - rest.start)} before the crash, from {instant(rest.start)}: "
-                "biases and levelling are known the less the shorter it is, and the bounds are so "
-                "much wider.",
-            )
-        else:
-            continue
-        told.setdefault(said, []).append(unit.name)
-    for (head, text), names in told.items():
-        yield f"{', '.join(names)}: {head}", text
-
-
-def _borrowed(result: CaseResult) -> Iterator[tuple[str, str]]:
-    told: dict[str, list[str]] = {}
-    for unit in result.units:
-        if unit.gyro is None and unit.gyro_from is not None:
-            told.setdefault(unit.gyro_from, []).append(unit.name)
-    for lender, names in told.items():
-        yield (
-            f"{', '.join(names)}: no gyro",
-            f"The turning is that of {lender}: a rigid vehicle turns everywhere alike. An error of "
-            "that gyro is in all of them, and the comparison of recorders does not show it.",
-        )
-
-
 def _alone(result: CaseResult) -> Iterator[tuple[str, str]]:
     if len(result.units) == 1:
         yield (
             "One recorder alone",
             "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
             "point or a loose bracket, would not show.",
-        )
-
-
-def _ringing(result: CaseResult) -> Iterator[tuple[str, str]]:
-    slow = []
-    for unit in result.units:
-        stamps = unit.accelerometers[-1].table.index.to_numpy()
-        rate = 1.0 / float(np.median(np.diff(stamps)))
-        means = unit.accelerometers[-1].table.attrs.get("sampling") == "mean"
-        if rate < RINGS and not means:
-            slow.append((unit.name, rate))
-    if slow:
-        which = ", ".join(f"{name} ({rate:.4g} Hz)" for name, rate in slow)
-        yield (
-            "Ringing of the structure is not seen at this rate",
-            f"{which}: what swings faster than a quarter of the rate cannot be integrated from "
-            "samples. Ringing of 10 g at 195 Hz that decays in 30 ms moves the path by 1 m within "
-            "750 ms at 200 Hz, and is not in the bounds. Another recorder at 1 kHz or more that "
-            "agrees excludes it.",
         )
 
 

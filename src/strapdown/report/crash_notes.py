@@ -14,11 +14,14 @@ __all__ = ["notes", "record_facts"]
 
 # A number whose digits beyond the sixth tell nothing, as 15.858333333.
 LONG = re.compile(r"-?\d+\.\d{5,}")
+NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 # Keys of a record that end with their unit.
 UNITS = {"_m_per_s": "m/s", "_kg": "kg", "_m": "m", "_deg": "deg"}
 
 
-def notes(findings: Sequence[Finding], result: CaseResult) -> tuple[tuple[str, str], ...]:
+def notes(
+    findings: Sequence[Finding], result: CaseResult, *, remedies: bool = True
+) -> tuple[tuple[str, str], ...]:
     """Return findings as items, one for all files and recorders of which the same is said.
 
     Parameters
@@ -26,6 +29,8 @@ def notes(findings: Sequence[Finding], result: CaseResult) -> tuple[tuple[str, s
     findings : sequence of Finding
     result : CaseResult
         Whose mean of the recorders is called that.
+    remedies : bool
+        Whether each says what can be done about it.
 
     Returns
     -------
@@ -33,7 +38,7 @@ def notes(findings: Sequence[Finding], result: CaseResult) -> tuple[tuple[str, s
         Where, and what, with what can be done about it.
     """
     combined = result.reconstruction.combined
-    told: dict[tuple[str, str], list[str]] = {}
+    told: dict[tuple[str, str], tuple[str, list[str]]] = {}
     for finding in findings:
         file = finding.file or ""
         if combined is not None:
@@ -43,13 +48,24 @@ def notes(findings: Sequence[Finding], result: CaseResult) -> tuple[tuple[str, s
             None if finding.line is None else f"line {finding.line}",
             finding.quantity,
         ]
-        remedy = finding.remedy or ""
+        remedy = finding.remedy or "" if remedies else ""
         text = _sentence(finding.what) + (f" {_sentence(remedy)}" if remedy else "")
-        told.setdefault((", ".join(r for r in rest if r), text), []).append(file)
+        place = ", ".join(r for r in rest if r)
+        # What differs in its numbers alone is said once, with those of the mean if it has them.
+        key = place, NUMBER.sub("#", text)
+        _, files = told.get(key, ("", []))
+        told[key] = text, [*files, file]
     return tuple(
-        (": ".join(p for p in (", ".join(f for f in files if f), place) if p), text)
-        for (place, text), files in told.items()
+        (": ".join(p for p in (_places(files), place) if p), text)
+        for (place, _), (text, files) in told.items()
     )
+
+
+def _places(files: Sequence[str]) -> str:
+    named = list(dict.fromkeys(f for f in files if f))
+    if len(named) > 1 and named[-1] == MEAN:
+        return f"{MEAN}, and each by itself"
+    return ", ".join(named)
 
 
 def _sentence(text: str) -> str:

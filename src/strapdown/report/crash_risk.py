@@ -66,6 +66,7 @@ def risk_chart(
                 symbol=style["symbol"],
                 low=np.array([_KMH * max(delta_v - reach, 0.0)]),
                 high=np.array([_KMH * (delta_v + reach)]),
+                legend=False,
             )
         )
     if not lines:
@@ -73,9 +74,9 @@ def risk_chart(
     return Chart(
         "severity",
         "Risk of injury against the change of velocity",
-        "Published logistic models, each drawn within the range that it is valid in; this crash "
-        "with the 95 % bound of its change of velocity and what that makes of the risk. The bound "
-        "has nothing of the model's own uncertainty.",
+        "Published logistic models, each drawn within the range that it is valid in; marked: this "
+        "crash with the 95 % bound of its change of velocity and what that makes of the risk. The "
+        "bound has nothing of the model's own uncertainty.",
         "change of velocity (resultant of the main event), km/h",
         (Panel("probability, %", tuple(lines)),),
     )

@@ -158,11 +158,8 @@ def _about_the_crash(
     return Chart(
         f"signals-{number + 1}",
         f"{unit.name}: specific force about the crash",
-        "Specific force at the unit's own place, vehicle axes forward, right, down; 1 g = 9.80665 "
-        "m/s². It is what an accelerometer feels: −1 g downward at rest. Thin: the ranges as "
-        "recorded, at their own rate; strong: at the common stamps, merged, biases taken off. "
-        "Triangles: a range at its end. Dashed levels: ends of ranges that were come near. "
-        f"Shaded: the event.{_not_drawn([a for a in assumed if a in _AXES])}",
+        "Specific force at the recorder's own place. Thin: as recorded; strong: as it was used. "
+        "Shaded: the event." + _told([axis for axis in _AXES if axis in assumed]),
         "time from the trigger, ms",
         tuple(
             Panel(
@@ -177,8 +174,8 @@ def _about_the_crash(
     )
 
 
-def _not_drawn(assumed: Sequence[str]) -> str:
-    """A sentence of the caption."""
+def _told(assumed: Sequence[str]) -> str:
+    """What is not drawn, for a caption."""
     if not assumed:
         return ""
     return f" Not recorded but assumed, and not drawn: {', '.join(assumed)}."
@@ -225,7 +222,6 @@ def _rates(
         tuple(
             Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
             for k, turn in enumerate(_TURNS)
-            if {"yaw": "heading"}.get(turn, turn) not in assumed_axes(unit)
         ),
     )
 
@@ -265,8 +261,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
         f"overview-{number + 1}",
         f"{unit.name}: the whole record",
         "Merged specific force (−1 g downward at rest) and rates along and about the vehicle's "
-        f"axes. Shaded: the event; {said}."
-        f"{_not_drawn(assumed)}",
+        f"axes. Shaded: the event; {said}." + _told(assumed),
         "time from the trigger, s",
         tuple(panels),
         marks=marks_apart(

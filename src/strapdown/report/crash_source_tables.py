@@ -83,7 +83,7 @@ def units_table(result: CaseResult) -> TableBlock:
         (
             "recorder",
             "forward right down, m",
-            "roll pitch heading, °",
+            "roll pitch heading, deg",
             "trigger on its clock",
             "± ms",
             "clock",

@@ -12,6 +12,7 @@ from strapdown.crash.pdof_interval import AngleInterval
 from strapdown.crash.velocity_change import VelocityChange
 from strapdown.report.crash_values import KMH, about, axis_names, instant, plain, recorder
 from strapdown.report.document import TableBlock
+from strapdown.rotation import within_half_turn
 from strapdown.systems.case_severity import main_event
 from strapdown.systems.crash_case import CaseResult
 from strapdown.tables import NED
@@ -136,7 +137,10 @@ def path_table(result: CaseResult) -> TableBlock:
     """Places at the end of the path, by every recorder."""
     rows = []
     for unit in result.reconstruction.answers:
-        table, sd = unit.path.table.iloc[-1], unit.path.sd.iloc[-1]
+        table, sd = unit.path.table.iloc[-1].copy(), unit.path.sd.iloc[-1]
+        if axis_names(result)[0] == "forward":
+            # As the charts: from where it pointed, and not round the compass.
+            table["heading"] = float(within_half_turn(table["heading"]))
         rows.append(
             (
                 recorder(unit, result),

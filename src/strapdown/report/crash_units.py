@@ -64,11 +64,11 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
     said = "agree within" if comparison.agree else "do NOT agree within"
     return Chart(
         "units",
-        "Units against each other",
-        "Change of velocity at the common point by each unit less that of their best weighted "
-        "mean, vehicle axes, since the first instant shown. Dotted, in its colour: what holds 95 % "
-        "of such a difference, as the units state it; what a unit shares with the mean is taken "
-        "into account. "
+        "Recorders against each other",
+        "Change of velocity at the reference point by each recorder less that of their best "
+        "weighted mean, vehicle axes, since the first instant shown. Dotted, in its colour: what "
+        "holds 95 % of such a difference, as stated of the recorders; what a recorder shares with "
+        "the mean is taken into account. "
         f"Together they {said} their bounds (chi-square {comparison.chi_square:.4g} of "
         f"{comparison.freedom} degrees of freedom, probability {comparison.probability:.2g}).",
         _X,
@@ -122,7 +122,7 @@ def accelerations_chart(
     how = f"after a phaseless low-pass of class CFC {_CLASS}" if filtered else "as sampled"
     return Chart(
         "accelerations",
-        "Acceleration of the reference point by every unit",
+        "Acceleration of the reference point by every recorder",
         "Along the turning axes of the vehicle, forward, right, down, what was felt at rest taken "
         f"off, {how}; 1 g = 9.80665 m/s². Shaded: the event.",
         _X,

@@ -11,6 +11,7 @@ from strapdown.crash.pdof import Pdof
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.report.crash_apart import apart, apart_figures, apart_headline
 from strapdown.report.crash_values import (
+    GAP,
     KMH,
     about,
     angle_range,
@@ -121,10 +122,10 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
             f"Place at the end{of}",
             f"{plain(math.hypot(place[0], place[1]), 2)} m",
             ", ".join(
-                f"{name} {about(p, h, 'm')}"
+                f"{name}{GAP}{about(p, h, 'm')}"
                 for name, p, h in zip(axis_names(result), place, half, strict=True)
             )
-            + " with 95 %",
+            + f" with 95{GAP}%",
             f"from the place at {instant(unit.path.entry.time)} to that at "
             f"{instant(unit.path.time[-1])}, {_axes(result)}",
         )

@@ -120,6 +120,8 @@ class Animation:
         Plain data: ``data``, ``layout``, ``frames``, each with a name that says when it is, and
         ``interval_ms`` between them, if not 60. The page has the button and the slider.
     stills : Picture
+    live_caption : str
+        What is true of the page alone.
     """
 
     slug: str
@@ -127,6 +129,7 @@ class Animation:
     caption: str
     figure: Mapping[str, Any] = field(repr=False)
     stills: Picture = field(repr=False)
+    live_caption: str = ""
 
 
 @dataclass(frozen=True)

@@ -162,6 +162,7 @@ class _Writer:
             "still": self._place(next(self._stills)),
             "width_mm": 170.0,
             "still_caption": "",
+            "live_caption": "",
         }
         if self._alive:
             from strapdown.report.plotly_chart import figure
@@ -198,6 +199,7 @@ class _Writer:
             "id": f"figure-{number}",
             "title": animation.title,
             "caption": animation.caption,
+            "live_caption": animation.live_caption,
             "still_caption": animation.stills.caption,
         }
         if self._alive:

@@ -36,7 +36,7 @@ _LIMITS: dict[type, dict[str, int]] = {
     Items: {"rows": _WORDS},
     Paragraph: {"text": _WORDS},
     Picture: {"caption": _WORDS, "alt": _WORDS, "title": _TITLE},
-    Animation: {"caption": _WORDS, "title": _TITLE},
+    Animation: {"caption": _WORDS, "live_caption": _TITLE, "title": _TITLE},
 }
 _MARKED = len("[U+10FFFF]")
 # What plotly may read as markup; it would make links of others.

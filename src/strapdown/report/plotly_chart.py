@@ -210,13 +210,16 @@ def _mark(layout: dict[str, Any], chart: Chart, suffix: str, top: float) -> int:
 def _shares(chart: Chart) -> list[float]:
     """Where each mark lies on the horizontal axis, as a share of what is drawn."""
     panels = [panel for panel in chart.panels if not panel.x_label]
-    drawn = [area.x for p in panels for area in (*p.lines, *p.fills) if area.x.size]
+    drawn = [
+        x for p in panels for x in (*(v.x for v in p.lines), *(v.x for v in p.fills)) if x.size
+    ]
     marks = np.array([mark.x for mark in chart.marks])
     found = np.concatenate([*drawn, marks])
     ends = np.array([np.nanmin(found), np.nanmax(found)]) if found.size else np.array([0.0, 1.0])
     if chart.log_x:
         marks, ends = np.log10(marks), np.log10(ends)
-    return ((marks - ends[0]) / max(float(ends[1] - ends[0]), 1e-12)).tolist()
+    span = max(float(ends[1] - ends[0]), 1e-12)
+    return [float(v) for v in (marks - ends[0]) / span]
 
 
 def _upright(kind: str, axis: str, x0: float, x1: float, top: float) -> dict[str, Any]:

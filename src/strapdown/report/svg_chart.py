@@ -142,11 +142,16 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
             entries.setdefault(label, handle)
     if entries or caption:
         widest = max(map(len, entries), default=0)
+        columns = max(1, min(6, (96 if paper else 110) // (widest + 7)))
+        if paper:
+            # Panels do not give way to a long legend.
+            more = 0.15 * (-(-len(entries) // columns) - 1)
+            figure.set_size_inches(width, height + max(0.0, more))
         legend = figure.legend(
             list(entries.values()),
             list(entries),
             loc="outside lower left",
-            ncols=max(1, min(6, (80 if paper else 110) // (widest + 6))),
+            ncols=columns,
             frameon=False,
             # Nothing else below the panels gives way to a legend.
             title=fill(chart.caption, _CAPTION) if caption else None,
