@@ -13,12 +13,12 @@ import json
 import os
 import platform
 import shutil
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 from strapdown.exceptions import ConfigError, DataError
@@ -138,9 +138,11 @@ def write_bundle(
     out = out.absolute()
     check_destination(out, force)
     made = [p for p in out.parents if not p.exists()]
-    out.parent.mkdir(parents=True, exist_ok=True)
-    staging = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent))
+    # Named before it is made: whoever interrupts in between leaves nothing either.
+    staging = out.parent / f".{out.name}.{token_hex(8)}.partial"
     try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        staging.mkdir(0o700)
         yield staging
         manifest = _manifest(staging, command, configuration, inputs)
         (staging / MANIFEST).write_text(to_json(manifest), encoding="utf-8", newline="\n")
@@ -302,14 +304,16 @@ def _move(staging: Path, out: Path) -> None:
     if not out.exists():
         staging.rename(out)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".old", dir=out.parent))
-    out.replace(old / out.name)
+    old = out.parent / f".{out.name}.{token_hex(8)}.old"
     try:
+        out.rename(old)
         staging.rename(out)
-    except OSError:
-        (old / out.name).replace(out)
+        shutil.rmtree(old, ignore_errors=True)
+    except BaseException:
+        if old.exists() and not out.exists():
+            old.rename(out)
+        shutil.rmtree(old, ignore_errors=True)
         raise
-    shutil.rmtree(old)
 
 
 def write_timing(
