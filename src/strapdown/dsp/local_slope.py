@@ -1,4 +1,4 @@
-"""Slope of a sampled signal from a parabola fitted to a few neighbours, with its exact noise."""
+"""Slope of a sampled signal from a polynomial of a few neighbours, with its exact noise."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ __all__ = ["LocalSlope", "local_slope"]
 # So many rows are solved at once: a few megabytes.
 CHUNK = 20_000
 LEAST_SAMPLES = 3
+# Enough for a polynomial of degree four; fewer have one of degree two.
+USUAL_SAMPLES = 7
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,23 +89,31 @@ class LocalSlope:
 
 
 def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0) -> LocalSlope:
-    """Weights of a parabola fitted by least squares to each sample and its neighbours.
+    """Weights of a polynomial fitted by least squares to each sample and its neighbours.
 
     Parameters
     ----------
     time : ndarray, (n,), s
         Increasing stamps, any spacing.
     window : float, s, optional
-        Length of a window; five samples if not given, and never fewer than three.
+        Length of a window; seven samples if not given, and never fewer than three. The polynomial
+        is of degree four where there are seven samples or more, and of degree two otherwise.
     delay : float, s
         By how much the signal is late: value and slope are taken this much after each stamp.
 
     Returns
     -------
     LocalSlope
-        With equal steps the filter of Savitzky and Golay, as `SlidingFit` of degree two. White
-        noise s becomes ``s sqrt(sum(slope²))``. Without delay the values are the samples
-        themselves.
+        With equal steps the filter of Savitzky and Golay. White noise s becomes
+        ``s sqrt(sum(slope²))``. Without delay the values are the samples themselves.
+
+    Notes
+    -----
+    By how much slopes are off, for steps h: those of a parabola through five samples by
+    ``17/30 h²`` times the third derivative, those of degree four through seven by ``-131/630 h⁴``
+    times the fifth. Of a pulse of 60 ms at 200 Hz that is 15 % and 1.6 %. White noise s leaves
+    0.32 and 0.51 s/h in a slope, and 0.48 and 0.59 s at each end of an integral of slopes: what a
+    change of velocity has of it.
 
     Raises
     ------
@@ -126,7 +136,7 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
             quantity="window",
             remedy="give the length over which the rates may be smoothed, as 0.02",
         )
-    width = 5 if window is None else 2 * max(1, round(0.5 * window / step)) + 1
+    width = USUAL_SAMPLES if window is None else 2 * max(1, round(0.5 * window / step)) + 1
     width = min(width, n)
     if abs(delay) > 0.5 * width * step:
         raise ConfigError(
@@ -134,12 +144,13 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
             quantity="delay",
             remedy="take the delay off the stamps, or use a longer window",
         )
+    degree = 4 if width >= USUAL_SAMPLES else min(2, width - 1)
     first = np.clip(np.arange(n) - width // 2, 0, n - width)
     slope, value = np.empty((n, width)), np.empty((n, width))
     for a in range(0, n, CHUNK):
         rows = slice(a, min(a + CHUNK, n))
         near = time[first[rows][:, None] + np.arange(width)]
-        value[rows], slope[rows] = fitted_weights(near, time[rows] + delay, min(2, width - 1))
+        value[rows], slope[rows] = fitted_weights(near, time[rows] + delay, degree)
     if delay == 0.0:
         value = (first[:, None] + np.arange(width) == np.arange(n)[:, None]).astype(np.float64)
     middle = n // 2

@@ -124,7 +124,7 @@ def move_imu(
         Of a gyro that was interpolated from a slower one, multiply it by the root of the ratio
         of the steps, and let the window cover several steps of the slower one.
     window : float, s, optional
-        As `local_slope`: of the parabola whose slope is the angular acceleration.
+        As `local_slope`: of the polynomial whose slope is the angular acceleration.
     gyro_delay : float, s
         By how much the gyro lags the accelerometer: the difference of the group delays of their
         filters, ``1 / (2 pi bandwidth)`` for a single pole.
