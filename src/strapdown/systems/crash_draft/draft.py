@@ -20,7 +20,7 @@ from strapdown.systems.crash_draft.case_tables import (
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import facings
 from strapdown.systems.crash_draft.parts import Skipped
-from strapdown.systems.crash_draft.toml_text import Asked, Page, plain
+from strapdown.systems.crash_draft.toml_text import Asked, Page, instant, plain
 from strapdown.systems.crash_draft.unit_tables import unit_tables
 
 __all__ = ["Draft", "write_draft"]
@@ -98,11 +98,13 @@ def _found(units: Sequence[Unit]) -> list[str]:
             what = f"its largest blow begins near sample {at:.0f}; it has no clock"
         elif impact.found:
             what = (
-                f"struck at {impact.trigger:.6g} s of its clock, {impact.largest / KMH:.3g} km/h, "
-                f"peak {impact.peak / STANDARD_GRAVITY:.3g} g"
+                f"struck at {instant(impact.trigger)} s of its clock, "
+                f"{impact.largest / KMH:.3g} km/h, peak {impact.peak / STANDARD_GRAVITY:.3g} g"
             )
         elif unit.ends[len(unit.accelerometers) - 1].saturated:
-            what = f"struck at {impact.trigger:.6g} s of its clock, beyond the end of its range"
+            what = (
+                f"struck at {instant(impact.trigger)} s of its clock, beyond the end of its range"
+            )
         else:
             what = (
                 f"no crash found: {impact.largest / KMH:.2g} km/h within 150 ms at most, of the 8 "

@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["ASK", "Asked", "Page", "array", "inline", "number", "plain", "string"]
+__all__ = ["ASK", "Asked", "Page", "array", "inline", "instant", "number", "plain", "string"]
 
 #: What stands where only a person knows the value.
 ASK = '"?"'
@@ -49,6 +49,12 @@ def number(value: float, digits: int = 6) -> str:
     """A float of TOML, in no more digits than it is known to."""
     text = f"{value:.{digits}g}"
     return text if any(c in text for c in ".en") else f"{text}.0"
+
+
+def instant(value: float) -> str:
+    """An instant of a clock, s: to 10 µs, however far it counts from."""
+    text = f"{value:.5f}".rstrip("0")
+    return f"{text}0" if text.endswith(".") else text
 
 
 def array(values: Sequence[float | None]) -> str:

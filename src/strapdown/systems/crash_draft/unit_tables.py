@@ -16,6 +16,7 @@ from strapdown.systems.crash_draft.toml_text import (
     Page,
     array,
     inline,
+    instant,
     number,
     plain,
     string,
@@ -126,21 +127,20 @@ def _trigger(page: Page, unit: Unit) -> None:
             f"samples; what it shows of the change of velocity, {impact.largest / KMH:.2g} km/h "
             "within 150 ms, is therefore too little"
         )
-        page.key(
-            "trigger_s", number(impact.trigger, 7), "assumed: where its largest pulse begins, s"
-        )
+        page.key("trigger_s", instant(impact.trigger), "assumed: where its largest pulse begins, s")
         page.key("trigger_sd_s", "0.01", "assumed, s")
         return
     if not impact.found:
         page.say(
             "No crash was found: the largest change of the horizontal velocity within 150 ms is "
             f"{impact.largest / KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
-            f"acceleration, {in_words(impact.peak, 'acceleration')}, is at {impact.trigger:.6g} s."
+            f"acceleration, {in_words(impact.peak, 'acceleration')}, is at "
+            f"{instant(impact.trigger)} s."
         )
         page.key(
             "trigger_s",
             ASK,
-            f"only you know: the instant on this unit's clock, s, e.g. {impact.trigger:.6g}",
+            f"only you know: the instant on this unit's clock, s, e.g. {instant(impact.trigger)}",
             what=f"instant of the impact on the clock of '{plain(unit.name)}', s",
         )
         page.key("trigger_sd_s", "0.01", "assumed, s")
@@ -150,7 +150,7 @@ def _trigger(page: Page, unit: Unit) -> None:
     else:
         page.key(
             "trigger_s",
-            number(impact.trigger, 7),
+            instant(impact.trigger),
             "found: time zero by 49 CFR 563, s on this unit's clock; if it stamped its trigger, "
             "write that instant",
         )
@@ -169,7 +169,7 @@ def _trigger(page: Page, unit: Unit) -> None:
         kind = {"still": "at rest", "steady": "steady, though perhaps moving"}[impact.grade]
         length = impact.rest[1] - impact.rest[0]
         page.say(
-            f"found: it was {kind} from {impact.rest[0]:.6g} to {impact.rest[1]:.6g} s, "
+            f"found: it was {kind} from {instant(impact.rest[0])} to {instant(impact.rest[1])} s, "
             f"{length:.3g} s; to name another, counted from the trigger: rest_s = [from, to]"
         )
 
@@ -192,6 +192,11 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
     page.table(header)
     if words:
         page.say(f"{words}")
+    if part.remarks and part is _first_of_its_file(part, unit):
+        page.say(
+            "The record says above its table; see whether it says axes, range or rate:",
+            *(f"   {plain(r)}" for r in part.remarks),
+        )
     page.key("path", string(part.path))
     page.key("channels", inline(part.channels), f"found: {part.why.split('; ')[0]}")
     missing = [a for a in "xyz" if a not in part.channels]
@@ -220,6 +225,8 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
             "would make it a crash of a usual length",
             what=f"samples a second of {plain(part.path)}",
         )
+    elif part.clock.stated:
+        page.key("rate_hz", number(part.clock.rate), f"found: {plain(part.clock.why)}")
     how = "; ".join(part.why.split("; ")[1:])
     if part.unit:
         page.key("unit", string(part.unit), f"found: {how}" if how else "found")
@@ -246,6 +253,11 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
             f"found: it stood at the end of its range in {ends.samples} samples: {', '.join(stood)}"
         )
     _sensor(page, part, ends, unit)
+
+
+def _first_of_its_file(part: Part, unit: Unit) -> Part:
+    parts = [*unit.accelerometers, *((unit.gyro,) if unit.gyro else ())]
+    return next(p for p in parts if p.path == part.path)
 
 
 def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
