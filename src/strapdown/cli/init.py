@@ -10,6 +10,9 @@ import typer
 EPILOG = "Example: strapdown init crash recorder.csv"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
 
+# Of what was left out.
+SHOWN = 6
+
 app = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode="rich",
@@ -62,10 +65,20 @@ def crash(
     page.print("Found", style="bold")
     for line in draft.found:
         page.print(f"  {line}")
+    if draft.left_out:
+        page.print("Left out", style="bold")
+        for gone in draft.left_out[:SHOWN]:
+            page.print(f"  {gone.path}, {gone.what}: {gone.why}")
+        if len(draft.left_out) > SHOWN:
+            page.print(f"  and {len(draft.left_out) - SHOWN} more: at the end of {out}")
     page.print(f"\nWrote {out}")
     if draft.asked:
         page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
         for one in draft.asked:
             page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
-        page.print("Look at the lines that say 'assumed', too.")
+    if draft.to_check:
+        page.print(f"\nIs this so? If not, correct it in {out}:", style="bold")
+        for one in draft.to_check:
+            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+    page.print("\nLook at the lines that say 'assumed', too.")
     page.print(f"\nThen   strapdown crash {out}")

@@ -7,6 +7,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from strapdown.config.sealed_paths import beside_sealed_case
 from strapdown.config.shown import shown
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
@@ -29,7 +30,8 @@ def with_absolute_paths(file: TomlFile, table: dict[str, Any]) -> dict[str, Any]
     Returns
     -------
     dict
-        With every ``path``, and every ``sensor`` that is a file, as an absolute path.
+        With every ``path``, and every ``sensor`` that is a file, as an absolute path. Of a case
+        that is a copy in a sealed folder, the copies in that folder.
 
     Raises
     ------
@@ -60,6 +62,9 @@ def _found(file: TomlFile, given: Any, path: KeyPath) -> Any:
     try:
         if wanted.exists():
             return str(wanted)
+        kept = beside_sealed_case(file.path, path, given)
+        if kept is not None:
+            return str(kept)
         why = f"there is no {shown(given)}"
     except (OSError, ValueError) as error:
         why = f"{shown(given)} cannot be read: {getattr(error, 'strerror', None) or error}"

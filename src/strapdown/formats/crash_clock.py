@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_stamps import Clock, seconds_of
+from strapdown.formats.crash_stamps import Clock, last_midnight, seconds_of
 from strapdown.formats.crash_units import state_unit
+from strapdown.formats.stamps import EPOCH
 
 Array = NDArray[np.float64]
 
@@ -139,6 +140,8 @@ def _even(
         ends = stamps[[0, -1]]
         seconds = _ends(clock, ends, rate_hz, values.size)
         start, span = float(seconds[0]), float(seconds[1] - seconds[0])
+        if abs(start) > EPOCH:
+            start -= last_midnight(start, 1.0)
     elif channel.samples is None:
         stamps = channel.load()[0]
         start, span = float(stamps[0]), float(stamps[-1] - stamps[0])

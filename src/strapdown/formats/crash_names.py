@@ -126,7 +126,11 @@ def _words(text: str) -> list[str]:
 
 def _says_change(words: list[str]) -> bool:
     joined = " ".join(words)
-    return bool(re.search(r"\b(delta ?v|dv|delta velocity|delta vel|velocity change)", joined))
+    return bool(
+        re.search(
+            r"\b(delta ?v|dv|delta velocity|delta vel|velocity change|geschwindigkeits)", joined
+        )
+    )
 
 
 def _quantity(words: list[str], triad: str | None, change: bool) -> str:

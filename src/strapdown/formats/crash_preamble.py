@@ -10,20 +10,28 @@ from strapdown.exceptions import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_attributes import check_attributes
 from strapdown.formats.crash_csv_writer import NOTE
+from strapdown.formats.crash_text import LONGEST_NAME, clean
 from strapdown.formats.crash_units import unit_of
+from strapdown.formats.day_time import day_nanoseconds
 from strapdown.formats.recording import RawLog
 
 __all__ = ["notes_of", "read_text_table"]
 
 # A header stands within so many lines, or there is none.
 HIGHEST_HEADER = 200
+# So many rows under the first look like it.
+ROWS = 3
+# Lines above a table that a person would read.
+MOST_REMARKS = 24
 # Rows of plain numbers of some hundred bytes: more than this is no table of a crash.
 LARGEST = 2_000_000_000
 _TITLE = "# title: "
 _NO_UNIT = ("", "-", "--", "none", "1")
 
 
-def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str]:
+def read_text_table(
+    path: Path,
+) -> tuple[RawLog, dict[str, dict[str, Any]], str, tuple[str, ...]]:
     """Read a text table whose header need not be its first line.
 
     Parameters
@@ -38,6 +46,8 @@ def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str]
         What comments say of columns, as `crash_attributes.attributes_of` gives it.
     str
         Title in a comment, or empty.
+    tuple of str
+        The other lines above the table, in which recorders write rate, range and axes.
 
     Raises
     ------
@@ -59,6 +69,7 @@ def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str]
         )
     lines = text.splitlines()
     header, units_at, units = _header(lines)
+    remarks = _remarks(lines, header)
     if header is not None:
         # Blank lines are skipped, and rows keep their numbers.
         above = [line if csv.is_comment(line) else "" for line in lines[:header]]
@@ -70,9 +81,37 @@ def read_text_table(path: Path) -> tuple[RawLog, dict[str, dict[str, Any]], str]
     raw.findings[:0] = findings
     if units and len(units) == len(raw.columns):
         raw.units |= {name: u for name, u in zip(raw.columns, units, strict=True) if u}
+    _read_clocks(raw)
     notes = notes_of(lines, raw)
     title = next((line[len(_TITLE) :] for line in lines[:1] if line.startswith(_TITLE)), "")
-    return raw, notes, title
+    # A comment may be the header.
+    return raw, notes, title, tuple(r for r in remarks if not r.startswith(next(iter(raw.columns))))
+
+
+def _remarks(lines: list[str], header: int | None) -> tuple[str, ...]:
+    above = []
+    for at, line in enumerate(lines[:HIGHEST_HEADER]):
+        if at == header or (not csv.is_comment(line) and (header is None or at > header)):
+            break
+        if line.startswith((NOTE, _TITLE)):
+            continue
+        text = clean(line.lstrip("#% "), LONGEST_NAME)
+        if text:
+            above.append(text)
+    return tuple(above[:MOST_REMARKS])
+
+
+def _read_clocks(raw: RawLog) -> None:
+    """Times of day become nanoseconds since midnight."""
+    stated = dict(raw.stated)
+    for name, values in raw.columns.items():
+        if values.dtype.kind != "O":
+            continue
+        ticks = day_nanoseconds(values)
+        if ticks is not None:
+            raw.columns[name] = ticks
+            stated[name] = ("time", "ns")
+    raw.stated = stated
 
 
 def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
@@ -105,13 +144,25 @@ def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:
         if line.strip() and not csv.is_comment(line)
     ]
     # Rows of numbers alone; of a table that has a column of text, rows that are mostly numbers.
-    for whole in (True, False):
-        for k, (_, fields) in enumerate(said):
-            there = [f for f in fields if f]
-            numbers = sum(map(csv.is_data, there))
-            if numbers and (numbers == len(there) if whole else 2 * numbers >= len(fields)):
+    # "Channels: 3" above a table looks like one: what goes on as it begins goes first.
+    for goes_on in (True, False):
+        for whole in (True, False):
+            for k, (_, fields) in enumerate(said):
+                if not _is_row(fields, whole):
+                    continue
+                below = [f for _, f in said[k + 1 : k + 1 + ROWS]]
+                if goes_on and not (
+                    below and all(len(f) == len(fields) and _is_row(f, whole) for f in below)
+                ):
+                    continue
                 return _above(said[:k], len(fields))
     return None, None, []
+
+
+def _is_row(fields: list[str], whole: bool) -> bool:
+    there = [f for f in fields if f]
+    numbers = sum(map(csv.is_data, there))
+    return bool(numbers and (numbers == len(there) if whole else 2 * numbers >= len(fields)))
 
 
 def _above(

@@ -113,6 +113,8 @@ class CrashRecord:
     files : tuple of Path
         Every file that belongs to it.
     findings : tuple of Finding
+    remarks : tuple of str
+        What else stands in it for people: lines above a table, in which rate and axes may be.
     """
 
     path: Path
@@ -122,6 +124,7 @@ class CrashRecord:
     channels: tuple[CrashChannel, ...]
     files: tuple[Path, ...]
     findings: tuple[Finding, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     def channel(self, name: str) -> CrashChannel:
         """Return a channel by its name.

@@ -17,7 +17,9 @@ from strapdown.formats.stamps import EPOCH
 
 Array = NDArray[np.float64]
 
-__all__ = ["Clock", "seconds_of"]
+__all__ = ["Clock", "last_midnight", "seconds_of"]
+
+DAY = 86_400.0  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +56,9 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     Returns
     -------
     seconds : ndarray, (n,)
-        From the origin of the recorder; from the first stamp where that is more than 1e6 s away,
-        as a clock of 1970 is.
+        From the origin of the recorder; where that is more than 1e6 s away, as a clock of 1970 is,
+        from the last midnight of that clock before the first stamp: records of one clock that do
+        not begin together keep one time.
     findings : list of Finding
 
     Raises
@@ -96,15 +99,30 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     factor = TIME_UNITS[unit]
     if abs(float(stamps[0])) * factor <= EPOCH:
         return stamps.astype(np.float64) * factor, findings
+    midnight = last_midnight(stamps[0].item(), factor)
     findings.append(
         Finding(
-            f"stamps count from a distant origin; time here counts from the first, "
-            f"{stamps[0].item()} {unit}",
+            "stamps count from a distant origin; time here counts from the midnight of that clock "
+            f"before the first, {midnight} {unit}",
             file=clock.file,
             quantity=f"time ({clock.name})",
         )
     )
-    return ticks * factor, findings
+    return (stamps - midnight).astype(np.float64) * factor, findings
+
+
+def last_midnight(stamp: float, factor: float) -> float:
+    """Stamp of the last whole day of a clock before a stamp.
+
+    Parameters
+    ----------
+    stamp : float or int
+        In ticks; whole numbers stay whole.
+    factor : float, s
+        Of a tick.
+    """
+    day = round(DAY / factor)
+    return stamp // day * day
 
 
 def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str:

@@ -17,6 +17,7 @@ from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_stamps import Clock, seconds_of
 from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
 from strapdown.formats.crash_units import factor_of
+from strapdown.formats.crash_velocity import ONE_STEP
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
@@ -30,6 +31,8 @@ __all__ = ["detect", "read", "record_of"]
 MOSTLY = 0.5
 # How even the steps of a column without a name must be, to be taken for a clock.
 EVEN = 0.01
+# A step of 10 ms of a crash of 50 ms gains less than this of it.
+SMALL = 0.2
 _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
 
 
@@ -55,8 +58,8 @@ def read(path: Path) -> CrashRecord:
     DataError
         It is no table, or a damaged one.
     """
-    raw, notes, title = read_text_table(path)
-    return record_of(raw, path, "csv", notes=notes, title=title)
+    raw, notes, title, remarks = read_text_table(path)
+    return record_of(raw, path, "csv", notes=notes, title=title, remarks=remarks)
 
 
 def record_of(
@@ -66,6 +69,7 @@ def record_of(
     *,
     notes: Mapping[str, Mapping[str, Any]] | None = None,
     title: str = "",
+    remarks: tuple[str, ...] = (),
 ) -> CrashRecord:
     """Make a record of the columns of a log.
 
@@ -78,6 +82,8 @@ def record_of(
     notes : dict of str to dict, optional
         What the file says of columns beside their names, as `attributes_of` gives it.
     title : str, optional
+    remarks : tuple of str, optional
+        Lines above the table.
 
     Returns
     -------
@@ -128,6 +134,7 @@ def record_of(
         channels=channels,
         files=raw.files,
         findings=tuple(findings),
+        remarks=remarks,
     )
 
 
@@ -225,6 +232,8 @@ def _channel(
     clock_name: str,
 ) -> CrashChannel:
     said = names[source]
+    if _begins_from_rest(raw, source, said, clock):
+        said = replace(said, change=True)
     factor = factor_of(said.quantity, said.unit) if said.unit else None
     samples = _samples(raw, source, said, factor)
     stamps = _stamps(raw, clock, names[clock].unit if clock else "")
@@ -246,6 +255,17 @@ def _channel(
         clock=clock_name,
         samples=samples,
     )
+
+
+def _begins_from_rest(raw: RawLog, source: str, said: ChannelName, clock: str) -> bool:
+    """A velocity that is small one step after time zero was none at zero: it is a change."""
+    if said.quantity != "velocity" or said.change or not clock:
+        return False
+    stamps, values = raw.columns[clock], raw.columns[source]
+    if stamps.dtype.kind not in "iuf" or values.dtype.kind not in "iuf" or stamps.size < 2:
+        return False
+    one_step = 0.0 < stamps[0] <= ONE_STEP * (stamps[1] - stamps[0])
+    return bool(one_step and abs(values[0]) <= SMALL * np.nanmax(np.abs(values), initial=0.0))
 
 
 def _samples(

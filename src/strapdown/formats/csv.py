@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats.columns import UNIT_OF
+from strapdown.formats.day_time import is_day_time
 from strapdown.formats.recording import RawLog
 from strapdown.tables import SAMPLINGS
 
@@ -144,8 +145,10 @@ def is_comment(line: str) -> bool:
 
 
 def is_data(field: str) -> bool:
-    """Whether a field is a number, a date, or missing, and no name."""
-    return field in NULLS or any(p.fullmatch(field) for p in (_NUMBER, _DATE, _HEX))
+    """Whether a field is a number, a date, a time of day, or missing, and no name."""
+    if field in NULLS or is_day_time(field):
+        return True
+    return any(p.fullmatch(field) for p in (_NUMBER, _DATE, _HEX))
 
 
 def _units(line: str, separator: str | None, width: int) -> list[str] | None:

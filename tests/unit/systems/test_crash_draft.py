@@ -463,7 +463,7 @@ def test_samples_of_the_two_ranges_say_why_they_are_one(three):
     assert "If they are separate boxes: give each its own [[units]] table" in flat
 
 
-def test_a_clock_of_1970_is_counted_from_its_first_stamp(pole, tmp_path):
+def test_a_clock_of_1970_is_counted_from_midnight(pole, tmp_path):
     time, (low, _, _) = tables(pole["IMU1"])
     stamps = 1_710_000_000_000 + np.round((time - time[0]) * 1e3)
     path = write(
@@ -474,9 +474,10 @@ def test_a_clock_of_1970_is_counted_from_its_first_stamp(pole, tmp_path):
     spec = filled(draft, tmp_path)
     read = triad(spec.units[0].accelerometers[0], "acceleration")
     assert isinstance(read, pd.DataFrame)
-    assert read.index[0] == 0.0
+    # 1710000000 s are 57600 s after a midnight.
+    assert read.index[0] == 57_600.0
     # On the clock of the case, as the table is read.
-    assert abs(unit["trigger_s"] - (pole["IMU1"].trigger - time[0])) < 0.05
+    assert abs(unit["trigger_s"] - 57_600.0 - (pole["IMU1"].trigger - time[0])) < 0.05
 
 
 def test_records_are_not_changed(german):

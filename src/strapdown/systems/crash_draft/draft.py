@@ -19,8 +19,9 @@ from strapdown.systems.crash_draft.case_tables import (
 )
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import facings
+from strapdown.systems.crash_draft.known_path import KnownPath, reference_tables
 from strapdown.systems.crash_draft.parts import Skipped
-from strapdown.systems.crash_draft.toml_text import Asked, Page, plain
+from strapdown.systems.crash_draft.toml_text import Asked, Page, instant, plain
 from strapdown.systems.crash_draft.unit_tables import unit_tables
 
 __all__ = ["Draft", "write_draft"]
@@ -38,6 +39,9 @@ class Draft:
         For the user, a line each.
     asked : tuple of Asked
         What is left to the user.
+    to_check : tuple of Asked
+        What follows from values that were found or assumed, for a person to confirm.
+    left_out : tuple of Skipped
     findings : tuple of Finding
         What a person should know of the records.
     """
@@ -45,6 +49,8 @@ class Draft:
     text: str
     found: tuple[str, ...]
     asked: tuple[Asked, ...]
+    to_check: tuple[Asked, ...] = ()
+    left_out: tuple[Skipped, ...] = ()
     findings: tuple[Finding, ...] = ()
 
 
@@ -55,6 +61,7 @@ def write_draft(
     title: str = "",
     facts: Mapping[str, str] | None = None,
     findings: Sequence[Finding] = (),
+    paths: Sequence[KnownPath] = (),
 ) -> Draft:
     """Write a case of units.
 
@@ -68,6 +75,8 @@ def write_draft(
     facts : mapping, optional
         Of a test: the keys of `CrashRecord.facts`.
     findings : sequence of Finding
+    paths : sequence of KnownPath
+        What else is known of the crash.
     """
     page = Page()
     facing = facings(units)
@@ -78,9 +87,22 @@ def write_draft(
     for k, unit in enumerate(units):
         unit_tables(page, unit, facing[k], units)
     agreement(page, units, facing)
+    reference_tables(page, list(paths))
     left_out(page, skipped)
     options_table(page, units)
-    return Draft(page.text, tuple(_found(units)), tuple(page.asked), tuple(findings))
+    found = _found(units)
+    found += [
+        f"{plain(p.name)}: a path from {instant(p.start)} to {instant(p.end)} s, a reference"
+        for p in paths
+    ]
+    return Draft(
+        page.text,
+        tuple(found),
+        tuple(page.asked),
+        tuple(page.to_check),
+        tuple(skipped),
+        tuple(findings),
+    )
 
 
 def _found(units: Sequence[Unit]) -> list[str]:
@@ -98,11 +120,13 @@ def _found(units: Sequence[Unit]) -> list[str]:
             what = f"its largest blow begins near sample {at:.0f}; it has no clock"
         elif impact.found:
             what = (
-                f"struck at {impact.trigger:.6g} s of its clock, {impact.largest / KMH:.3g} km/h, "
-                f"peak {impact.peak / STANDARD_GRAVITY:.3g} g"
+                f"struck at {instant(impact.trigger)} s of its clock, "
+                f"{impact.largest / KMH:.3g} km/h, peak {impact.peak / STANDARD_GRAVITY:.3g} g"
             )
         elif unit.ends[len(unit.accelerometers) - 1].saturated:
-            what = f"struck at {impact.trigger:.6g} s of its clock, beyond the end of its range"
+            what = (
+                f"struck at {instant(impact.trigger)} s of its clock, beyond the end of its range"
+            )
         else:
             what = (
                 f"no crash found: {impact.largest / KMH:.2g} km/h within 150 ms at most, of the 8 "

@@ -12,6 +12,7 @@ from strapdown.formats.crash_records import read_crash_record
 from strapdown.systems.crash_draft.draft import Draft, write_draft
 from strapdown.systems.crash_draft.event_table import as_accelerations
 from strapdown.systems.crash_draft.group_units import group_units
+from strapdown.systems.crash_draft.known_path import KnownPath, known_path
 from strapdown.systems.crash_draft.laboratory import laboratory_parts
 from strapdown.systems.crash_draft.parts import Part, Skipped
 from strapdown.systems.crash_draft.settle_units import settle_units
@@ -81,10 +82,15 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     skipped: list[Skipped] = []
     settled: list[Part] = []
     findings: list[Finding] = []
+    paths: list[KnownPath] = []
     for record in records:
         path = _from(record.path, Path(folder))
         # What the reader concluded of the clock is stated in the case.
         findings += [f for f in record.findings if f.quantity != "time"]
+        known = known_path(path, record)
+        if known is not None:
+            paths.append(known)
+            continue
         tabular = all(c.samples is not None for c in record.channels)
         found, left = (table_parts if tabular else laboratory_parts)(path, record)
         skipped += left
@@ -97,7 +103,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
         raise _nothing(records, settled, skipped)
     facts = next((r.facts for r in records if r.facts), {})
     title = next((r.title for r in records if r.facts and r.title), "")
-    return write_draft(units, skipped, title=title, facts=facts, findings=findings)
+    return write_draft(units, skipped, title=title, facts=facts, findings=findings, paths=paths)
 
 
 def _from(path: Path, folder: Path) -> str:

@@ -11,7 +11,7 @@ from strapdown.crash.pdof import pdof
 from strapdown.rotation import within_half_turn
 from strapdown.systems.crash_draft.group_units import Unit
 
-__all__ = ["Facing", "facings"]
+__all__ = ["Facing", "direction", "facings", "side_of"]
 
 TURNS = (0.0, 90.0, 180.0, -90.0)
 # A blow from the front, as most crashes of vehicles that drive are, comes within this of it.
@@ -73,6 +73,11 @@ def direction(unit: Unit, heading_deg: float) -> float | None:
     return float(pdof((change[0], change[1], 0.0)).horizontal_deg)
 
 
+def side_of(came: float) -> str:
+    """In words, where a force came from at this direction, deg."""
+    return SIDES[round(came / 90.0) % 4]
+
+
 def _own(unit: Unit) -> Facing | None:
     sitting = unit.impact.sitting
     named = all(p.named for p in unit.accelerometers)
@@ -118,8 +123,7 @@ def _meanings(unit: Unit) -> str:
         came = direction(unit, turn)
         if came is None:
             continue
-        side = SIDES[round(came / 90.0) % 4]
-        told.append(f"{turn:g} makes it a blow from {side}")
+        told.append(f"{turn:g} makes it a blow from {side_of(came)}")
     if not told:
         return "only you know which way it faces: the record does not tell it"
     return "only you know which way it faces: " + ", ".join(told)

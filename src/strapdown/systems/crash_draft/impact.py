@@ -92,6 +92,8 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     sitting = sitting_at_rest(fine_base) if len(fine.axes) == 3 else None
     level = _ahead(sitting.into_vehicle(free) if sitting else free)
     step = float(np.median(np.diff(time)))
+    # Stamps that are rounded have steps of two lengths.
+    lasts = np.gradient(time)[:, None]
     before = time < time[int(np.argmax(np.linalg.norm(free, axis=1)))] - BEFORE
     noise = free[before].std(axis=0) if before.sum() > LEAST_BASE else np.zeros(3)
     detector = EventDetector(noise=tuple(float(n) for n in noise))
@@ -102,7 +104,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
         first = events[0]
         trigger, sd = first.time_zero, first.time_zero_sd
         during = (time >= first.time_zero) & (time <= first.end)
-        largest = float(np.linalg.norm(level[during, :2].sum(axis=0)) * step)
+        largest = float(np.linalg.norm((level[:, :2] * lasts)[during].sum(axis=0)))
     else:
         trigger, sd = _onset(time, np.linalg.norm(free, axis=1), peak_at), math.nan
         largest = detector.largest_change[0]
@@ -110,7 +112,7 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
     sd = max(sd if math.isfinite(sd) else 0.0, step, 0.25 * PART_563.wake_window)
     at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
     after = (time >= trigger) & (time <= trigger + CHANGE_OVER)
-    change = free[after].sum(axis=0) * step
+    change = (free * lasts)[after].sum(axis=0)
     return Impact(
         0.0 if at_zero else trigger,
         step / math.sqrt(12.0) if at_zero else sd,

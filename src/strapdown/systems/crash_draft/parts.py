@@ -31,6 +31,8 @@ class Clock:
         By the likeliest unit.
     candidates : str
         Units that it may be, in words, where `unit` is empty.
+    stated : bool
+        There is no column, and a line above the table states the rate.
     """
 
     column: str
@@ -39,6 +41,7 @@ class Clock:
     step: float
     rate: float
     candidates: str = ""
+    stated: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +87,8 @@ class Part:
         Why.
     notes : tuple of str
         What else belongs in a comment.
+    remarks : tuple of str
+        Lines that the record has for people.
     """
 
     path: str
@@ -105,6 +110,7 @@ class Part:
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     basis: str = ""
     notes: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @property
     def axes(self) -> list[int]:

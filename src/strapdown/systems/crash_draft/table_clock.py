@@ -88,9 +88,10 @@ def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock,
     if heading.unit in TIME_UNITS:
         factor = TIME_UNITS[heading.unit]
         rate = 1.0 / (step * factor)
-        return Clock(
-            name, heading.unit, f"{why}, which names the unit", step, rate
-        ), values * factor
+        # Dates and times of day are read in ns, which no heading says.
+        names_it = heading.unit != "ns" or "ns" in name.lower() or "nano" in name.lower()
+        how = f"{why}, which names the unit" if names_it else f"{why}; a time of day, read in ns"
+        return Clock(name, heading.unit, how, step, rate), values * factor
     said = infer_time_unit(_whole(values))
     shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     within = {u: p for u, p in shares.items() if SLOWEST <= 1.0 / (step * TIME_UNITS[u]) <= FASTEST}

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_stamps import last_midnight
 from strapdown.formats.crash_units import factor_of
 from strapdown.formats.stamps import EPOCH
 from strapdown.systems.crash_draft.header_words import Heading, read_heading
 from strapdown.systems.crash_draft.parts import Part, Skipped
+from strapdown.systems.crash_draft.stated_rate import stated_rate
 from strapdown.systems.crash_draft.table_clock import find_clock, likely_rate
 from strapdown.systems.crash_draft.table_triads import group_columns
 
@@ -70,14 +72,29 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
     clock, time = find_clock(table.columns, table.headings)
     if time is None:
         whole = np.column_stack([v for v in table.columns.values() if np.isfinite(v).all()])
-        clock = replace(clock, rate=likely_rate(whole))
+        said = stated_rate(record.remarks)
+        clock = (
+            replace(
+                clock,
+                unit="s",
+                rate=said[0],
+                stated=True,
+                why=f"stated above the table: '{said[1]}'",
+            )
+            if said
+            else replace(clock, rate=likely_rate(whole))
+        )
         stamps = np.arange(rows, dtype=np.float64) / clock.rate
     else:
         _check_advances(record.channel(clock.column), table.columns[clock.column])
         factor = 1.0 / (clock.rate * clock.step)
         origin = table.origins.get(clock.column, 0.0) * factor
-        # As those are read who read the case: what counts from far away counts from its first.
-        stamps = time - time[0] if abs(origin + time[0]) > EPOCH else time + origin
+        # As those are read who read the case: what counts from far away counts from midnight.
+        raw = table.origins.get(clock.column, 0.0) + float(table.columns[clock.column][0])
+        far = abs(origin + time[0]) > EPOCH
+        stamps = (
+            time - time[0] + (raw - last_midnight(raw, factor)) * factor if far else time + origin
+        )
     others = {n: v for n, v in table.columns.items() if n != clock.column}
     groups, left = group_columns(others, table.headings)
     skipped += [Skipped(path, f"column '{name}'", why, (name,)) for name, why in left]
@@ -111,6 +128,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             label=group.label,
             named=group.by_heading,
             notes=(f"{lost} of {rows} rows have no value of it",) if lost else (),
+            remarks=record.remarks,
         )
         parts.append(replace(part, sampling=_sampling(record, group.columns.values())))
     return parts, skipped

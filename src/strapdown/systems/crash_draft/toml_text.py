@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-__all__ = ["ASK", "Asked", "Page", "array", "inline", "number", "plain", "string"]
+__all__ = ["ASK", "Asked", "Page", "array", "inline", "instant", "number", "plain", "string"]
 
 #: What stands where only a person knows the value.
 ASK = '"?"'
@@ -51,6 +51,12 @@ def number(value: float, digits: int = 6) -> str:
     return text if any(c in text for c in ".en") else f"{text}.0"
 
 
+def instant(value: float) -> str:
+    """An instant of a clock, s: to 10 µs, however far it counts from."""
+    text = f"{value:.5f}".rstrip("0")
+    return f"{text}0" if text.endswith(".") else text
+
+
 def array(values: Sequence[float | None]) -> str:
     """Numbers, with a question where one is not known."""
     return "[" + ", ".join(ASK if v is None else number(v) for v in values) + "]"
@@ -85,6 +91,7 @@ class Page:
 
     lines: list[str] = field(default_factory=list)
     asked: list[Asked] = field(default_factory=list)
+    to_check: list[Asked] = field(default_factory=list)
 
     def say(self, *paragraphs: str) -> None:
         """Comment lines, wrapped; text in them is made harmless."""
@@ -106,7 +113,9 @@ class Page:
         if self.lines and self.lines[-1]:
             self.lines.append("")
 
-    def key(self, name: str, value: str, remark: str = "", *, what: str = "") -> None:
+    def key(
+        self, name: str, value: str, remark: str = "", *, what: str = "", check: str = ""
+    ) -> None:
         """One key with its remark, beside it where it fits, else above.
 
         Parameters
@@ -116,6 +125,8 @@ class Page:
         remark : str
         what : str
             Short, for the list of what is left to the user; the remark, if not given.
+        check : str
+            What follows from the value, for a person to confirm who knows of the crash.
         """
         text = f"{name} = {value}"
         remark = "".join(c if c.isprintable() else " " for c in remark)
@@ -127,6 +138,8 @@ class Page:
         if ASK in value:
             said = what or remark.removeprefix("only you know: ")
             self.asked.append(Asked(len(self.lines), name, said))
+        elif check:
+            self.to_check.append(Asked(len(self.lines), name, check))
 
     @property
     def text(self) -> str:

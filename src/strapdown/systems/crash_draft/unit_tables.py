@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from strapdown.crash.event_rule import KMH
 from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
-from strapdown.systems.crash_draft.heading_of_unit import Facing
+from strapdown.systems.crash_draft.heading_of_unit import Facing, direction, side_of
 from strapdown.systems.crash_draft.parts import Part
 from strapdown.systems.crash_draft.range_ends import RangeEnds, in_words
 from strapdown.systems.crash_draft.stated_errors import stated_of
@@ -16,10 +17,12 @@ from strapdown.systems.crash_draft.toml_text import (
     Page,
     array,
     inline,
+    instant,
     number,
     plain,
     string,
 )
+from strapdown.systems.crash_draft.turn_after import LEAST_TURN, in_turn_words, turn_after
 
 __all__ = ["unit_tables"]
 
@@ -98,10 +101,19 @@ def _angles(page: Page, unit: Unit, facing: Facing) -> None:
         else f"found: roll and pitch by gravity at rest, {sitting.length:.2f} m/s² along no axis"
     )
     page.say(turns, told, facing.why)
+    came = None if facing.heading_deg is None else direction(unit, facing.heading_deg)
+    if facing.heading_deg is None:
+        page.say(
+            "If in the vehicle no side of the housing points so, an axis of the record is reversed "
+            "or exchanged: correct `channels` below, where a minus before a name turns it round."
+        )
     page.key(
         "angles_deg",
         array([sitting.roll_deg, sitting.pitch_deg, facing.heading_deg]),
         what=f"heading of '{plain(unit.name)}', deg: {facing.why.removeprefix(ONLY)}",
+        check=""
+        if came is None
+        else f"'{plain(unit.name)}' faces so that the blow came from {side_of(came)}",
     )
 
 
@@ -126,21 +138,20 @@ def _trigger(page: Page, unit: Unit) -> None:
             f"samples; what it shows of the change of velocity, {impact.largest / KMH:.2g} km/h "
             "within 150 ms, is therefore too little"
         )
-        page.key(
-            "trigger_s", number(impact.trigger, 7), "assumed: where its largest pulse begins, s"
-        )
+        page.key("trigger_s", instant(impact.trigger), "assumed: where its largest pulse begins, s")
         page.key("trigger_sd_s", "0.01", "assumed, s")
         return
     if not impact.found:
         page.say(
             "No crash was found: the largest change of the horizontal velocity within 150 ms is "
             f"{impact.largest / KMH:.2g} km/h, and 49 CFR 563 asks for 8. The largest "
-            f"acceleration, {in_words(impact.peak, 'acceleration')}, is at {impact.trigger:.6g} s."
+            f"acceleration, {in_words(impact.peak, 'acceleration')}, is at "
+            f"{instant(impact.trigger)} s."
         )
         page.key(
             "trigger_s",
             ASK,
-            f"only you know: the instant on this unit's clock, s, e.g. {impact.trigger:.6g}",
+            f"only you know: the instant on this unit's clock, s, e.g. {instant(impact.trigger)}",
             what=f"instant of the impact on the clock of '{plain(unit.name)}', s",
         )
         page.key("trigger_sd_s", "0.01", "assumed, s")
@@ -150,7 +161,7 @@ def _trigger(page: Page, unit: Unit) -> None:
     else:
         page.key(
             "trigger_s",
-            number(impact.trigger, 7),
+            instant(impact.trigger),
             "found: time zero by 49 CFR 563, s on this unit's clock; if it stamped its trigger, "
             "write that instant",
         )
@@ -169,7 +180,7 @@ def _trigger(page: Page, unit: Unit) -> None:
         kind = {"still": "at rest", "steady": "steady, though perhaps moving"}[impact.grade]
         length = impact.rest[1] - impact.rest[0]
         page.say(
-            f"found: it was {kind} from {impact.rest[0]:.6g} to {impact.rest[1]:.6g} s, "
+            f"found: it was {kind} from {instant(impact.rest[0])} to {instant(impact.rest[1])} s, "
             f"{length:.3g} s; to name another, counted from the trigger: rest_s = [from, to]"
         )
 
@@ -192,8 +203,13 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
     page.table(header)
     if words:
         page.say(f"{words}")
+    if part.remarks and part is _first_of_its_file(part, unit):
+        page.say(
+            "The record says above its table; see whether it says axes, range or rate:",
+            *(f"   {plain(r)}" for r in part.remarks),
+        )
     page.key("path", string(part.path))
-    page.key("channels", inline(part.channels), f"found: {part.why.split('; ')[0]}")
+    _channels(page, unit, part)
     missing = [a for a in "xyz" if a not in part.channels]
     if missing:
         page.say(f"found: nothing of {', '.join(missing)} in the record")
@@ -220,6 +236,8 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
             "would make it a crash of a usual length",
             what=f"samples a second of {plain(part.path)}",
         )
+    elif part.clock.stated:
+        page.key("rate_hz", number(part.clock.rate), f"found: {plain(part.clock.why)}")
     how = "; ".join(part.why.split("; ")[1:])
     if part.unit:
         page.key("unit", string(part.unit), f"found: {how}" if how else "found")
@@ -246,6 +264,51 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
             f"found: it stood at the end of its range in {ends.samples} samples: {', '.join(stood)}"
         )
     _sensor(page, part, ends, unit)
+
+
+def _channels(page: Page, unit: Unit, part: Part) -> None:
+    why = f"found: {part.why.split('; ')[0]}"
+    turn = turn_after(unit) if part is unit.gyro else None
+    if turn is None or abs(turn) < LEAST_TURN:
+        page.key("channels", inline(part.channels), why)
+        return
+    so, other = in_turn_words(turn), in_turn_words(-turn)
+    sitting = unit.impact.sitting
+    axis = sitting.along.lstrip("-") if sitting else ""
+    vertical = part.channels.get(axis, "")
+    # Of yaw, pitch and roll some count to the left and some to the right.
+    if vertical and re.search(r"yaw|gier|pitch|nick", " ".join(part.channels.values()).lower()):
+        page.say(
+            why,
+            f'only you know: write "{vertical}", and in the half second after the blow the vehicle '
+            f'turned {so}, seen from above; write "{_turned(vertical)}", and it turned {other}. '
+            "Makers count yaw and pitch either way: with a minus here put one before the pitch "
+            "rate, too.",
+        )
+        asked = {**part.channels, axis: "?"}
+        page.key(
+            "channels",
+            inline(asked),
+            what=f'{axis}: "{plain(vertical)}" if after the blow the vehicle turned to the '
+            f'{so.split()[-1]} ({so}), "-" before it if to the {other.split()[-1]}',
+        )
+        return
+    page.key(
+        "channels",
+        inline(part.channels),
+        why,
+        check=f"in the half second after the blow '{plain(unit.name)}' turned {so}, seen from "
+        "above",
+    )
+
+
+def _turned(name: str) -> str:
+    return name[1:] if name.startswith("-") else f"-{name}"
+
+
+def _first_of_its_file(part: Part, unit: Unit) -> Part:
+    parts = [*unit.accelerometers, *((unit.gyro,) if unit.gyro else ())]
+    return next(p for p in parts if p.path == part.path)
 
 
 def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
