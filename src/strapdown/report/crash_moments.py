@@ -58,7 +58,7 @@ def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
 
 def assumed_axes(unit: UnitReconstruction) -> tuple[str, ...]:
     """What of forward, right, down, roll, pitch, heading no sensor of a unit has measured."""
-    return tuple(getattr(unit.at_point, "assumed_axes", ()))
+    return unit.at_point.assumed_axes
 
 
 def main_event(unit: UnitReconstruction) -> int | None:

@@ -47,6 +47,7 @@ __all__ = ["UnitSignals", "unit_signals"]
 
 _AXES = ("forward", "right", "down")
 _TURNS = ("roll", "pitch", "yaw")
+_ANGLES = ("roll", "pitch", "heading")
 _RAW = ((GREY, "solid"), (SKY, "dash"), (GREY, "dot"))
 
 
@@ -197,6 +198,7 @@ def _rates(
     prepared = unit.at_point.prepared
     assert prepared is not None
     degree, there = math.radians(1.0), synchronised.gyro
+    assumed = assumed_axes(unit)
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     flags = (time, np.asarray(prepared.gyro_clipped))
     if there is not None:
@@ -222,6 +224,7 @@ def _rates(
         tuple(
             Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
             for k, turn in enumerate(_TURNS)
+            if _ANGLES[k] not in assumed
         ),
     )
 
@@ -234,7 +237,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
     assumed = assumed_axes(unit)
     for label, columns, scale, named in (
         ("specific force, g", ACCEL, STANDARD_GRAVITY, _AXES),
-        ("rate, deg/s", GYRO, math.radians(1.0), ("roll", "pitch", "heading")),
+        ("rate, deg/s", GYRO, math.radians(1.0), _ANGLES),
     ):
         values = prepared.imu[columns].to_numpy(dtype=np.float64) / scale
         lines = [

@@ -72,10 +72,13 @@ def test_the_band_of_delta_v_is_the_bound_at_an_exact_time():
 
 def test_a_stated_delta_v_is_laid_over_with_its_bound():
     result = crash_case()
-    spec = result.references[1].spec
+    stated = result.references[1]
+    spec = stated.spec
     panel = figures_of().delta_v[0].panels[0]
     point = line(panel, "EDR")
-    assert (point.x[0], point.y[0]) == pytest.approx((1e3 * spec.at_s, 3.6 * spec.delta_v_m_per_s))
+    assert (point.x[0], point.y[0]) == pytest.approx(
+        (1e3 * stated.span[1], 3.6 * spec.delta_v_m_per_s)
+    )
     bar = [one for one in panel.lines if one.name == "bar"][-1]
     assert np.ptp(bar.y) == pytest.approx(2 * TWO_SIDED_95 * 3.6 * 0.3)
 
