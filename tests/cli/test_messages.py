@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_case import CASE_FILES, TEXT
 from bad_crash import CRASH_CALLS
+from bad_crash_case import CRASH_CASES
 from bad_crash_records import RECORD_CALLS
 from bad_inputs import CASES
 from bad_navigation import CALLS
@@ -56,6 +58,13 @@ of both. Here the differences are from this file, whose records are beside it:
 
 """
 
+CRASH_COMMAND = """## strapdown crash
+
+Each is the folder that `strapdown simulate pole` writes, with one thing changed, given to
+`strapdown crash case.toml`. Where it can be used, the notes stand in the report, too.
+
+"""
+
 RECORDS = """## From Python: crash records
 
 Each record is a small file with one fault; its channels are asked for as a case asks for them, by
@@ -65,7 +74,7 @@ Each record is a small file with one fault; its channels are asked for as a case
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory, run_cli):
+def page(tmp_path_factory, run_cli, crash_said):
     """The page as the command line would fill it now."""
     sections = []
     for number, case in enumerate(CASES):
@@ -89,7 +98,45 @@ def page(tmp_path_factory, run_cli):
             + (f"With `{words}`:\n\n" if words else "")
             + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
         )
-    return HEAD + "".join(sections) + _from_python()
+    return HEAD + "".join(sections) + _crash_cases(crash_said) + _from_python()
+
+
+@pytest.fixture(scope="module")
+def crash_said(tmp_path_factory, run_cli):
+    """What `strapdown crash` says of each case, and its exit code."""
+    import strapdown.report.crash_case as module
+
+    root = tmp_path_factory.mktemp("crash-cases")
+    assert run_cli("simulate", "pole", "-q", "--out", root / "pole").code == 0
+    said = []
+    with pytest.MonkeyPatch.context() as patch:
+        # The drawing says nothing, and takes most of the time.
+        patch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
+        patch.setattr(module, "document_page", lambda document, stills: "<html></html>")
+        patch.setattr(module, "write_pdf", lambda document, path, stills: path.write_bytes(b""))
+        for number, bad in enumerate(CRASH_CASES):
+            folder = root / str(number)
+            case = bad.make(root / "pole", folder)
+            before = sorted(p.name for p in root.rglob("*"))
+            done = run_cli("crash", case, "--out", root / "out")
+            assert done.code == bad.code, (bad.title, done.err)
+            assert "Traceback" not in done.err
+            if bad.code:
+                assert sorted(p.name for p in root.rglob("*")) == before, "something was left"
+                assert done.out == ""
+            else:
+                assert (root / "out" / "manifest.json").is_file()
+                shutil.rmtree(root / "out")
+            said.append((bad, done.err.replace(str(folder) + os.sep, ""), done.code))
+            shutil.rmtree(folder)
+    return said
+
+
+def _crash_cases(crash_said):
+    return CRASH_COMMAND + "".join(
+        f"### {bad.title}\n\n{bad.what}\n\n```text\n{said}```\n\nExit code {code}.\n\n"
+        for bad, said, code in crash_said
+    )
 
 
 def _from_python() -> str:

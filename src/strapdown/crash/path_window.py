@@ -75,4 +75,4 @@ def _usual(time: Array, at: float) -> tuple[float, float]:
 def _overlap(begin: float, end: float, time: Array) -> str:
     low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
     high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
-    return f": window=({low:g}, {high:g})" if low < high else ""
+    return f": {low:g} to {high:g} s" if low < high else ""

@@ -190,11 +190,15 @@ def common_edges(
     last = min(float(u.time[-1]) for u in units)
     start, end = (max(first, -0.1), min(last, 0.75)) if window is None else window
     if not first <= start < end <= last:
+        begins = next(u.name for u in units if u.time[0] == first)
+        ends = next(u.name for u in units if u.time[-1] == last)
+        wanted = (-0.1, 0.75) if window is None else window
         raise DataError(
             f"{', '.join(u.name for u in units)} share {first:.5g} to {last:.5g} s, which does not "
-            f"cover {start:.5g} to {end:.5g} s",
+            f"cover {wanted[0]:.5g} to {wanted[1]:.5g} s: {begins} begins last, {ends} ends first",
             quantity="window",
-            remedy="give a window within what they share, and look whether the clocks agree",
+            remedy=f"look whether a record of {ends} is cut off, or of {begins} begins late, and "
+            "whether their triggers are right; else give a window within what they share",
         )
     coarsest = max(float(np.median(np.diff(u.time))) for u in units)
     most = int((end - start) / (2.0 * coarsest))

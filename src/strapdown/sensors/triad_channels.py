@@ -267,7 +267,7 @@ def _judge_force(
     length = float(np.linalg.norm(_quiet_mean(unit, groups)))
     if IN_G[0] <= length <= IN_G[1]:
         what = f"its specific force before the crash is {length:.3f} in length: gravity in g"
-        remedy = "multiply the columns by 9.80665, so that they are in m/s²"
+        remedy = "state the unit g in the record's header or in the case, or multiply by 9.80665"
         if max(triad.uncertainty.axis("bias")) < BIAS_SPEAKS:
             raise DataError(what, file=source, quantity="accel", remedy=remedy)
         found.append(
@@ -300,7 +300,7 @@ def _judge_rate(
             f"{largest / DEGREES:.4g} rad/s",
             file=source,
             quantity="gyro",
-            remedy="multiply the columns by π/180, so that they are in rad/s",
+            remedy="state the unit deg/s in the record's header or in the case, or multiply by π/180",
         )
     return _over_range(source, triad, groups, "rad/s", "deg/s instead of rad/s?")
 

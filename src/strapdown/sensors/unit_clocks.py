@@ -143,7 +143,7 @@ def _trigger_within(u: UnitChannels) -> float:
             f"{end:.6g} s",
             file=u.unit.name,
             quantity="trigger",
-            remedy="give the instant on this unit's own clock, in s",
+            remedy="give the instant on this unit's own clock, in s: trigger_s of a case",
         )
     return trigger
 

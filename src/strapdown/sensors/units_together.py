@@ -118,7 +118,8 @@ def compare_sizes(
                     "deg/s would be 57.3 times as many",
                     file=other,
                     quantity="gyro",
-                    remedy="multiply the columns by π/180, so that they are in rad/s",
+                    remedy="state the unit deg/s in the record's header or in the case, or multiply by "
+                    "π/180",
                 )
     forces = [(force[-1].source, _spread(force[-1])) for _, force in units if force]
     return [
