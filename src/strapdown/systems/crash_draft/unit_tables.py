@@ -221,6 +221,9 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
                 string(part.clock.unit),
                 f"found: {part.clock.rate:.5g} samples a second",
             )
+            if part.clock.stated:
+                why = part.clock.why.split("; ")[-1]
+                page.key("rate_hz", number(part.clock.rate, 9), f"found: {why}")
         else:
             page.key(
                 "time_unit",
