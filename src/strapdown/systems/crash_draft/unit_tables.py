@@ -68,9 +68,15 @@ def unit_tables(page: Page, unit: Unit, facing: Facing, units: Sequence[Unit]) -
         f"{where}only you know: m forward, right, down from the origin, e.g. [0.62, -0.45, 0.2]",
         what=f"where '{plain(unit.name)}' sits, m forward, right, down",
     )
-    page.key("position_sd_m", "0.02", "assumed: measured with a tape, m")
+    page.key(
+        "position_sd_m", "0.02", "assumed: measured with a tape, m; by eye or from photographs 0.2"
+    )
     _angles(page, unit, facing)
-    page.key("angles_sd_deg", "1.0", "assumed: bolted along the vehicle's axes, deg")
+    page.key(
+        "angles_sd_deg",
+        "1.0",
+        "assumed: bolted along the vehicle's axes, deg; set down by eye 3 to 5",
+    )
     _trigger(page, unit)
     if unit.gyro is None and unit.gyro_from:
         page.key(
