@@ -85,6 +85,18 @@ def read_crash_record(
     try:
         # Messages name a record by the last part of its path, which "." does not have.
         return _read(file if file.name not in ("", "..") else file.resolve(), format)
+    except DataError as error:
+        found = error.finding
+        # Options of the command that reads logs for their attitude.
+        if "--" not in f"{found.remedy}{found.quantity}":
+            raise
+        raise DataError(
+            found.what,
+            file=found.file,
+            row=found.row,
+            quantity=None if "--" in str(found.quantity) else found.quantity,
+            remedy="correct a copy of it, or give the record as CSV with a column a channel",
+        ) from error
     except (OSError, ValueError) as error:
         # A name that no file can have, a file that may not be read, a link that leads in a ring.
         raise DataError(

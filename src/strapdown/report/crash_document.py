@@ -25,7 +25,7 @@ from strapdown.report.document import (
     Picture,
     Section,
 )
-from strapdown.systems.case_remedies import case_finding
+from strapdown.systems.case_words import in_case_words
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["crash_document", "drawings"]
@@ -189,7 +189,7 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
     comparison = result.reconstruction.comparison
     assert comparison is not None
-    found = [case_finding(f) for f in comparison.findings]
+    found = [in_case_words(f) for f in comparison.findings]
     words = notes(found, result, remedies=False)
     remedies = dict.fromkeys(f.remedy for f in found if f.remedy)
     return _blocks(
@@ -225,7 +225,7 @@ def _limitations(result: CaseResult) -> tuple[Block, ...]:
 
 def _findings(result: CaseResult) -> tuple[Block, ...]:
     comparison = result.reconstruction.comparison
-    told = [] if comparison is None else [case_finding(f) for f in comparison.findings]
+    told = [] if comparison is None else [in_case_words(f) for f in comparison.findings]
     rows = notes([f for f in result.findings if f not in told], result)
     if not rows:
         return (Paragraph("Nothing was noticed in the records that a reader should know."),)

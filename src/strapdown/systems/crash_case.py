@@ -20,9 +20,9 @@ from strapdown.results import InputFiles
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.case_references import ReferenceAnswer, compare_reference
-from strapdown.systems.case_remedies import case_finding
 from strapdown.systems.case_severity import SeverityAnswer, case_severity
 from strapdown.systems.case_units import case_unit
+from strapdown.systems.case_words import in_case_words, saying_case_words
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.systems.one_thread import one_thread
 
@@ -110,20 +110,21 @@ def run_case(
     inputs = _inputs(spec, case_file, records)
     progress("reconstructing", 0.15)
     options = spec.options
-    made = reconstruct_crash(
-        units,
-        entry,
-        point=spec.point.position_m,
-        window=options.window_s,
-        rate=options.rate_hz,
-        sampling=options.sampling,
-        clock=options.clock,
-        combine=options.combine,
-        preparation=_preparation(spec),
-        peak_window=options.peak_window_s,
-        rule=EventRule(zero_at=options.zero_at),
-        gravity=options.gravity_m_per_s2,
-    )
+    with saying_case_words():
+        made = reconstruct_crash(
+            units,
+            entry,
+            point=spec.point.position_m,
+            window=options.window_s,
+            rate=options.rate_hz,
+            sampling=options.sampling,
+            clock=options.clock,
+            combine=options.combine,
+            preparation=_preparation(spec),
+            peak_window=options.peak_window_s,
+            rule=EventRule(zero_at=options.zero_at),
+            gravity=options.gravity_m_per_s2,
+        )
     findings += made.findings
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed)
@@ -142,7 +143,7 @@ def run_case(
         samples,
         case_severity(spec, made.main),
         references,
-        tuple(dict.fromkeys(map(case_finding, findings))),
+        tuple(dict.fromkeys(map(in_case_words, findings))),
     )
 
 
@@ -229,6 +230,9 @@ def _preparation(spec: CaseSpec) -> dict[str, dict[str, object]]:
     made: dict[str, dict[str, object]] = {}
     for unit in spec.units:
         own: dict[str, object] = {}
+        if spec.entry.kind == "standstill":
+            # What is quiet was at rest, and not at a constant speed.
+            own["moving_at_impact"] = False
         if unit.rest_s is not None:
             own["rest"] = unit.rest_s
         if unit.levelling_deg is not None:

@@ -67,7 +67,11 @@ def vehicle_table(page: Page, facts: Mapping[str, str]) -> None:
     mass = _fact(facts, "mass_kg")
     if mass is None:
         page.key(
-            "mass_kg", ASK, "only you know: as it was driven, in kg, e.g. 1450", what="mass, kg"
+            "mass_kg",
+            ASK,
+            "only you know: as it was driven, in kg, e.g. 1450; no answer depends on it: delete "
+            "the line if it is not known",
+            what="mass, kg; delete the line if it is not known",
         )
     else:
         page.key("mass_kg", number(mass), "found: in the record, as tested, kg")
@@ -101,15 +105,18 @@ def entry_table(page: Page, facts: Mapping[str, str], units: Sequence[Unit]) -> 
         page.key(
             "speed_km_per_h",
             ASK,
-            "only you know: forward, km/h, e.g. 25.6",
+            "only you know: of the vehicle that the records are of, forward, km/h, e.g. 25.6",
             what="entry speed, km/h",
         )
         page.key(
             "speed_sd_km_per_h",
             ASK,
-            "only you know: standard deviation, km/h: two thirds of all such values are within it, "
-            "e.g. 0.4 for a light barrier",
-            what="its standard deviation, km/h",
+            "only you know: how far off it may be, as a standard deviation, km/h: the truth is "
+            "within it in two of three cases, within twice it in nineteen of twenty; e.g. 0.5 for "
+            "a light gate, 1 for a tachograph or the car's own data, 3 from a video, 5 from skid "
+            "marks",
+            what="how far off it may be (its standard deviation), km/h: e.g. 0.5 light gate, 3 "
+            "video, 5 skid marks",
         )
         page.key(
             "source",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,15 @@ from strapdown.systems.crash_draft.triad_kind import pulse_samples
 
 Array = NDArray[np.float64]
 
-__all__ = ["find_clock", "likely_rate"]
+__all__ = ["evenly", "find_clock", "likely_rate"]
 
 RATES = (50.0, 100.0, 200.0, 400.0, 500.0, 1000.0, 2000.0, 5000.0, 10_000.0, 20_000.0)
 # Four fifths of the power of a frontal impact, s.
 USUAL_PULSE = 0.06
 
+# Steps that differ by less than this of their mean are even; rounding moves a stamp by no more than
+# twice what it moves a step, as the line goes through two that are rounded, and a step not twice.
+EVEN, ROUNDED, STEP = 0.01, 2.0, 1.05
 # Steps of a clock stay within this of their median, but for as many as this part of them.
 REGULAR, IRREGULAR_PART = 0.5, 0.05
 # Rates at which what happens in a crash is recorded; a sum that grows is no clock.
@@ -110,6 +114,39 @@ def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock,
             "if it counts samples, delete `time` and `time_unit` and write `rate_hz` instead"
         )
     return Clock(name, "", why, step, rate, "; ".join(kinds)), values * TIME_UNITS[best]
+
+
+def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
+    """Stamps that are rounded, or written late, made even; others as they are.
+
+    Parameters
+    ----------
+    clock : Clock
+    time : ndarray, (n,), s
+
+    Returns
+    -------
+    clock : Clock
+        With `stated` where the case must state the rate.
+    time : ndarray, (n,), s
+
+    Notes
+    -----
+    The stamps of an even clock that are rounded to q stay within q of it, and their steps differ
+    by q. Several samples that are missing bend the line by more.
+    """
+    count = np.arange(time.size)
+    steps = np.diff(time)
+    mean = float((time[-1] - time[0]) / max(time.size - 1, 1))
+    spread = float(np.ptp(steps)) if steps.size else 0.0
+    if not clock.unit or spread <= EVEN * mean:
+        return clock, time
+    off = time - time[0] - count * mean
+    if float(np.ptp(off)) > ROUNDED * spread or spread > STEP * mean:
+        return clock, time
+    told = f"its stamps are rounded: evenly spaced within {1e3 * float(np.ptp(off)):.2g} ms"
+    even = replace(clock, rate=1.0 / mean, stated=True, why=f"{clock.why}; {told}")
+    return even, time[0] + count * mean
 
 
 def _whole(values: Array) -> NDArray[np.float64] | NDArray[np.int64]:

@@ -17,7 +17,7 @@ from strapdown.formats.stamps import EPOCH
 from strapdown.systems.crash_draft.header_words import Heading, read_heading
 from strapdown.systems.crash_draft.parts import Part, Skipped
 from strapdown.systems.crash_draft.stated_rate import stated_rate
-from strapdown.systems.crash_draft.table_clock import find_clock, likely_rate
+from strapdown.systems.crash_draft.table_clock import evenly, find_clock, likely_rate
 from strapdown.systems.crash_draft.table_triads import group_columns
 
 Array = NDArray[np.float64]
@@ -95,6 +95,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         stamps = (
             time - time[0] + (raw - last_midnight(raw, factor)) * factor if far else time + origin
         )
+        clock, stamps = evenly(clock, stamps)
     others = {n: v for n, v in table.columns.items() if n != clock.column}
     groups, left = group_columns(others, table.headings)
     skipped += [Skipped(path, f"column '{name}'", why, (name,)) for name, why in left]

@@ -68,9 +68,15 @@ def unit_tables(page: Page, unit: Unit, facing: Facing, units: Sequence[Unit]) -
         f"{where}only you know: m forward, right, down from the origin, e.g. [0.62, -0.45, 0.2]",
         what=f"where '{plain(unit.name)}' sits, m forward, right, down",
     )
-    page.key("position_sd_m", "0.02", "assumed: measured with a tape, m")
+    page.key(
+        "position_sd_m", "0.02", "assumed: measured with a tape, m; by eye or from photographs 0.2"
+    )
     _angles(page, unit, facing)
-    page.key("angles_sd_deg", "1.0", "assumed: bolted along the vehicle's axes, deg")
+    page.key(
+        "angles_sd_deg",
+        "1.0",
+        "assumed: bolted along the vehicle's axes, deg; set down by eye 3 to 5",
+    )
     _trigger(page, unit)
     if unit.gyro is None and unit.gyro_from:
         page.key(
@@ -221,6 +227,9 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
                 string(part.clock.unit),
                 f"found: {part.clock.rate:.5g} samples a second",
             )
+            if part.clock.stated:
+                why = part.clock.why.split("; ")[-1]
+                page.key("rate_hz", number(part.clock.rate, 9), f"found: {why}")
         else:
             page.key(
                 "time_unit",
@@ -308,7 +317,8 @@ def _turned(name: str) -> str:
 
 def _first_of_its_file(part: Part, unit: Unit) -> Part:
     parts = [*unit.accelerometers, *((unit.gyro,) if unit.gyro else ())]
-    return next(p for p in parts if p.path == part.path)
+    first: Part = next(p for p in parts if p.path == part.path)
+    return first
 
 
 def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
