@@ -24,6 +24,7 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     Section,
+    TableBlock,
 )
 from strapdown.systems.case_remedies import case_finding
 from strapdown.systems.crash_case import CaseResult
@@ -68,15 +69,17 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         Section(
             "delta-v",
             "Delta-V",
-            _blocks(tables.answers_table(result), *_charts(*figures.delta_v)),
+            _blocks(_if_any(tables.answers_table(result)), *_charts(*figures.delta_v))
+            or (Paragraph(headline(result)),),
         ),
         Section(
             "direction",
             "Direction of force",
             _blocks(
-                tables.direction_table(result),
+                _if_any(tables.direction_table(result)),
                 *_charts(figures.pdof_by_window, figures.pdof_by_time_zero),
-            ),
+            )
+            or (Paragraph("Without an event there is no direction of force to tell."),),
         ),
         Section(
             "path",
@@ -140,6 +143,10 @@ def _blocks(*found: Block | None) -> tuple[Block, ...]:
     return tuple(block for block in found if block is not None)
 
 
+def _if_any(table: TableBlock) -> TableBlock | None:
+    return table if table.rows else None
+
+
 def _charts(*found: Chart | None) -> tuple[ChartBlock, ...]:
     return tuple(ChartBlock(chart) for chart in found if chart is not None)
 
@@ -178,9 +185,7 @@ def _case(result: CaseResult) -> tuple[Block, ...]:
         rows = record_facts(record)
         if rows:
             facts += [Paragraph(f"What {record.path.name} says of itself:"), Facts(rows)]
-    return _blocks(
-        *described, Paragraph(headline(result), "note"), sources.records_table(result), *facts
-    )
+    return _blocks(*described, sources.records_table(result), *facts)
 
 
 def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:

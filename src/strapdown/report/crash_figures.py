@@ -50,7 +50,7 @@ class CrashFigures:
     ----------
     front : tuple of Picture
         For page one: direction of force of every event on a clock about the vehicle, where it came
-        from, 0 the front, positive clockwise, 95 % as a wedge; and the path, small.
+        from, 0 the front, positive clockwise, 95 % as a wedge, if any; and the path, small.
     path : Picture
         From above, m; ellipses of 95 %; outlines at the entry, time zero, event ends and end.
     signals : tuple of UnitSignals
@@ -169,12 +169,10 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     by_name = {unit.name: unit for unit in result.units}
     return CrashFigures(
         front=(
-            pdof_dial(
-                outline,
-                _directions(main, which),
-                point=point,
-                point_name=spec.point.name,
-                small=True,
+            *(
+                pdof_dial(outline, directions, point=point, point_name=spec.point.name, small=True)
+                for directions in [_directions(main, which)]
+                if directions
             ),
             path_plan(path, outline, small=True, **seen),
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -62,7 +63,7 @@ def _run(name, units, window, end):
     entry = Entry.from_speed(speed, SPEED_SD)
     found = reconstruct_crash(recorded, entry, window=window)
     path = found.main.path
-    references = [_path_reference(crash, impact, path)]
+    references = [_path_reference(crash, impact, found.main)]
     severity = []
     if found.main.body:
         change = found.main.body[0].event
@@ -72,13 +73,15 @@ def _run(name, units, window, end):
             name="EDR",
             delta_v_m_per_s=forward - 0.2,
             delta_v_sd_m_per_s=0.3,
-            at_s=end_time,
+            over_s=(float(change.delta_v.start), end_time),
         )
-        references.append(ReferenceAnswer(spec, None, None, forward, 0.1, True))
+        references.append(
+            ReferenceAnswer(spec, found.main.name, None, None, spec.over_s, forward, 0.1, True)
+        )
         model = find_severity_model("wang_2022_all_mais3")
         sd = change.bound.along(change.delta_v.vector)
         risk = injury_risk(model, {"delta_v": change.resultant}, {"delta_v": sd})
-        severity.append(SeverityAnswer(model.name, model.source, model.outcome, risk))
+        severity.append(SeverityAnswer(model, risk))
     spec = CaseSpec(
         title=f"simulated {name}",
         point=PointSpec(name="centre of mass"),
@@ -101,13 +104,17 @@ def _run(name, units, window, end):
     )
 
 
-def _path_reference(crash, impact, path):
+def _path_reference(crash, impact, main):
+    path = main.path
     time = np.arange(-0.05, min(0.3, path.time[-1]), 0.01)
     truth = MountedMotion(crash.motion, Mounting()).kinematics_from(time + impact, epoch=impact)
     table = pd.DataFrame(truth.position + 2.0, index=pd.Index(time, name="time"), columns=NED)
     spec = ReferenceSpec(kind="path", name="cameras", path="cameras.csv")
     compared = compare_with_reference(path, table)
-    return ReferenceAnswer(spec, table, compared, np.nan, np.nan, compared.consistent)
+    whole = (math.nan, math.nan)
+    return ReferenceAnswer(
+        spec, main.name, table, compared, whole, math.nan, math.nan, compared.consistent
+    )
 
 
 @cache

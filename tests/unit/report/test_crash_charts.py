@@ -74,7 +74,8 @@ def test_a_stated_delta_v_is_laid_over_with_its_bound():
     spec = result.references[1].spec
     panel = figures_of().delta_v[0].panels[0]
     point = line(panel, "EDR")
-    assert (point.x[0], point.y[0]) == pytest.approx((1e3 * spec.at_s, 3.6 * spec.delta_v_m_per_s))
+    at = 1e3 * spec.over_s[1]
+    assert (point.x[0], point.y[0]) == pytest.approx((at, 3.6 * spec.delta_v_m_per_s))
     bar = [one for one in panel.lines if one.name == "bar"][-1]
     assert np.ptp(bar.y) == pytest.approx(2 * TWO_SIDED_95 * 3.6 * 0.3)
 

@@ -347,7 +347,7 @@ def test_the_conventions_show_where_units_and_point_are():
 
 def test_names_from_outside_are_text_and_nothing_else():
     result = crash_case()
-    spec = result.spec.model_copy(update={"point": PointSpec(name=HOSTILE)})
+    spec = result.spec.model_copy(update={"point": PointSpec.model_construct(name=HOSTILE)})
     answer = result.references[0]
     named = replace(answer, spec=answer.spec.model_copy(update={"name": HOSTILE}))
     units = [MountingPoint(HOSTILE, (0.0, 0.0, 0.0), 0)]
