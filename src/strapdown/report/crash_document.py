@@ -11,7 +11,7 @@ from strapdown.report.crash_assumptions import CONVENTIONS, assumptions, how_to_
 from strapdown.report.crash_figures import CrashFigures
 from strapdown.report.crash_limits import limitations
 from strapdown.report.crash_notes import notes, record_facts
-from strapdown.report.crash_values import plain
+from strapdown.report.crash_values import GAP, plain
 from strapdown.report.crash_words import headline, key_figures, lead
 from strapdown.report.document import (
     Animation,
@@ -166,7 +166,9 @@ def _place(position: tuple[float, float, float]) -> str:
 
 def _vehicle(result: CaseResult) -> str:
     vehicle = result.spec.vehicle
-    size = f"{vehicle.length_m:g} m × {vehicle.width_m:g} m" if not vehicle.outline_m else ""
+    size = ""
+    if not vehicle.outline_m:
+        size = f"{vehicle.length_m:g} m × {vehicle.width_m:g} m".replace(" ", GAP)
     mass = "" if vehicle.mass_kg is None else f"{vehicle.mass_kg:g} kg"
     return ", ".join(part for part in (vehicle.name, mass, size) if part)
 
