@@ -11,7 +11,7 @@ from strapdown.report.crash_assumptions import CONVENTIONS, assumptions, how_to_
 from strapdown.report.crash_figures import CrashFigures
 from strapdown.report.crash_limits import limitations
 from strapdown.report.crash_notes import notes, record_facts
-from strapdown.report.crash_values import plain
+from strapdown.report.crash_values import GAP, plain
 from strapdown.report.crash_words import headline, key_figures, lead
 from strapdown.report.document import (
     Animation,
@@ -24,6 +24,7 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     Section,
+    TableBlock,
 )
 from strapdown.systems.case_words import in_case_words
 from strapdown.systems.crash_case import CaseResult
@@ -68,15 +69,17 @@ def crash_document(result: CaseResult, figures: CrashFigures, name: str) -> Docu
         Section(
             "delta-v",
             "Delta-V",
-            _blocks(tables.answers_table(result), *_charts(*figures.delta_v)),
+            _blocks(_if_any(tables.answers_table(result)), *_charts(*figures.delta_v))
+            or (Paragraph(headline(result)),),
         ),
         Section(
             "direction",
             "Direction of force",
             _blocks(
-                tables.direction_table(result),
+                _if_any(tables.direction_table(result)),
                 *_charts(figures.pdof_by_window, figures.pdof_by_time_zero),
-            ),
+            )
+            or (Paragraph("Without an event there is no direction of force to tell."),),
         ),
         Section(
             "path",
@@ -140,6 +143,10 @@ def _blocks(*found: Block | None) -> tuple[Block, ...]:
     return tuple(block for block in found if block is not None)
 
 
+def _if_any(table: TableBlock) -> TableBlock | None:
+    return table if table.rows else None
+
+
 def _charts(*found: Chart | None) -> tuple[ChartBlock, ...]:
     return tuple(ChartBlock(chart) for chart in found if chart is not None)
 
@@ -159,7 +166,9 @@ def _place(position: tuple[float, float, float]) -> str:
 
 def _vehicle(result: CaseResult) -> str:
     vehicle = result.spec.vehicle
-    size = f"{vehicle.length_m:g} m × {vehicle.width_m:g} m" if not vehicle.outline_m else ""
+    size = ""
+    if not vehicle.outline_m:
+        size = f"{vehicle.length_m:g} m × {vehicle.width_m:g} m".replace(" ", GAP)
     mass = "" if vehicle.mass_kg is None else f"{vehicle.mass_kg:g} kg"
     return ", ".join(part for part in (vehicle.name, mass, size) if part)
 
@@ -178,9 +187,7 @@ def _case(result: CaseResult) -> tuple[Block, ...]:
         rows = record_facts(record)
         if rows:
             facts += [Paragraph(f"What {record.path.name} says of itself:"), Facts(rows)]
-    return _blocks(
-        *described, Paragraph(headline(result), "note"), sources.records_table(result), *facts
-    )
+    return _blocks(*described, sources.records_table(result), *facts)
 
 
 def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:

@@ -40,22 +40,21 @@ __all__ = ["CrashFigures", "crash_figures", "reference_in_path_axes"]
 
 @dataclass(frozen=True)
 class CrashFigures:
-    """Charts and pictures of one case, each with its own caption; None where there is none.
+    """Charts and pictures of one case, each with its caption; None where there is none.
 
-    Time is from the trigger, in ms (of the overviews in s). Every bound holds 95 %. Along the
-    turning axes of the vehicle: forward, right, down positive. Of the path: north, east, down, or
-    forward, right, down as the vehicle stood at the entry, where no heading was stated.
+    Time is from the trigger, ms (of overviews s). Every bound holds 95 %. Along the turning axes of
+    the vehicle: forward, right, down. Of the path: north, east, down, or, where no heading was
+    stated, forward, right, down as the vehicle stood at the entry.
 
     Attributes
     ----------
     front : tuple of Picture
         For page one: direction of force of every event on a clock about the vehicle, where it came
-        from, 0 the front, positive clockwise, 95 % as a wedge; and the path, small.
+        from, 0 the front, positive clockwise, 95 % as a wedge, if any; and the path, small.
     path : Picture
         From above, m; ellipses of 95 %; outlines at the entry, time zero, event ends and end.
     signals : tuple of UnitSignals
-        Of every unit, in the order of the case: specific force, g, and rates, deg/s, about the
-        crash, and the whole record.
+        Of every unit: specific force, g, and rates, deg/s, of the crash and the whole record.
     delta_v : tuple of Chart
         One an event: forward, right, down, resultant, km/h, of every unit and the mean.
     pdof_by_window, pdof_by_time_zero : Chart or None
@@ -67,15 +66,15 @@ class CrashFigures:
     references : tuple of Chart
         Path less each reference path, m, with the bound of both.
     units : Chart or None
-        Change of velocity of each unit less that of all, m/s; None for a single unit.
+        Change of velocity of each unit less that of all, m/s.
     accelerations : Chart or None
-        All units at the reference point, g; None for a single unit.
+        All units at the reference point, g.
     delta_v_budget : Chart or None
         Standard deviation by contributor, m/s, of the main event.
     place_budget : Chart
         The same of the end of the path, m.
     severity : Chart or None
-        Risk, %, against the change of velocity, km/h; None where no model answered.
+        Risk, %, against the change of velocity, km/h.
     conventions : Picture
         Axes, signs, origin, units and reference point on this vehicle.
     """
@@ -169,12 +168,10 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     by_name = {unit.name: unit for unit in result.units}
     return CrashFigures(
         front=(
-            pdof_dial(
-                outline,
-                _directions(main, which),
-                point=point,
-                point_name=spec.point.name,
-                small=True,
+            *(
+                pdof_dial(outline, directions, point=point, point_name=spec.point.name, small=True)
+                for directions in [_directions(main, which)]
+                if directions
             ),
             path_plan(path, outline, small=True, **seen),
         ),

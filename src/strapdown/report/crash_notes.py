@@ -38,7 +38,7 @@ def notes(
         Where, and what, with what can be done about it.
     """
     combined = result.reconstruction.combined
-    told: dict[tuple[str, str], tuple[str, list[str]]] = {}
+    told: dict[tuple[str, str], list[str]] = {}
     for finding in findings:
         file = finding.file or ""
         if combined is not None:
@@ -51,14 +51,22 @@ def notes(
         remedy = finding.remedy or "" if remedies else ""
         text = _sentence(finding.what) + (f" {_sentence(remedy)}" if remedy else "")
         place = ", ".join(r for r in rest if r)
-        # What differs in its numbers alone is said once, with those of the mean if it has them.
-        key = place, NUMBER.sub("#", text)
-        _, files = told.get(key, ("", []))
-        told[key] = text, [*files, file]
+        key = place, text
+        alike = [k for k in told if _alike(k, key)]
+        if file == MEAN and alike:
+            # What differs from the mean's in its numbers alone is said once, with those of it.
+            files = [f for k in alike for f in told.pop(k)]
+            told[key] = [*files, file]
+        else:
+            told.setdefault(key, []).append(file)
     return tuple(
         (": ".join(p for p in (_places(files), place) if p), text)
-        for (place, _), (text, files) in told.items()
+        for (place, text), files in told.items()
     )
+
+
+def _alike(first: tuple[str, str], second: tuple[str, str]) -> bool:
+    return [NUMBER.sub("#", t) for t in first] == [NUMBER.sub("#", t) for t in second]
 
 
 def _places(files: Sequence[str]) -> str:

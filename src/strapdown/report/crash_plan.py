@@ -39,8 +39,7 @@ _LOOKS = (
 )
 _ARROW = 44.0  # pixels
 _SMALL_CAPTION = "The vehicle at the instants named, in m from its place at the entry."
-_SLOW = 0.05  # m/s: below it there is no arrow
-_EVERY = 0.1  # s between dots
+_SLOW, _EVERY = 0.05, 0.1  # m/s, below it there is no arrow; s between dots
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +93,7 @@ def path_plan(
     Returns
     -------
     Picture
-        Where the path is short against the vehicle, it is drawn a second time, larger, if there is
-        the width.
+        A path short against the vehicle is drawn a second time, larger, if there is the width.
     """
     plan = _plan(path, events, reference)
     whole = _SMALL_WIDTH if small else _WIDTH
@@ -124,7 +122,6 @@ def path_plan(
         f"Path of the reference point from above: it ends {signed(float(end['north']), 2)} m "
         f"{names[0]}, {signed(float(end['east']), 2)} m {names[1]} of its place at the entry"
     )
-    speed = math.hypot(*path.entry.velocity[:2])
     out = Drawing(whole, bottom + 17.0 * len(legend) + 4.0, alt)
     view.draw_grid(out)
     _draw_band(out, view, plan)
@@ -151,7 +148,7 @@ def path_plan(
         out.arrow(tail_at.tolist(), tip.tolist(), VERMILLION, 2.6)
         middle = (0.5 * (tail_at + tip)).tolist()
         bodies = [_box(view.pixels(car.body)) for car in cars]
-        words = f"{signed(speed, 1)} m/s"
+        words = f"{signed(math.hypot(*path.entry.velocity[:2]), 1)} m/s"
         out.label(middle, words, 10.5, VERMILLION, away=9.0, avoid=bodies)
     if beside is not None:
         beside.draw_grid(out)

@@ -124,8 +124,8 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str]]:
             said = (
                 "a short stationary stretch",
                 f"{instant(still.end - still.start)} before the crash, from "
-                f"{instant(still.start)}: biases and levelling are known the less the shorter it is, and the bounds are so "
-                "much wider.",
+                f"{instant(still.start)}: biases and levelling are known the less the "
+                "shorter it is, and the bounds are so much wider.",
             )
         else:
             continue

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cache
 
 import numpy as np
@@ -15,9 +16,9 @@ from strapdown.config.crash_case import (
     TriadSpec,
     UnitSpec,
 )
-from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.entry import Entry
 from strapdown.crash.monte_carlo import sample_paths
+from strapdown.crash.reference_path import compare_with_reference
 from strapdown.crash.severity import find_severity_model
 from strapdown.crash.severity_model import injury_risk
 from strapdown.report.crash_figures import crash_figures
@@ -26,9 +27,7 @@ from strapdown.simulation.crash_recording import record_crash
 from strapdown.simulation.crash_scenarios import find_crash
 from strapdown.simulation.mounted_motion import MountedMotion
 from strapdown.simulation.paper_recorders import paper_units
-from strapdown.systems.case_references import compare_reference
-from strapdown.systems.case_severity import SeverityAnswer
-from strapdown.systems.crash_case import CaseResult
+from strapdown.systems.crash_case import CaseResult, ReferenceAnswer, SeverityAnswer
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED
 
@@ -68,14 +67,17 @@ def _run(name, units, window, end):
     severity = []
     if found.main.body:
         change = found.main.body[0].event
-        forward = float(change.delta_v.vector[0])
+        forward, end_time = float(change.delta_v.vector[0]), float(change.delta_v.end)
         spec = ReferenceSpec(
             kind="delta_v",
             name="EDR",
             delta_v_m_per_s=forward - 0.2,
             delta_v_sd_m_per_s=0.3,
+            over_s=(float(change.delta_v.start), end_time),
         )
-        references.append(compare_reference(spec, found.main, STANDARD_GRAVITY, {}))
+        references.append(
+            ReferenceAnswer(spec, found.main.name, None, None, spec.over_s, forward, 0.1, True)
+        )
         model = find_severity_model("wang_2022_all_mais3")
         sd = change.bound.along(change.delta_v.vector)
         risk = injury_risk(model, {"delta_v": change.resultant}, {"delta_v": sd})
@@ -102,12 +104,17 @@ def _run(name, units, window, end):
     )
 
 
-def _path_reference(crash, impact, unit):
-    time = np.arange(-0.05, min(0.3, unit.path.time[-1]), 0.01)
+def _path_reference(crash, impact, main):
+    path = main.path
+    time = np.arange(-0.05, min(0.3, path.time[-1]), 0.01)
     truth = MountedMotion(crash.motion, Mounting()).kinematics_from(time + impact, epoch=impact)
     table = pd.DataFrame(truth.position + 2.0, index=pd.Index(time, name="time"), columns=NED)
     spec = ReferenceSpec(kind="path", name="cameras", path="cameras.csv")
-    return compare_reference(spec, unit, STANDARD_GRAVITY, {"cameras.csv": table})
+    compared = compare_with_reference(path, table)
+    whole = (math.nan, math.nan)
+    return ReferenceAnswer(
+        spec, main.name, table, compared, whole, math.nan, math.nan, compared.consistent
+    )
 
 
 @cache

@@ -12,7 +12,6 @@ from tests.unit.report.crash_results import crash_case, figures_of
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.pdof_sensitivity import pdof_by_shift
-from strapdown.report import crash_signals
 from strapdown.report.chart import SERIES_COLOURS
 from strapdown.report.crash_budget import delta_v_budget
 from strapdown.report.crash_delta_v import delta_v_chart, delta_v_half_widths
@@ -72,13 +71,11 @@ def test_the_band_of_delta_v_is_the_bound_at_an_exact_time():
 
 def test_a_stated_delta_v_is_laid_over_with_its_bound():
     result = crash_case()
-    stated = result.references[1]
-    spec = stated.spec
+    spec = result.references[1].spec
     panel = figures_of().delta_v[0].panels[0]
     point = line(panel, "EDR")
-    assert (point.x[0], point.y[0]) == pytest.approx(
-        (1e3 * stated.span[1], 3.6 * spec.delta_v_m_per_s)
-    )
+    at = 1e3 * spec.over_s[1]
+    assert (point.x[0], point.y[0]) == pytest.approx((at, 3.6 * spec.delta_v_m_per_s))
     bar = [one for one in panel.lines if one.name == "bar"][-1]
     assert np.ptp(bar.y) == pytest.approx(2 * TWO_SIDED_95 * 3.6 * 0.3)
 
@@ -134,26 +131,6 @@ def test_signals_are_turned_into_vehicle_axes_and_missing_axes_spoil_no_other():
     assert math.isnan(turned[1, 0])
     flags = flags_in_vehicle_axes(np.array([[False, True, False]]), C)
     np.testing.assert_array_equal(flags, [[True, False, False]])
-
-
-def test_what_was_assumed_is_not_drawn_as_recorded(monkeypatch):
-    monkeypatch.setattr(crash_signals, "assumed_axes", lambda _: ("right", "roll"))
-    result = crash_case(units=ALONE)
-    found = result.reconstruction
-    recorded = result.units[0]
-    low = recorded.accelerometers[0]
-    bare = replace(low, table=low.table.drop(columns="accel_y"))
-    signals = crash_signals.unit_signals(
-        replace(recorded, accelerometers=(bare, *recorded.accelerometers[1:])),
-        found.synchronised.units[0],
-        found.units[0],
-        0,
-        found.units[0].events.events,
-    )
-    assert [p.y_label for p in signals.crash.panels] == ["forward, g", "down, g"]
-    assert [p.y_label for p in signals.rates.panels] == ["pitch, deg/s", "yaw, deg/s"]
-    assert [one.name for one in signals.overview.panels[0].lines] == ["forward", "down"]
-    assert "Not recorded but assumed, and not drawn: right." in signals.crash.caption
 
 
 def test_the_direction_by_window_goes_through_the_answer():
