@@ -95,8 +95,8 @@ def case_text(csv: Path, mme: Path) -> str:
     one["units"][1]["gyro_from"] = one["units"][0]["name"]
     (reference,) = one["references"]
     reference |= {"name": EVIL, "source": EVIL, "path": f"records/{CAMERAS}"}
-    stated = {"kind": "delta_v", "name": EVIL + "2", "source": EVIL, "axis": "forward",
-              "delta_v_m_per_s": -30.0, "delta_v_sd_m_per_s": 0.1, "over_s": [0.0, 0.1]}  # fmt: skip
+    stated = {"kind": "delta_v", "name": EVIL + "2", "source": EVIL, "axis": "forward"}
+    stated |= {"delta_v_m_per_s": -30.0, "delta_v_sd_m_per_s": 0.1, "over_s": [0.0, 0.1]}
     one["references"].append(stated)
     one["options"]["severity_inputs"] = {"age": 40.0, "gender": EVIL}
     one["options"]["monte_carlo_runs"] = 50
