@@ -119,44 +119,113 @@ def another_crash(folder: Path) -> None:
 GYRO_1 = 'channels = { x = "wx [deg/s]", y = "wy [deg/s]", z = "wz [deg/s]" }'
 
 CRASH_CASES = (
-    BadCase("A record that is not there", "imu2_gyro.csv is deleted.",
-            lambda f: (f / "imu2_gyro.csv").unlink(), 4),
+    BadCase(
+        "A record that is not there",
+        "imu2_gyro.csv is deleted.",
+        lambda f: (f / "imu2_gyro.csv").unlink(),
+        4,
+    ),
     BadCase("A record without a byte", "imu1_low_g.csv is empty.", empty("imu1_low_g.csv")),
-    BadCase("A record that is cut within a row", "imu1_high_g.csv ends within row 900.",
-            rows("imu1_high_g.csv", lambda x: [*x[:899], x[899][:20]])),
-    BadCase("A record that ends before the trigger", "IMU2's three records end 1 s before it.",
-            both(*(stamps(f"imu2_{p}.csv", lambda t: t < 4.75) for p in ("low_g", "high_g", "gyro")))),
-    BadCase("A record that ends within the crash", "IMU2's three records end 50 ms after the trigger.",
-            both(*(stamps(f"imu2_{p}.csv", lambda t: t < 5.8) for p in ("low_g", "high_g", "gyro"))), 0),
-    BadCase("No number within the crash", "Row 1416 of imu1_gyro.csv holds nan.",
-            rows("imu1_gyro.csv", field(1415, 3, "nan"))),
-    BadCase("Text for a number", "Row 1001 of imu1_gyro.csv holds n/a.",
-            rows("imu1_gyro.csv", field(1000, 3, "n/a"))),
-    BadCase("Time that runs backwards", "Row 1003 of imu2_low_g.csv stands before row 1002.",
-            rows("imu2_low_g.csv", lambda x: [*x[:1001], x[1002], x[1001], *x[1003:]])),
-    BadCase("A column that there is not", "The case names ax [g] of imu1_low_g.csv.",
-            case(('x = "ax [m/s2]"', 'x = "ax [g]"'))),
-    BadCase("Accelerations in g said to be in m/s²", "imu1_low_g.csv and imu1_high_g.csv hold g.",
-            both(scaled("imu1_low_g.csv", 1 / 9.80665), scaled("imu1_high_g.csv", 1 / 9.80665))),
-    BadCase("Accelerations in m/s² said to be in g", "imu1_low_g.csv and imu1_high_g.csv, unit = g.",
-            case(('time = "time [s]"', 'unit = "g"\ntime = "time [s]"')), 4),
-    BadCase("A gyro in deg/s said to be in rad/s", "The header of imu1_gyro.csv says rad/s.",
-            both(rows("imu1_gyro.csv", lambda x: ["time [s],wx [rad/s],wy [rad/s],wz [rad/s]", *x[1:]]),
-                 case((GYRO_1, GYRO_1.replace("deg/s", "rad/s"))))),
+    BadCase(
+        "A record that is cut within a row",
+        "imu1_high_g.csv ends within row 900.",
+        rows("imu1_high_g.csv", lambda x: [*x[:899], x[899][:20]]),
+    ),
+    BadCase(
+        "A record that ends before the trigger",
+        "IMU2's three records end 1 s before it.",
+        both(*(stamps(f"imu2_{p}.csv", lambda t: t < 4.75) for p in ("low_g", "high_g", "gyro"))),
+    ),
+    BadCase(
+        "A record that ends within the crash",
+        "IMU2's three records end 50 ms after the trigger.",
+        both(*(stamps(f"imu2_{p}.csv", lambda t: t < 5.8) for p in ("low_g", "high_g", "gyro"))),
+        0,
+    ),
+    BadCase(
+        "No number within the crash",
+        "Row 1416 of imu1_gyro.csv holds nan.",
+        rows("imu1_gyro.csv", field(1415, 3, "nan")),
+    ),
+    BadCase(
+        "Text for a number",
+        "Row 1001 of imu1_gyro.csv holds n/a.",
+        rows("imu1_gyro.csv", field(1000, 3, "n/a")),
+    ),
+    BadCase(
+        "Time that runs backwards",
+        "Row 1003 of imu2_low_g.csv stands before row 1002.",
+        rows("imu2_low_g.csv", lambda x: [*x[:1001], x[1002], x[1001], *x[1003:]]),
+    ),
+    BadCase(
+        "A column that there is not",
+        "The case names ax [g] of imu1_low_g.csv.",
+        case(('x = "ax [m/s2]"', 'x = "ax [g]"')),
+    ),
+    BadCase(
+        "Accelerations in g said to be in m/s²",
+        "imu1_low_g.csv and imu1_high_g.csv hold g.",
+        both(scaled("imu1_low_g.csv", 1 / 9.80665), scaled("imu1_high_g.csv", 1 / 9.80665)),
+    ),
+    BadCase(
+        "Accelerations in m/s² said to be in g",
+        "imu1_low_g.csv and imu1_high_g.csv, unit = g.",
+        case(('time = "time [s]"', 'unit = "g"\ntime = "time [s]"')),
+        4,
+    ),
+    BadCase(
+        "A gyro in deg/s said to be in rad/s",
+        "The header of imu1_gyro.csv says rad/s.",
+        both(
+            rows("imu1_gyro.csv", lambda x: ["time [s],wx [rad/s],wy [rad/s],wz [rad/s]", *x[1:]]),
+            case((GYRO_1, GYRO_1.replace("deg/s", "rad/s"))),
+        ),
+    ),
     BadCase("Two records of two crashes", "IMU2's record is of another crash.", another_crash, 0),
-    BadCase("A trigger outside of the record", "IMU2's trigger_s is that of IMU1's clock.",
-            case(("trigger_s = 5.749553 ", "trigger_s = 10.748534 "))),
-    BadCase("A window outside of the record", "window_s ends 5 s after the trigger.",
-            case(("rate_hz = 200.0", "window_s = [-0.1, 5.0]\nrate_hz = 200.0"))),
-    BadCase("An entry speed in km/h said to be in m/s", "speed_m_per_s = 25.5.",
-            case(("speed_m_per_s = 7.08 ", "speed_m_per_s = 25.5 ")), 0),
-    BadCase("A reference that does not cover the path", "cameras.csv begins 1.5 s after the trigger.",
-            both(rows("cameras.csv", lambda x: [x[0], *(f"{float(r.split(',')[0]) + 1.6:.6f},"
-                                                        + r.split(",", 1)[1] for r in x[1:])]))),
-    BadCase("A reference without a column that is needed", "cameras.csv has no column time.",
-            rows("cameras.csv", lambda x: [x[0].replace("time", "tame"), *x[1:]])),
-    BadCase("Two values that contradict each other", "The entry is a standstill with a speed.",
-            case(('kind = "speed"', 'kind = "standstill"')), 4),
-    BadCase("A position that contradicts the size of the vehicle", "IMU1 sits 6 m ahead.",
-            case(("position_m = [0.6, -0.5, 0.2]", "position_m = [6.0, -0.5, 0.2]")), 4),
-)  # fmt: skip
+    BadCase(
+        "A trigger outside of the record",
+        "IMU2's trigger_s is that of IMU1's clock.",
+        case(("trigger_s = 5.749553 ", "trigger_s = 10.748534 ")),
+    ),
+    BadCase(
+        "A window outside of the record",
+        "window_s ends 5 s after the trigger.",
+        case(("rate_hz = 200.0", "window_s = [-0.1, 5.0]\nrate_hz = 200.0")),
+    ),
+    BadCase(
+        "An entry speed in km/h said to be in m/s",
+        "speed_m_per_s = 25.5.",
+        case(("speed_m_per_s = 7.08 ", "speed_m_per_s = 25.5 ")),
+        0,
+    ),
+    BadCase(
+        "A reference that does not cover the path",
+        "cameras.csv begins 1.5 s after the trigger.",
+        both(
+            rows(
+                "cameras.csv",
+                lambda x: [
+                    x[0],
+                    *(f"{float(r.split(',')[0]) + 1.6:.6f}," + r.split(",", 1)[1] for r in x[1:]),
+                ],
+            )
+        ),
+    ),
+    BadCase(
+        "A reference without a column that is needed",
+        "cameras.csv has no column time.",
+        rows("cameras.csv", lambda x: [x[0].replace("time", "tame"), *x[1:]]),
+    ),
+    BadCase(
+        "Two values that contradict each other",
+        "The entry is a standstill with a speed.",
+        case(('kind = "speed"', 'kind = "standstill"')),
+        4,
+    ),
+    BadCase(
+        "A position that contradicts the size of the vehicle",
+        "IMU1 sits 6 m ahead.",
+        case(("position_m = [0.6, -0.5, 0.2]", "position_m = [6.0, -0.5, 0.2]")),
+        4,
+    ),
+)

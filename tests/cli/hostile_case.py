@@ -1,4 +1,4 @@
-"""A crash case in which every text is an attack: of its file, of its records, and of their names."""
+"""A crash case in which every text attacks: of its file, of its records, and their names."""
 
 from __future__ import annotations
 
@@ -49,15 +49,17 @@ def write_hostile_case(csv: Path, mme: Path, folder: Path) -> Path:
     return case
 
 
+CAMERAS = NAMES["cameras.csv"]
 EVIL_FOLDER = "imu2 <script>alert(1)"
 
 
 def evil_column(name: str) -> str:
-    return f"{name.split(' [')[0]} <script>alert(1)</script><img src=x onerror=alert(1)> [{name.split('[')[1]}"
+    own, unit = name.split(" [")
+    return f"{own} <script>alert(1)</script><img src=x onerror=alert(1)> [{unit}"
 
 
 def evil_line(line: str) -> str:
-    head, colon, value = line.partition(":")
+    head, colon, _ = line.partition(":")
     texts = ("Laboratory", "Customer", "Title", "Type of", "Name of test", "Location", "Transducer")
     if colon and head.startswith(texts) and "channel code" not in head:
         return f"{head}:{WORSE.replace(chr(10), ' ')}"
@@ -92,9 +94,9 @@ def case_text(csv: Path, mme: Path) -> str:
     one["units"][1].pop("gyro")
     one["units"][1]["gyro_from"] = one["units"][0]["name"]
     (reference,) = one["references"]
-    reference |= {"name": EVIL, "source": EVIL, "path": f"records/{NAMES['cameras.csv']}"}
-    stated = {"kind": "delta_v", "name": EVIL + "2", "source": EVIL, "axis": "forward",
-              "delta_v_m_per_s": -30.0, "delta_v_sd_m_per_s": 0.1, "over_s": [0.0, 0.1]}  # fmt: skip
+    reference |= {"name": EVIL, "source": EVIL, "path": f"records/{CAMERAS}"}
+    stated = {"kind": "delta_v", "name": EVIL + "2", "source": EVIL, "axis": "forward"}
+    stated |= {"delta_v_m_per_s": -30.0, "delta_v_sd_m_per_s": 0.1, "over_s": [0.0, 0.1]}
     one["references"].append(stated)
     one["options"]["severity_inputs"] = {"age": 40.0, "gender": EVIL}
     one["options"]["monte_carlo_runs"] = 50

@@ -46,10 +46,15 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str]]:
     unit = result.reconstruction.main
     number = main_event(unit)
     if number is None:
+        others = [u.name for u in result.reconstruction.units if main_event(u) is not None]
+        alone = (
+            f" There is one by {' and '.join(others)} alone: see Delta-V, and whether the record "
+            "of another begins late or ends early."
+        )
         yield (
             "No event",
             "The record holds no event after 49 CFR 563. There is no delta-V and no direction of "
-            "force; the path is told all the same.",
+            f"force; the path is told all the same.{alone if others else ''}",
         )
         return
     event = unit.events.events[number]

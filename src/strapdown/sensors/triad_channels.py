@@ -300,7 +300,8 @@ def _judge_rate(
             f"{largest / DEGREES:.4g} rad/s",
             file=source,
             quantity="gyro",
-            remedy="state the unit deg/s in the record's header or in the case, or multiply by π/180",
+            remedy="state the unit deg/s in the record's header or in the case, or multiply by "
+            "π/180",
         )
     return _over_range(source, triad, groups, "rad/s", "deg/s instead of rad/s?")
 

@@ -118,8 +118,8 @@ def compare_sizes(
                     "deg/s would be 57.3 times as many",
                     file=other,
                     quantity="gyro",
-                    remedy="state the unit deg/s in the record's header or in the case, or multiply by "
-                    "π/180",
+                    remedy="state the unit deg/s in the record's header or in the case, or "
+                    "multiply by π/180",
                 )
     forces = [(force[-1].source, _spread(force[-1])) for _, force in units if force]
     return [

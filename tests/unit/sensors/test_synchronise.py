@@ -400,7 +400,7 @@ def test_what_a_shorter_record_takes_from_the_others_is_told():
         ),
         (
             lambda: [with_table(imu(), lambda t: t / 9.80665)],
-            ["IMU1, accel, accel", "gravity in g", "multiply the columns by 9.80665"],
+            ["IMU1, accel, accel", "gravity in g", "multiply by 9.80665"],
         ),
         (
             lambda: [with_table(imu(), lambda t: t * 57.29578, gyro=True)],

@@ -1,0 +1,368 @@
+"""What a case's report is made of: limitations, plain data, tables, severity, references."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from strapdown.bundle import to_json
+from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
+from strapdown.config.crash_case_file import read_case_spec
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats import read_raw
+from strapdown.report.changed_case import changed_case
+from strapdown.report.crash_case import file_name
+from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
+from strapdown.report.crash_json import crash_json
+from strapdown.report.crash_limits import limitations
+from strapdown.report.simulation import simulate
+from strapdown.systems.case_references import compare_reference
+from strapdown.systems.case_severity import case_severity, main_event
+from strapdown.systems.crash_case import run_case
+
+USUAL = {
+    "Ringing of the structure is not seen at this rate",
+    "The vehicle is taken as rigid",
+    "The entry speed is not from these records",
+}
+
+
+@pytest.fixture(scope="module")
+def case_file(tmp_path_factory):
+    return simulate("pole", tmp_path_factory.mktemp("pole") / "pole").path / "case.toml"
+
+
+@pytest.fixture(scope="module")
+def result(case_file):
+    return run_case(read_case_spec(case_file), case_file)
+
+
+@pytest.fixture(scope="module")
+def main(result):
+    return result.reconstruction.main
+
+
+def heads(result):
+    return {head for head, _ in limitations(result)}
+
+
+def with_main(result, **changes):
+    """The result with another main answer."""
+    made = result.reconstruction
+    return replace(result, reconstruction=replace(made, combined=replace(made.combined, **changes)))
+
+
+def with_event(result, **changes):
+    events = result.reconstruction.main.events
+    (event,) = events.events
+    return with_main(result, events=replace(events, events=(replace(event, **changes),)))
+
+
+def with_entry(result, **changes):
+    spec = result.spec
+    return replace(
+        result, spec=spec.model_copy(update={"entry": spec.entry.model_copy(update=changes)})
+    )
+
+
+# -- limitations: each when its fact happens, and only then -------------------------------------
+
+
+def test_a_case_without_further_faults_has_the_usual_limits_alone(result):
+    assert heads(result) == USUAL
+
+
+def test_an_event_that_is_cut_by_the_record(result):
+    assert heads(with_event(result, lasts_beyond_record=True)) - USUAL == {
+        "The event lasts beyond the record"
+    }
+    assert heads(with_event(result, starts_before_record=True)) - USUAL == {
+        "The event begins before the record"
+    }
+
+
+def test_no_event(result):
+    events = result.reconstruction.main.events
+    none = with_main(result, events=replace(events, events=()), body=(), ned=(), types=())
+    assert heads(none) - USUAL == {"No event"}
+    text = dict(limitations(none))["No event"]
+    assert "There is one by IMU1 and IMU2 alone" in text
+    assert case_severity(none.spec, none.reconstruction.main) == ()
+    assert main_event(none.reconstruction.main) is None
+
+
+def test_an_event_outside_of_the_path(result):
+    found = heads(with_main(result, ned=(None,)))
+    assert found - USUAL == {"The event is not within the path"}
+
+
+def test_recorders_that_do_not_agree(result):
+    made = result.reconstruction
+    apart = replace(made, comparison=replace(made.comparison, agree=False))
+    texts = dict(limitations(replace(result, reconstruction=apart)))
+    assert set(texts) - USUAL == {"The recorders do not agree"}
+    assert texts["The recorders do not agree"].startswith("All together: they differ")
+    assert next(iter(texts)) == "The recorders do not agree"
+
+
+def test_one_recorder_alone(result):
+    made = result.reconstruction
+    alone = replace(
+        result,
+        spec=result.spec.model_copy(update={"units": result.spec.units[:1]}),
+        units=result.units[:1],
+        reconstruction=replace(made, units=made.units[:1], combined=None, comparison=None),
+    )
+    assert heads(alone) - USUAL == {"One recorder alone"}
+
+
+def test_a_standstill_has_no_entry_speed_that_could_be_wrong(result):
+    assert heads(with_entry(result, kind="standstill")) == USUAL - {
+        "The entry speed is not from these records"
+    }
+
+
+def test_nothing_to_compare_with_and_what_does_not_agree(result):
+    assert heads(replace(result, references=())) - USUAL == {"Nothing to compare with"}
+    first, *others = result.references
+    assert first.unit == result.reconstruction.main.name
+    off = replace(result, references=(replace(first, consistent=False), *others))
+    assert heads(off) - USUAL == {"cameras: not within the bounds"}
+    # That of a recorder by itself stands in the table, and does not limit the answer.
+    other = replace(result, references=(first, replace(others[0], consistent=False)))
+    assert heads(other) == USUAL
+
+
+def test_what_was_assumed_is_said_with_its_reason(result):
+    assumed = AssumedSpec(turn_sd_deg=2.0, over_s=(0.0, 0.2), because="film of IMU1")
+    one, two = result.spec.units
+    spec = result.spec.model_copy(
+        update={"units": (one, two.model_copy(update={"assumed": assumed}))}
+    )
+    texts = dict(limitations(replace(result, spec=spec)))
+    (head,) = set(texts) - USUAL
+    assert head == "IMU2: something is assumed that was not measured"
+    assert "standard deviation of 2° of each angle between 0 s and 0.2 s" in texts[head]
+    assert texts[head].endswith("Reason stated: film of IMU1")
+
+
+def prepared_of(result, change):
+    """The first recorder with another preparation."""
+    made = result.reconstruction
+    unit = made.units[0]
+    at = unit.at_point
+    own = replace(unit, at_point=replace(at, prepared=change(at.prepared)))
+    return replace(result, reconstruction=replace(made, units=(own, *made.units[1:])))
+
+
+@pytest.mark.parametrize(
+    ("part", "head", "text"),
+    [
+        ("clipped", "IMU1: the accelerometer was at the end of its range", "delta-V is too small"),
+        ("gyro_clipped", "IMU1: the gyro was at the end of its range", "attitude after it"),
+    ],
+)
+def test_a_sensor_at_its_end(result, part, head, text):
+    def change(prepared):
+        flags = np.zeros_like(getattr(prepared, part))
+        flags[100:103, 1] = True
+        return replace(prepared, **{part: flags})
+
+    texts = dict(limitations(prepared_of(result, change)))
+    assert set(texts) - USUAL == {head}
+    assert texts[head].startswith("Axis y, 3 samples between ")
+    assert text in texts[head]
+
+
+@pytest.mark.parametrize(
+    ("change", "head"),
+    [
+        (lambda p: replace(p, rest=None), "IMU1: no stationary stretch before the crash"),
+        (
+            lambda p: replace(p, rest=replace(p.rest, grade="steady")),
+            "IMU1: quiet before the crash, but perhaps at speed",
+        ),
+        (
+            lambda p: replace(p, rest=replace(p.rest, end=p.rest.start + 1.9)),
+            "IMU1: a short stationary stretch",
+        ),
+    ],
+)
+def test_a_rest_that_is_none_or_short(result, change, head):
+    assert heads(prepared_of(result, change)) - USUAL == {head}
+
+
+# -- plain data ---------------------------------------------------------------------------------
+
+UNITS = ("_s", "_deg", "_m", "_m2", "_m_per_s", "_m_per_s2")
+# Numbers without a unit: counts, probabilities, a chi-square, a clock's hour, and the case's own.
+BARE = {
+    "main_event", "event", "clock", "probability", "chi_square", "freedom", "value", "low", "high",
+}  # fmt: skip
+
+
+def numbers(value, place=()):
+    if isinstance(value, dict):
+        for key, item in value.items():
+            yield from numbers(item, (*place, key))
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from numbers(item, place)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield place, value
+
+
+def test_every_number_is_finite_and_its_key_says_its_unit(result):
+    told = crash_json(result)
+    case = told.pop("case")
+    for place, value in (*numbers(told), *numbers(case)):
+        assert math.isfinite(value), place
+    for place, _ in numbers(told):
+        named = [key for key in place if str(key).endswith(UNITS)]
+        assert named or place[-1] in BARE, place
+    assert json.loads(to_json(told)) == json.loads(json.dumps(told))
+
+
+def test_what_is_no_number_is_null(result):
+    first, *others = result.references
+    told = crash_json(replace(result, references=(replace(first, delta_v=math.inf), *others)))
+    assert told["references"][0]["delta_v_m_per_s"] is None
+    assert told["references"][0]["sd_m_per_s"] is None
+
+
+def test_where_files_lay_is_no_result(result, case_file):
+    text = to_json(crash_json(result))
+    assert str(case_file.parent) not in text
+    assert crash_json(result)["case"]["units"][0]["gyro"]["path"] == "imu1_gyro.csv"
+
+
+# -- tables -------------------------------------------------------------------------------------
+
+
+def test_the_path_comes_back_bit_for_bit(main, tmp_path):
+    table = trajectory_table(main.path)
+    write_table(table, tmp_path / "trajectory.csv", {"time": "s"})
+    back = read_raw(tmp_path / "trajectory.csv").columns
+    assert list(back) == list(table.columns)
+    for name in table:
+        assert (
+            np.asarray(back[name], dtype=np.float64).tobytes() == table[name].to_numpy().tobytes()
+        )
+    assert np.array_equal(table["time_s"], main.path.time)
+    assert np.array_equal(table["north_m"], main.path.table["north"])
+    assert np.array_equal(table["heading_sd_deg"], main.path.sd["heading"])
+    assert all(re.search(r"_(s|m|m_per_s|deg)$", name) for name in table)
+
+
+def test_signals_come_back_with_which_range_spoke(result, tmp_path):
+    for unit in result.reconstruction.answers:
+        table = signals_table(unit)
+        write_table(table, tmp_path / "signals.csv", {})
+        back = read_raw(tmp_path / "signals.csv").columns
+        for name in table:
+            assert np.array_equal(np.asarray(back[name], dtype=np.float64), table[name])
+        if unit.at_point.prepared is not None:
+            assert set(table["range_x"]) == {0, 1}
+    assert "range_x" not in signals_table(result.reconstruction.main)
+
+
+def test_names_of_recorders_become_names_of_files():
+    made = set()
+    names = ["IMU1", "imu 1", "imu-1", "../..", "-o", "ёж", "a" * 300, "CON.csv"]
+    found = [file_name(name, made) for name in names]
+    assert found[:6] == ["imu1", "imu-1", "imu-1-2", "recorder", "o", "recorder-2"]
+    assert len(found[6]) == 60
+    assert len(set(found)) == len(names)
+
+
+# -- severity and references --------------------------------------------------------------------
+
+
+def test_models_of_the_type_are_asked_or_those_that_are_named(result, main):
+    assert {a.model.name for a in result.severity} == {
+        f"wang_2022_front_{k}" for k in ("mais1", "mais2", "mais3", "mais4", "mais5", "fatal")
+    }
+    assert all(a.risk is not None and a.because == "" for a in result.severity)
+
+    def asked(**options):
+        own = result.spec.options.model_copy(update=options)
+        return case_severity(result.spec.model_copy(update={"options": own}), main)
+
+    (one,) = asked(severity=("wang_2022_front_mais3",))
+    assert one.model.name == "wang_2022_front_mais3"
+    assert asked(severity=()) == ()
+    rear = replace(main, types=(replace(main.types[0], name="rear"),))
+    front = {"severity": ("wang_2022_front_mais3",)}
+    own = result.spec.options.model_copy(update=front)
+    (other,) = case_severity(result.spec.model_copy(update={"options": own}), rear)
+    assert other.risk is None
+    assert "rear" in other.because
+    with pytest.raises(ConfigError, match="mais9"):
+        asked(severity=("wang_2022_front_mais9",))
+
+
+def test_models_of_every_crash_are_asked_where_the_type_is_open(result, main):
+    kind = replace(main.types[0], name="undetermined")
+    found = case_severity(result.spec, replace(main, types=(kind,)))
+    assert found
+    assert all(not a.model.applies for a in found)
+    assert {a.model.outcome for a in found} >= {"MAIS3+"}
+
+
+def test_a_change_of_velocity_is_held_against_another(result, main):
+    whole = main.body[0].event
+    gravity = result.spec.options.gravity_m_per_s2
+
+    def held(**given):
+        spec = ReferenceSpec(kind="delta_v", name="EDR", **{"axis": "resultant"} | given)
+        return compare_reference(spec, main, gravity, {})
+
+    ours = whole.resultant
+    same = held(delta_v_m_per_s=ours, delta_v_sd_m_per_s=0.1)
+    assert same.delta_v == pytest.approx(ours, rel=1e-12)
+    assert same.sd * 1.959963984540054 == pytest.approx(whole.resultant_bound, rel=1e-9)
+    assert same.consistent
+    event = main.events.events[0]
+    assert same.span == (event.time_zero, event.end)
+    limit = 1.959963984540054 * math.hypot(same.sd, 0.1)
+    assert held(delta_v_m_per_s=ours + 0.999 * limit, delta_v_sd_m_per_s=0.1).consistent
+    assert not held(delta_v_m_per_s=ours + 1.001 * limit, delta_v_sd_m_per_s=0.1).consistent
+    right = held(delta_v_m_per_s=0.0, delta_v_sd_m_per_s=0.1, axis="right", over_s=(0.0, 0.1))
+    assert abs(right.delta_v) < 0.5
+    assert right.span == (0.0, 0.1)
+    with pytest.raises(DataError, match="the reference 'EDR'"):
+        held(delta_v_m_per_s=1.0, delta_v_sd_m_per_s=0.1, over_s=(0.5, 9.0))
+
+
+def test_without_event_or_span_nobody_knows_what_is_meant(result, main):
+    none = replace(main, events=replace(main.events, events=()), body=(), ned=(), types=())
+    spec = ReferenceSpec(kind="delta_v", name="EDR", delta_v_m_per_s=7.0, delta_v_sd_m_per_s=0.1)
+    with pytest.raises(ConfigError, match="over_s"):
+        compare_reference(spec, none, 9.8, {})
+
+
+# -- what changed -------------------------------------------------------------------------------
+
+
+def test_options_that_differ_from_the_file_are_named_with_both_values(result, case_file):
+    sealed = result.spec.model_dump(mode="json", exclude_none=True)
+    manifest = {"command": "crash", "configuration": {"case": sealed, "case_path": "case.toml"}}
+    assert changed_case(case_file.parent, manifest) == []
+    sealed["options"]["seed"] = 3
+    sealed["units"][0]["trigger_s"] = 1.0
+    assert changed_case(case_file.parent, manifest) == [
+        "case.toml: unit 'IMU1', trigger_s: 1.0 before, 10.748534 now",
+        "case.toml: options, seed: 3 before, 0 now",
+    ]
+    for other in (
+        {"command": "attitude", "configuration": {}},
+        {"command": "crash", "configuration": 3},
+    ):
+        assert changed_case(case_file.parent, other) == []
+    gone = {"command": "crash", "configuration": {"case": sealed, "case_path": "none.toml"}}
+    assert changed_case(case_file.parent, gone) == []

@@ -1,0 +1,114 @@
+"""Numbers as a reader of a crash report sees them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from strapdown.crash.pdof_interval import AngleInterval
+from strapdown.report.crash_values import (
+    about,
+    angle_range,
+    instant,
+    plain,
+    side_words,
+    speed,
+    speed_range,
+)
+
+MINUS = "\u2212"
+
+
+@pytest.mark.parametrize(
+    ("value", "places", "text"),
+    [
+        (1.25, 1, "1.2"),
+        (-1.26, 1, f"{MINUS}1.3"),
+        (-0.04, 1, "0.0"),
+        (-0.0, 0, "0"),
+        (-1e-9, 4, "0.0000"),
+        (0.0, 2, "0.00"),
+        (-12345.6, 0, f"{MINUS}12346"),
+        (math.nan, 2, "–"),
+        (math.inf, 2, "–"),
+        (-math.inf, 0, "–"),
+    ],
+)
+def test_a_number_to_so_many_places(value, places, text):
+    assert plain(value, places) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "half", "text"),
+    [
+        # The bound has two digits, the value ends where it does.
+        (7.3412, 0.2689, "7.34 ± 0.27 m"),
+        (7.3412, 2.689, "7.3 ± 2.7 m"),
+        (7.3412, 26.89, "7 ± 27 m"),
+        (7341.2, 268.9, "7341 ± 269 m"),
+        (-7.3412, 0.02689, f"{MINUS}7.341 ± 0.027 m"),
+        # Four places at most: a bound that is as small says no more.
+        (1.0, 1e-7, "1.0000 ± 0.0000 m"),
+        # Nothing is known of a bound: two places.
+        (1.23456, 0.0, "1.23 ± 0.00 m"),
+        (1.23456, math.inf, "1.23 ± – m"),
+        (1.23456, math.nan, "1.23 ± – m"),
+        (math.nan, 0.1, "– ± 0.10 m"),
+        (0.001, 1.0, "0.0 ± 1.0 m"),
+        (-0.001, 1.0, "0.0 ± 1.0 m"),
+    ],
+)
+def test_a_value_is_rounded_by_its_bound(value, half, text):
+    assert about(value, half, "m") == text
+
+
+def test_a_bound_that_rounds_up_has_a_digit_more_and_never_less():
+    assert about(10.0, 0.0996, "m") == "10.000 ± 0.100 m"
+    assert about(10.0, 9.96, "m") == "10.0 ± 10.0 m"
+
+
+def test_without_a_unit_nothing_trails():
+    assert about(1.0, 0.1, "") == "1.00 ± 0.10"
+
+
+def test_speeds_are_in_km_per_h_with_m_per_s_beside():
+    assert speed(-10.0, 1.0) == f"{MINUS}36.0 ± 3.6 km/h"
+    assert speed_range(10.0, 1.0) == "32.4 to 39.6 km/h with 95 %; 10.0 ± 1.0 m/s"
+    assert speed_range(0.5, 1.0).startswith(f"{MINUS}1.8 to 5.4 km/h")
+
+
+@pytest.mark.parametrize(
+    ("time", "text"),
+    [
+        (0.1157164, "0.1157 s"),
+        (-0.1, f"{MINUS}0.1 s"),
+        (0.0, "0 s"),
+        (-0.00001, "0 s"),
+        (10.0, "10 s"),
+        (100.25, "100.25 s"),
+    ],
+)
+def test_instants_have_no_idle_zeros(time, text):
+    assert instant(time) == text
+
+
+def test_a_direction_that_nothing_bounds_is_said_to_be_none():
+    open_one = AngleInterval(math.nan, math.nan, True)
+    assert angle_range(open_one) == "not determined: no direction is excluded with 95 %"
+    assert angle_range(AngleInterval(-3.44, 0.26, False)) == f"{MINUS}3.4° to 0.3° with 95 %"
+
+
+@pytest.mark.parametrize(
+    ("forward", "right", "words"),
+    [
+        (-7.0, 0.1, "backward"),
+        (7.0, -0.1, "forward"),
+        (0.1, 5.0, "to the right"),
+        (0.1, -5.0, "to the left"),
+        (-3.0, 2.0, "backward and to the right"),
+        (3.0, -2.0, "forward and to the left"),
+    ],
+)
+def test_ways_in_words(forward, right, words):
+    assert side_words(forward, right) == words
