@@ -108,7 +108,7 @@ def test_the_folder_holds_report_numbers_figures_and_everything_that_was_read(se
         "trajectory.csv",
         "signals-imu1.csv",
         "signals-imu2.csv",
-        "signals-weighted-of-imu1--imu2.csv",
+        "signals-weighted-mean-of-imu1--imu2.csv",
         "manifest.json",
         "timing.json",
         "inputs/case/case.toml",
