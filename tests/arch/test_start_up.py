@@ -35,7 +35,9 @@ def test_dir_and_an_unknown_name_load_nothing_either():
         ["--help"],
         ["attitude", "--help"],
         ["reproduce", "--help"],
+        ["crash", "--help"],
         ["init", "crash", "--help"],
+        ["verify", "--help"],
         ["--version"],
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 __all__ = ["shown"]
@@ -34,7 +35,8 @@ FE70-FE74 FE76-FEFC FFFC-FFFD 10140-1018E 102E0-102FB 1D106-1D107 1D400-1D454 1D
 1F810-1F847 1F850-1F859 1F860-1F887 1F890-1F8AD 1F8B0-1F8B1
 """
 # They choose between a letter as text and as a picture; there is one form here.
-_SELECTORS = dict.fromkeys(range(0xFE00, 0xFE10))
+_ONE_FORM = re.compile("[\ufe00-\ufe0f]")
+_BEYOND = re.compile(r"[^\x00-\x7f]")
 
 
 def shown(text: str) -> str:
@@ -52,11 +54,12 @@ def shown(text: str) -> str:
     """
     if text.isascii():
         return text
-    known = _known()
-    return "".join(
-        char if char.isascii() or ord(char) in known else f"[U+{ord(char):04X}]"
-        for char in text.translate(_SELECTORS)
-    )
+    return _BEYOND.sub(_told, _ONE_FORM.sub("", text))
+
+
+def _told(letter: re.Match[str]) -> str:
+    char = letter[0]
+    return char if ord(char) in _known() else f"[U+{ord(char):04X}]"
 
 
 @cache
