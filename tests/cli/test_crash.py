@@ -117,7 +117,7 @@ def test_the_folder_holds_report_numbers_figures_and_everything_that_was_read(se
     assert wanted <= files
     rest = files - wanted - {f"inputs/record/{name}" for name in recorders}
     assert {f for f in rest if not f.startswith("figures/")} == set()
-    assert {"figures/pdof.svg", "figures/path.svg", "figures/delta-v.svg"} <= rest
+    assert {"figures/pdof-front.svg", "figures/path.svg", "figures/delta-v.svg"} <= rest
     assert all(f.endswith(".svg") for f in rest)
     assert (sealed_crash.folder / "report.pdf").read_bytes().startswith(b"%PDF-")
 
