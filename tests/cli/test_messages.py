@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from bad_case import CASE_FILES, TEXT
 from bad_crash import CRASH_CALLS
 from bad_crash_records import RECORD_CALLS
+from bad_init import init_section
 from bad_inputs import CASES
 from bad_navigation import CALLS
 
@@ -89,6 +90,7 @@ def page(tmp_path_factory, run_cli):
             + (f"With `{words}`:\n\n" if words else "")
             + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
         )
+    sections.append(init_section(tmp_path_factory.mktemp, run_cli))
     return HEAD + "".join(sections) + _from_python()
 
 

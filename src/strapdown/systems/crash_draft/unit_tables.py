@@ -317,7 +317,8 @@ def _turned(name: str) -> str:
 
 def _first_of_its_file(part: Part, unit: Unit) -> Part:
     parts = [*unit.accelerometers, *((unit.gyro,) if unit.gyro else ())]
-    return next(p for p in parts if p.path == part.path)
+    first: Part = next(p for p in parts if p.path == part.path)
+    return first
 
 
 def _sensor(page: Page, part: Part, ends: RangeEnds, unit: Unit) -> None:
