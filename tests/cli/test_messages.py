@@ -18,6 +18,7 @@ from bad_case import CASE_FILES, TEXT
 from bad_crash import CRASH_CALLS
 from bad_crash_case import CRASH_CASES
 from bad_crash_records import RECORD_CALLS
+from bad_init import init_section
 from bad_inputs import CASES
 from bad_navigation import CALLS
 
@@ -98,6 +99,7 @@ def page(tmp_path_factory, run_cli, crash_said):
             + (f"With `{words}`:\n\n" if words else "")
             + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
         )
+    sections.append(init_section(tmp_path_factory.mktemp, run_cli))
     return HEAD + "".join(sections) + _crash_cases(crash_said) + _from_python()
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError, nearest
@@ -12,6 +14,13 @@ from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import clean
 
 __all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
+
+# Files of programs for tables, which hold more than a table.
+SPREADSHEETS = (".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
+# Names of a folder that are looked through for one that is near.
+MOST_NAMES = 10_000
+# What readers of logs say of a row.
+CORRECT = "correct or delete that row"
 
 
 @dataclass(frozen=True)
@@ -87,6 +96,14 @@ def read_crash_record(
         return _read(file if file.name not in ("", "..") else file.resolve(), format)
     except DataError as error:
         found = error.finding
+        if found.remedy == CORRECT:
+            raise DataError(
+                found.what,
+                file=found.file,
+                row=found.row,
+                quantity=found.quantity,
+                remedy=f"{CORRECT} in a copy, and name the copy; the record itself stays as it is",
+            ) from error
         # Options of the command that reads logs for their attitude.
         if "--" not in f"{found.remedy}{found.quantity}":
             raise
@@ -106,10 +123,28 @@ def read_crash_record(
         ) from error
 
 
+def _names_beside(file: Path) -> list[str]:
+    try:
+        return sorted(p.name for p in islice(file.absolute().parent.iterdir(), MOST_NAMES))
+    except OSError:
+        return []
+
+
 def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
+        near = difflib.get_close_matches(file.name, _names_beside(file), n=1)
         raise ConfigError(
-            "there is no such file or folder", file=clean(str(file)), remedy="check the path"
+            "there is no such file or folder",
+            file=clean(str(file)),
+            remedy=f"did you mean '{clean(near[0])}'? Else check the path"
+            if near
+            else "check the path",
+        )
+    if file.suffix.lower() in SPREADSHEETS and file.is_file():
+        raise DataError(
+            "it is a spreadsheet",
+            file=file.name,
+            remedy="open it in the spreadsheet program, and save the sheet as CSV, as a copy",
         )
     if file.is_file() and file.stat().st_size == 0:
         raise DataError(

@@ -18,6 +18,7 @@ TURNS = (0.0, 90.0, 180.0, -90.0)
 FRONTAL = 45.0  # deg
 # Two units of one vehicle feel one direction; the next right angle is farther than this.
 SAME_DIRECTION = 30.0  # deg
+POINTS = {0.0: "forward", 90.0: "to the right", 180.0: "rearward", -90.0: "to the left"}
 SIDES = {0: "the front", 1: "the right", 2: "the rear", 3: "the left"}
 
 
@@ -73,6 +74,14 @@ def direction(unit: Unit, heading_deg: float) -> float | None:
     return float(pdof((change[0], change[1], 0.0)).horizontal_deg)
 
 
+def _pointing(unit: Unit, turn: float) -> str:
+    """Where x of a housing points that is turned so; nothing where it points up or down."""
+    sitting = unit.impact.sitting
+    if sitting is None or abs(sitting.pitch_deg) > FRONTAL:
+        return ""
+    return f" (its x points {POINTS[turn]})"
+
+
 def side_of(came: float) -> str:
     """In words, where a force came from at this direction, deg."""
     return SIDES[round(came / 90.0) % 4]
@@ -123,7 +132,7 @@ def _meanings(unit: Unit) -> str:
         came = direction(unit, turn)
         if came is None:
             continue
-        told.append(f"{turn:g} makes it a blow from {side_of(came)}")
+        told.append(f"{turn:g}{_pointing(unit, turn)} makes it a blow from {side_of(came)}")
     if not told:
         return "only you know which way it faces: the record does not tell it"
     return "only you know which way it faces: " + ", ".join(told)

@@ -66,7 +66,10 @@ def group_columns(
     for name, values in columns.items():
         quantity = headings[name].quantity
         if quantity in ("other", "time", "counter"):
-            what = {"time": "a second clock", "counter": "a count of samples"}
+            what = {
+                "time": "a second clock, or one that goes back",
+                "counter": "a count of samples",
+            }
             left.append((name, what.get(quantity, "its heading names something else")))
         elif not np.isfinite(values).any():
             left.append((name, "it is empty"))
