@@ -12,8 +12,9 @@ from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.combined_effects import SampleWeights, combine_effects
+from strapdown.crash.mean_weights import CRASH_WINDOW, by_none, force_weights
 from strapdown.crash.sample_effects import SampleEffects, level_turned_by
-from strapdown.crash.unit_differences import TINY, floored
+from strapdown.crash.unit_differences import TINY
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.results import RestStretch
 from strapdown.sensors.prepared_unit import Levelling
@@ -25,12 +26,6 @@ Array = NDArray[np.float64]
 __all__ = ["COMBINATIONS", "combine_units"]
 
 COMBINATIONS = ("weighted", "median")
-# Near the impact: rates are weighed by how well they tell the turn over it.
-TURN_WINDOW = (-0.1, 0.75)
-# What swings faster than this is ringing, by which units differ.
-RINGING = 0.05  # s
-# Of squared cosines.
-ROUNDING = 1e-9
 
 
 def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint:
@@ -42,8 +37,10 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
         Of one vehicle, at one point; the stamps of the first are kept, where all have samples,
         and the others are interpolated linearly.
     method : {'weighted', 'median'}
-        Each sample weighed by the inverse of its covariance (noise and all unknowns); or, of three
-        units or more, the median of each axis, which one unit gone astray does not move far.
+        One weight a unit and axis for the whole record, by what each states of its change of
+        velocity over the crash (`force_weights`): such a change of the mean lies between those of
+        the units. Or, of three units or more, the median of each axis and sample, which one unit
+        gone astray does not move far.
 
     Returns
     -------
@@ -63,11 +60,9 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
 
     Notes
     -----
-    Weights follow from what each unit states for itself, and any that sum to one are right; those
-    of units that share unknowns are not the best. Where something is assumed of a unit, each axis
-    is weighed by itself, by what is measured of it. Samples of a combination are taken for
-    independent, though what the noise of the gyros does through a lever arm is not: this states
-    more than there is.
+    Any weights that sum to one are right, with the effects of the mean made with them. Samples of
+    a combination are taken for independent, though what the noise of the gyros does through a
+    lever arm is not: this states more than there is.
     """
     if method not in COMBINATIONS:
         raise ConfigError(
@@ -91,7 +86,10 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
     time = _common_stamps(units)
     at = [_at(u, time) for u in units]
     force = np.array([u.force for u in at])
-    weights = _inverse_weights(at) if method == "weighted" else _median_weights(force)
+    if method == "weighted":
+        weights = np.repeat(force_weights(at)[:, None], time.size, axis=1)
+    else:
+        weights = _median_weights(force)
     counted = _turning_measured(at)
     turning = _rate_weights(at, counted)
     kind = "weighted mean" if method == "weighted" else method
@@ -134,21 +132,11 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
         rest,
         # The vehicle's own, which all units feel alike.
         float(share @ [u.rest_accel_sd for u in units]),
-        unmeasured=_by_none([u.unmeasured for u in units]),
-        unmeasured_turns=_by_none(
+        unmeasured=by_none([u.unmeasured for u in units]),
+        unmeasured_turns=by_none(
             [u.unmeasured_turns for u, counts in zip(units, counted, strict=True) if counts]
         ),
     )
-
-
-def _by_none(projections: Sequence[Array | None]) -> Array | None:
-    """Projection onto the directions that none of several units measures."""
-    given = [p for p in projections if p is not None]
-    if len(given) < len(projections):
-        return None
-    values, vectors = np.linalg.eigh(np.mean(given, axis=0))
-    kept = vectors[:, values > 1.0 - ROUNDING]
-    return np.asarray(kept @ kept.T) if kept.size else None
 
 
 def _turning_measured(units: Sequence[AtPoint]) -> NDArray[np.bool_]:
@@ -235,58 +223,6 @@ def _without_own_tilt(unit: AtPoint) -> SampleEffects:
     return replace(effects, tilt=effects.tilt - tilt)
 
 
-def _inverse_weights(units: Sequence[AtPoint]) -> Array:
-    information: list[Array] = []
-    by_axis = _by_axis(units)
-    for u in units:
-        effects = u.effects
-        covariance = np.einsum("pni,pnj->nij", effects.force, effects.force, optimize=True)
-        covariance += effects.force_noise[:, :, None] ** 2 * np.eye(3)
-        if by_axis:
-            covariance = _over_the_pulse(covariance, u.time) * np.eye(3)
-        information.append(_of_measured(floored(covariance), u.unmeasured))
-    by_none = _by_none([u.unmeasured for u in units])
-    if by_none is not None:
-        # Along what none measures all are as good as one another.
-        size = float(np.mean(np.trace(information, axis1=-2, axis2=-1)))
-        information = [i + size * by_none for i in information]
-    total = np.linalg.inv(np.sum(information, axis=0))
-    return np.array([total @ i for i in information])
-
-
-def _by_axis(units: Sequence[AtPoint]) -> bool:
-    """Whether each axis is weighed by itself.
-
-    An assumed turn through the arms makes errors of the axes hang together, and whole matrices
-    would draw on one axis for another: what rings downward would come forward. Where a missing
-    axis is none of the vehicle's, it cannot be had by axis.
-    """
-    missing = [u.unmeasured for u in units if u.unmeasured is not None]
-    aligned = all(np.abs(p - np.diag(np.diagonal(p))).max() < ROUNDING for p in missing)
-    return aligned and any(u.assumed_axes for u in units)
-
-
-def _over_the_pulse(covariance: Array, time: Array) -> Array:
-    """Means over 50 ms: a scale factor is wrong by more where a unit reads more.
-
-    Sample by sample the one that reads less would always count for more, and where two ring
-    against one another the mean would be less than either.
-    """
-    from scipy.ndimage import uniform_filter1d
-
-    width = max(1, round(RINGING / float(np.median(np.diff(time)))))
-    return np.asarray(uniform_filter1d(covariance, width, axis=0, mode="nearest"))
-
-
-def _of_measured(covariance: Array, unmeasured: Array | None) -> Array:
-    """Inverse of covariances (n, 3, 3), nothing along what is assumed and not measured."""
-    if unmeasured is None:
-        return np.asarray(np.linalg.inv(covariance))
-    kept = np.eye(3) - unmeasured
-    whole = np.linalg.inv(kept @ covariance @ kept + unmeasured)
-    return np.asarray(kept @ whole @ kept)
-
-
 def _median_weights(force: Array) -> Array:
     """One for the unit in the middle, a half for each of two in the middle; per sample and axis."""
     count = len(force)
@@ -303,7 +239,7 @@ def _rate_weights(units: Sequence[AtPoint], counted: NDArray[np.bool_]) -> Array
     """One number a unit; a gyro that several have counts once."""
     time = units[0].time
     steps = np.gradient(time)
-    within = (time >= TURN_WINDOW[0]) & (time <= TURN_WINDOW[1])
+    within = (time >= CRASH_WINDOW[0]) & (time <= CRASH_WINDOW[1])
     steps = np.where(within, steps, 0.0) if within.any() else steps
     known, weights = set(), []
     for u, counts in zip(units, counted, strict=True):

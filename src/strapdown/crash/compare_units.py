@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.crash.at_point import AtPoint
+from strapdown.crash.clipped_samples import clipped_pieces
 from strapdown.crash.lever_arm_check import LeverArmCheck, check_lever_arm, lever_arm_findings
 from strapdown.crash.match_axes import AxisMatch, axis_findings, match_axes
 from strapdown.crash.measured_directions import (
@@ -37,6 +38,7 @@ from strapdown.crash.unit_differences import (
 from strapdown.exceptions import ConfigError, Finding
 
 Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 __all__ = ["compare_units"]
 
@@ -78,9 +80,9 @@ def compare_units(
     all that both units state, ``dᵀ C⁻¹ d`` is chi-square. What they share (a borrowed gyro, the
     attitude that all were levelled at) cancels in d and in C. Ringing that the structure has at
     one place and not at the other, and whatever else was not stated, shows as a disagreement; its
-    words say
-    where it is largest. Swapped axes, a turned mounting and wrong positions are looked for in each
-    pair.
+    words say where it is largest. Pieces in which either unit was at the end of its range, with
+    nothing behind, are left out of everything, and a finding says so. Swapped axes, a turned
+    mounting and wrong positions are looked for in each pair.
 
     Raises
     ------
@@ -97,20 +99,23 @@ def compare_units(
         )
     edges = common_edges(units, window, pieces)
     increments = [velocity_increments(u, edges) for u in units]
+    cut = [clipped_pieces(u, edges) for u in units]
     pairs = tuple(
-        _pair(units[i], units[j], increments[i], increments[j], level)
+        _pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level)
         for i, j in itertools.combinations(range(len(units)), 2)
     )
-    together = _against_all(units, increments)
+    kept = ~np.any(cut, axis=0)
+    together = _against_all(units, [v.of_pieces(kept) for v in increments], kept)
     chi, freedom = together.chi_square, together.freedom
     probability = chi_square_tail(chi, freedom)
-    findings = [f for p in pairs for f in p.findings]
+    findings = [_left_out(u, edges, c) for u, c in zip(units, cut, strict=True) if c.any()]
+    findings += [f for p in pairs for f in p.findings]
     findings += _odd_one(units, pairs)
     return UnitComparison(
         edges,
         pairs,
-        _curve(together.combined) + together.told,
-        _curve_sd(together.covariance) + together.told,
+        _curve(together.combined, kept) + together.told,
+        _curve_sd(together.covariance, kept) + together.told,
         together.against,
         chi,
         freedom,
@@ -125,26 +130,32 @@ def _pair(
     second: AtPoint,
     a: VelocityIncrements,
     b: VelocityIncrements,
+    kept: Flags,
     level: float,
 ) -> UnitPair:
     edges = a.edges
+    a, b = a.of_pieces(kept), b.of_pieces(kept)
     difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)
     basis = measured_by_all((first, second))
     told = np.where(measured_axes(basis), 0.0, np.nan)
     chi, freedom = chi_square_along(basis, difference, covariance)
     probability = chi_square_tail(chi, freedom)
-    curve, sd = _curve(difference) + told, _curve_sd(covariance) + told
-    lengths = np.diff(edges)[:, None]
-    force_sd = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths + told
+    curve, sd = _curve(difference, kept) + told, _curve_sd(covariance, kept) + told
+    lengths = np.diff(edges)[kept, None]
+    force = np.full((2, kept.size, 3), np.nan)
+    force[0, kept] = difference.reshape(-1, 3) / lengths + told
+    force[1, kept] = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths + told
     findings: list[Finding] = []
-    whole = not (first.assumed_axes or second.assumed_axes)
+    whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
     if whole:
         axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
     else:
         # Three axes and the turning of both are needed to say how they lie to one another.
         axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
     agree = probability >= level
-    if freedom == 0:
+    if not kept.any():
+        findings.append(_nothing_whole(first, second))
+    elif freedom == 0:
         findings.append(_nothing_in_common(first, second))
     elif not agree:
         findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
@@ -167,8 +178,8 @@ def _pair(
         edges,
         curve,
         sd,
-        difference.reshape(-1, 3) / lengths + told,
-        force_sd,
+        force[0],
+        force[1],
         chi,
         freedom,
         probability,
@@ -192,8 +203,13 @@ class _Together:
     against: tuple[UnitAgainstAll, ...]
 
 
-def _against_all(units: Sequence[AtPoint], increments: Sequence[VelocityIncrements]) -> _Together:
+def _against_all(
+    units: Sequence[AtPoint], increments: Sequence[VelocityIncrements], kept: Flags
+) -> _Together:
+    """`increments` are those of the pieces that are kept."""
     size = increments[0].values.size
+    if size == 0:
+        return _nothing_together(units, kept)
     joint = floored(joint_covariance(increments))
     pieces, largest = size // 3, float(np.diagonal(joint).max())
     bases = [measured_by_all((u,)) for u in units]
@@ -219,8 +235,8 @@ def _against_all(units: Sequence[AtPoint], increments: Sequence[VelocityIncremen
         against.append(
             UnitAgainstAll(
                 u.name,
-                _curve(left[rows]) + told,
-                _curve_sd(own) + told,
+                _curve(left[rows], kept) + told,
+                _curve_sd(own, kept) + told,
                 chi,
                 freedom,
                 chi_square_tail(chi, freedom),
@@ -242,14 +258,30 @@ def _square(difference: Array, covariance: Array) -> float:
     return float(difference @ np.linalg.solve(floored(covariance), difference))
 
 
-def _curve(increments: Array) -> Array:
-    return np.vstack([np.zeros(3), np.cumsum(increments.reshape(-1, 3), axis=0)])
+def _nothing_together(units: Sequence[AtPoint], kept: Flags) -> _Together:
+    """All pieces were left out."""
+    none = np.full((kept.size + 1, 3), np.nan)
+    return _Together(
+        np.zeros(0),
+        np.zeros((0, 0)),
+        np.full(3, np.nan),
+        0.0,
+        0,
+        tuple(UnitAgainstAll(u.name, none, none, 0.0, 0, 1.0) for u in units),
+    )
 
 
-def _curve_sd(covariance: Array) -> Array:
-    m = len(covariance) // 3
-    total = np.kron(np.tril(np.ones((m, m))), np.eye(3))
-    variance = np.maximum(np.diag(total @ covariance @ total.T), 0.0)
+def _curve(increments: Array, kept: Flags) -> Array:
+    """Sums at all edges: what was left out adds nothing."""
+    whole = np.zeros((kept.size, 3))
+    whole[kept] = increments.reshape(-1, 3)
+    return np.vstack([np.zeros(3), np.cumsum(whole, axis=0)])
+
+
+def _curve_sd(covariance: Array, kept: Flags) -> Array:
+    m = kept.size
+    total = np.kron(np.tril(np.ones((m, m)))[:, kept], np.eye(3))
+    variance = np.maximum(np.einsum("ij,jk,ik->i", total, covariance, total), 0.0)
     return np.vstack([np.zeros(3), np.sqrt(variance).reshape(-1, 3)])
 
 
@@ -263,7 +295,7 @@ def _disagreement(
     freedom: int,
     probability: float,
 ) -> Finding:
-    ratio = np.abs(curve[1:]) / np.maximum(sd[1:], 1e-30)
+    ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
     row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
     share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
     return Finding(
@@ -275,6 +307,29 @@ def _disagreement(
         quantity="delta-V",
         remedy="look at what follows on axes, mounting and positions; without such, one of them "
         "rings or bends with its place, or states too small uncertainties",
+    )
+
+
+def _left_out(unit: AtPoint, edges: Array, cut: Flags) -> Finding:
+    pieces = np.flatnonzero(cut)
+    return Finding(
+        f"it was at the end of its range between {edges[pieces[0]]:.4g} and "
+        f"{edges[pieces[-1] + 1]:.4g} s: {pieces.size} of {cut.size} pieces of the record are left "
+        "out where it is compared with other units",
+        file=unit.name,
+        quantity="comparison",
+        remedy="what was cut off is missing from its change of velocity, and no comparison can "
+        "show how much; believe a unit that was not at its end",
+    )
+
+
+def _nothing_whole(first: AtPoint, second: AtPoint) -> Finding:
+    return Finding(
+        f"it and {second.name} have no piece of the record in which neither was at the end of its "
+        "range, and are not compared",
+        file=first.name,
+        quantity="comparison",
+        remedy="compare them over another stretch (window), or by a unit of a wider range",
     )
 
 

@@ -36,6 +36,12 @@ class NoiseOfSums:
     turned: Array
     gyro: str
 
+    def of_rows(self, rows: NDArray[np.bool_]) -> NoiseOfSums:
+        """Some of the rows, (3 m,)."""
+        return NoiseOfSums(
+            self.of_force[np.ix_(rows, rows)], self.through_arm[rows], self.turned[rows], self.gyro
+        )
+
 
 def noise_of_sums(at_point: AtPoint, weights: Array) -> NoiseOfSums:
     """Find what the noise of the samples does to weighted sums of them.

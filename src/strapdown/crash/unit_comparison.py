@@ -27,13 +27,13 @@ class UnitPair:
     edges : ndarray, (m + 1,), s
     difference : ndarray, (m + 1, 3), m/s
         Integral of the first one's specific force minus that of the second's, vehicle axes,
-        from the first edge.
+        from the first edge; pieces in which either was at the end of its range add nothing.
     sd : ndarray, (m + 1, 3), m/s
         As both state it. NaN along axes that either assumes, here and in what follows.
     force_difference, force_sd : ndarray, (m, 3), m/s²
-        Means over each piece.
+        Means over each piece; NaN in pieces in which either was at the end of its range.
     chi_square, freedom : float, int
-        Of all pieces and axes together, with their covariance; of those axes that both
+        Of all other pieces and axes together, with their covariance; of those axes that both
         measure. Zero, where there is none.
     probability : float
         Of a chi-square as large or larger, where the statements are right.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,26 @@ class VelocityIncrements:
     turned_effects: Array
     noise: NoiseOfSums
     lever: Array
+
+    def of_pieces(self, kept: NDArray[np.bool_]) -> VelocityIncrements:
+        """Some of the pieces; the edges stay those of all.
+
+        Parameters
+        ----------
+        kept : ndarray of bool, (m,)
+        """
+        if kept.all():
+            return self
+        rows = np.repeat(kept, 3)
+        return replace(
+            self,
+            values=self.values[kept],
+            turned=self.turned[kept],
+            effects=self.effects[rows],
+            turned_effects=self.turned_effects[rows],
+            noise=self.noise.of_rows(rows),
+            lever=self.lever[rows],
+        )
 
     def borrows(self, other: VelocityIncrements) -> bool:
         """Whether both have the rates of one gyro, so that their agreement says nothing."""

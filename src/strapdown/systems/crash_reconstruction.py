@@ -44,7 +44,8 @@ class CrashReconstruction:
     comparison : UnitComparison or None
         None for a single unit.
     combined : UnitReconstruction or None
-        Of the weighted mean of the units, where it was asked for and there are several.
+        Of the weighted mean of the units, where it was asked for, there are several and they
+        agree.
     findings : tuple of Finding
         What a person should know, of everything that was done.
     """
@@ -141,7 +142,8 @@ def reconstruct_crash(
     clock : {'trigger', 'correlation'}
         As `synchronise`.
     combine : bool
-        Also reconstruct the weighted mean of the units.
+        Also reconstruct the weighted mean of the units, if they agree: of units of which one must
+        be wrong there is none, and a finding says so. `combine_units` makes it all the same.
     preparation : mapping, optional
         Options of `prepare_unit`, for all units alike; under the name of a unit, a mapping of its
         own ones.
@@ -196,12 +198,26 @@ def reconstruct_crash(
         )
 
     found = tuple(answers(of, start) for of, start in zip(there, tied, strict=True))
-    combined = answers(combine_units(there), tied[0]) if combine and len(there) > 1 else None
+    combined = None
+    if combine and comparison is not None and comparison.agree:
+        combined = answers(combine_units(there), tied[0])
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings
     if comparison is not None:
         findings += comparison.findings
+        if combine and not comparison.agree:
+            findings.append(_no_mean(there))
     x, y, z = (float(v) for v in point)
     return CrashReconstruction(
         (x, y, z), together, found, comparison, combined, tuple(dict.fromkeys(findings))
+    )
+
+
+def _no_mean(units: Sequence[AtPoint]) -> Finding:
+    return Finding(
+        "the units disagree, so that no mean is told; each is told by itself",
+        file=", ".join(u.name for u in units),
+        quantity="combine",
+        remedy="find the fault by what is said of their axes, mountings and positions, or state "
+        "the uncertainties that they really have",
     )
