@@ -42,7 +42,9 @@ class RecordCall:
     def source(self) -> str:
         """The call, in words."""
         said = "".join(f", {key}={value!r}" for key, value in self.stated)
-        return f"triad_of_channels(record, {self.channels}, quantity={self.quantity!r}{said})"
+        call = f"triad_of_channels(record, {self.channels}, quantity={self.quantity!r}{said})"
+        # As the project writes Python.
+        return call.replace("'", '"')
 
     @property
     def call(self) -> Callable[[], object]:
