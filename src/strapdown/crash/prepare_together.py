@@ -52,7 +52,7 @@ def prepare_together(
     """
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}
-    turning = [u.unit.name for u in together.units if u.lender is None and u.unit.gyro is not None]
+    turning = [u.unit.name for u in together.units if u.lender is None and _turns(u)]
     done: dict[str, AtPoint] = {}
     for unit in sorted(together.units, key=lambda u: u.lender is not None):
         own = {"gravity": gravity, **common, **options.get(unit.unit.name, {})}
@@ -79,9 +79,15 @@ def prepare_together(
     return [done[u.unit.name] for u in together.units]
 
 
+def _turns(unit: SynchronisedUnit) -> bool:
+    """Whether it has a gyro that measures something, and is no stand-in for an assumption."""
+    gyro = unit.unit.gyro
+    return gyro is not None and len(gyro.absent) < 3
+
+
 def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding | None:
     """For a unit without gyro that takes none from another, of which there are some."""
-    if unit.lender is not None or unit.unit.gyro is not None or not turning:
+    if unit.lender is not None or _turns(unit) or not turning:
         return None
     return Finding(
         f"it has no gyro and borrows none, where {' and '.join(turning)} "

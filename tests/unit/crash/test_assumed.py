@@ -30,6 +30,9 @@ from strapdown.sensors.assumed import Assumed, assumed_shapes
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import TURNS
+from strapdown.simulation.crash_recording import record_crash
+from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.paper_recorders import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
