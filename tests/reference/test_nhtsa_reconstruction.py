@@ -14,8 +14,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from strapdown.crash.combine_units import combine_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.entry import Entry
+from strapdown.crash.unit_reconstruction import reconstruct_unit
 from strapdown.exceptions import DataError
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.sensors.assumed import Assumed
@@ -92,6 +94,16 @@ def crash(units, request):
     return reconstruct(units, *request.param)
 
 
+def mean_of(crash):
+    """Of units that ring, and so disagree by what they state: it is not told, but can be made."""
+    assert not crash.comparison.agree
+    assert crash.combined is None
+    assert any("no mean is told" in f.what for f in crash.findings)
+    return reconstruct_unit(
+        combine_units([u.at_point for u in crash.units]), ENTRY, window=(-0.03, 0.2)
+    )
+
+
 def test_each_unit_comes_to_its_known_change_of_velocity(crash):
     for name, (_, _, _, known) in UNITS.items():
         found = crash.unit(name)
@@ -126,8 +138,9 @@ def test_what_was_assumed_is_told_and_in_the_bounds(crash):
         "pitch",
         "heading",
     )
-    assert crash.combined.at_point.assumed_axes == ("right", "roll", "pitch", "heading")
-    for found in crash.answers:
+    mean = mean_of(crash)
+    assert mean.at_point.assumed_axes == ("right", "roll", "pitch", "heading")
+    for found in (*crash.units, mean):
         (changes,) = found.body
         assert found.types[0].name == "front"
         assert "rolled over cannot be told" in found.types[0].reason
@@ -143,8 +156,9 @@ def test_what_was_assumed_is_told_and_in_the_bounds(crash):
 
 def test_the_mean_of_the_units_is_better_than_each(crash):
     sds = [u.path.sd["VN"].iloc[-1] for u in crash.units]
-    assert crash.combined.path.sd["VN"].iloc[-1] < min(sds)
-    change = delta_v(crash.combined.acceleration, 0.0, 0.115)
+    mean = mean_of(crash)
+    assert mean.path.sd["VN"].iloc[-1] < min(sds)
+    change = delta_v(mean.acceleration, 0.0, 0.115)
     known = np.mean([row[3] for row in UNITS.values()])
     assert -change.vector[0] == pytest.approx(known, abs=0.1)
 
@@ -153,9 +167,10 @@ def test_what_rings_against_one_another_is_not_drawn_to_the_less(units):
     # Left and right swing by tens of g against one another. Weighed sample by sample, the scale
     # factor would count whichever reads less, and their mean would come to 18.1 m/s.
     found = reconstruct(units[:2], 1000.0, "mean")
-    lost = [-delta_v(u.acceleration, 0.0, 0.115).vector[0] for u in found.answers]
+    three = (*found.units, mean_of(found))
+    lost = [-delta_v(u.acceleration, 0.0, 0.115).vector[0] for u in three]
     assert min(lost[:2]) <= lost[2] <= max(lost[:2])
-    crush = [u.path.table["north"].max() for u in found.answers]
+    crush = [u.path.table["north"].max() for u in three]
     assert min(crush[:2]) <= crush[2] <= max(crush[:2])
 
 

@@ -60,13 +60,17 @@ def clipped_pieces(unit: AtPoint, edges: Array) -> Flags:
     time = prepared.imu.index.to_numpy(dtype=np.float64)
     arm = unit.moved is not None and bool(unit.moved.lever_arm.any())
     wide = unit.moved.slope.slope.shape[1] // 2 if arm and unit.moved is not None else 0
-    cut = _spread(np.asarray(prepared.clipped.any(axis=1)), 1)
+    cut = _spread(_any(prepared.clipped), 1)
     # What one reads along axes that turned unseen is not affected, but where an arm moves it.
-    cut |= _spread(np.asarray(prepared.gyro_clipped.any(axis=1)), wide + 1) if arm else False
+    cut |= _spread(_any(prepared.gyro_clipped), wide + 1) if arm else False
     at = time[cut]
     return np.asarray(
         np.searchsorted(at, edges[1:], side="right") > np.searchsorted(at, edges[:-1], side="left")
     )
+
+
+def _any(flags: Flags) -> Flags:
+    return np.asarray(flags.any(axis=1))
 
 
 def _spread(flags: Flags, by: int) -> Flags:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from strapdown.crash.at_point import AtPoint, at_point
@@ -11,6 +12,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.prepare_options import checked_options
+from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
 
 # Over which the attitude that is lent is read, in samples.
@@ -50,6 +52,7 @@ def prepare_together(
     """
     names = {u.unit.name for u in together.units}
     common = {k: v for k, v in options.items() if k not in names}
+    turning = [u.unit.name for u in together.units if u.lender is None and _turns(u)]
     done: dict[str, AtPoint] = {}
     for unit in sorted(together.units, key=lambda u: u.lender is not None):
         own = {"gravity": gravity, **common, **options.get(unit.unit.name, {})}
@@ -57,9 +60,43 @@ def prepare_together(
             lent = _attitude_at_start(unit, done[unit.lender])
             if lent is not None:
                 own["levelling"] = lent
-        prepared = prepare_unit(unit.unit, **checked_options(own))
+        hint = _gyro_to_borrow(unit, turning)
+        try:
+            prepared = prepare_unit(unit.unit, **checked_options(own))
+        except DataError as error:
+            if hint is None or error.finding.quantity != "gyro":
+                raise
+            raise DataError(
+                error.finding.what,
+                file=error.finding.file,
+                row=error.finding.row,
+                quantity="gyro",
+                remedy=f"{hint.remedy}; or state how far the vehicle turned (assumed)",
+            ) from None
+        if hint is not None:
+            prepared = replace(prepared, findings=(*prepared.findings, hint))
         done[unit.unit.name] = at_point(prepared, point, time_sd=unit.time_sd)
     return [done[u.unit.name] for u in together.units]
+
+
+def _turns(unit: SynchronisedUnit) -> bool:
+    """Whether it has a gyro that measures something, and is no stand-in for an assumption."""
+    gyro = unit.unit.gyro
+    return gyro is not None and len(gyro.absent) < 3
+
+
+def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding | None:
+    """For a unit without gyro that takes none from another, of which there are some."""
+    if unit.lender is not None or _turns(unit) or not turning:
+        return None
+    return Finding(
+        f"it has no gyro and borrows none, where {' and '.join(turning)} "
+        f"{'have one' if len(turning) > 1 else 'has one'}",
+        file=unit.unit.name,
+        quantity="gyro",
+        remedy=f"if both are fixed to one rigid vehicle, give it gyro_from = {turning[0]!r}: what "
+        "is measured there goes before any assumption",
+    )
 
 
 def _attitude_at_start(

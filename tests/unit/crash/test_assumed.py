@@ -30,6 +30,9 @@ from strapdown.sensors.assumed import Assumed, assumed_shapes
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import TURNS
+from strapdown.simulation.crash_recording import record_crash
+from strapdown.simulation.crash_scenarios import CRASHES
+from strapdown.simulation.paper_recorders import paper_units
 from strapdown.systems.crash_reconstruction import reconstruct_crash
 from strapdown.tables import NED, VELOCITY
 
@@ -310,3 +313,25 @@ class TestAnswers:
         other = drawn_motion(2, seed=1)
         assert np.abs(other.place[0][-1] - straight.place[0][-1]).max() > 0.01
         assert np.abs(other.place[0][-1] - other.place[1][-1]).max() > 0.01
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_a_gyro_on_the_same_vehicle_is_named_where_none_is_borrowed(stated):
+    crash = CRASHES["frontal"]
+    own, other = (
+        record_crash(crash.motion, d, impact=crash.start, seed=1)[0]
+        for d in paper_units()
+        if d.name.startswith("IMU")
+    )
+    assumed = Assumed(turn_sd_deg=2.0, because="a wall across") if stated else None
+    without = replace(other, gyro=None, assumed=assumed)
+    if stated:
+        found = reconstruct_crash([own, without], Entry.from_speed(15.65, 0.05))
+        (said,) = (f for f in found.findings if "borrows none" in f.what)
+        assert said.file == "IMU2"
+        words = said.remedy
+    else:
+        with pytest.raises(DataError) as error:
+            reconstruct_crash([own, without], Entry.from_speed(15.65, 0.05))
+        words = error.value.finding.remedy
+    assert "gyro_from = 'IMU1'" in words

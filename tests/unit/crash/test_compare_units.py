@@ -13,6 +13,7 @@ from strapdown.crash.at_point import at_point
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.compare_units import compare_units
 from strapdown.crash.match_axes import signed_permutations
+from strapdown.crash.mean_weights import least_variance
 from strapdown.crash.unit_differences import (
     difference_covariance,
     joint_covariance,
@@ -290,6 +291,66 @@ def test_what_is_refused():
         combine_units([one, one], "median")
     with pytest.raises(ConfigError, match="no way"):
         combine_units([one, one], "mode")
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 7])
+def test_a_car_that_is_spun_by_a_blow_from_the_side_is_no_disagreement(seed):
+    # Its rate comes within 60 ms, and with arms that are a metre apart 15 % of the angular
+    # acceleration are 23 mm/s in a piece: chi-square 114 to 155 of 60 in these records.
+    units = [of.unit for of in record_case(CASES["side"], seed=seed).units]
+    assert reconstruct_crash(units, Entry.from_speed(0.0, 0.05), combine=False).comparison.agree
+
+
+def test_a_mean_lies_between_units_that_disagree_and_is_not_told_of_them():
+    units = [of.unit for of in record_case(CASES["side-disagree"], seed=0).units]
+    found = reconstruct_crash(units, Entry.from_speed(0.0, 0.05))
+    assert not found.comparison.agree
+    assert found.combined is None
+    assert found.main is found.units[0]
+    assert sum("no mean is told" in f.what for f in found.findings) == 1
+    silent = reconstruct_crash(units, Entry.from_speed(0.0, 0.05), combine=False).findings
+    assert not any("no mean is told" in f.what for f in silent)
+    there = [u.at_point for u in found.units]
+    mean = combine_units(there)
+    edges = np.array([0.0, 0.05, 0.1, 0.2])
+    parts = np.array([velocity_increments(u, edges).values for u in there])
+    between = velocity_increments(mean, edges).values
+    # Straight lines between the stamps of two clocks: a millimetre per second.
+    assert (between >= parts.min(axis=0) - 1e-3).all()
+    assert (between <= parts.max(axis=0) + 1e-3).all()
+
+
+def test_weights_are_the_best_of_those_that_are_not_negative():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        root = rng.normal(size=(3, 3))
+        covariance = root @ root.T
+        weights = least_variance(covariance)
+        assert weights.sum() == pytest.approx(1.0)
+        assert (weights >= 0.0).all()
+        # No worse than any of many others, to the rounding of the least squares.
+        others = rng.dirichlet(np.ones(3), 2000)
+        least = np.einsum("ni,ij,nj->n", others, covariance, others).min()
+        assert weights @ covariance @ weights <= least * (1 + 1e-9)
+    # Two that are independent: the inverses of their variances.
+    assert least_variance(np.diag([1.0, 4.0])) == pytest.approx([0.8, 0.2])
+
+
+def test_what_was_cut_off_is_not_compared():
+    units = [of.unit for of in record_case(CASES["saturated"], seed=0).units]
+    found = reconstruct_crash(units, Entry.from_speed(15.65, 0.05))
+    pair = found.comparison.pairs[0]
+    assert found.comparison.agree
+    assert pair.freedom < 60
+    assert pair.axes.kind == "agree"
+    gone = np.isnan(pair.force_difference).all(axis=1)
+    assert pair.freedom == 3 * (~gone).sum()
+    # Nothing is added where nothing was compared.
+    assert not np.diff(pair.difference, axis=0)[gone].any()
+    for name in ("IMU1", "IMU2"):
+        assert any(
+            f.file == name and "left out where it is compared" in f.what for f in found.findings
+        )
 
 
 @pytest.mark.parametrize("seed", [0, 2])

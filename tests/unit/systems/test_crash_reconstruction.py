@@ -90,7 +90,7 @@ class TestEntry:
     def test_an_instant_in_the_crash_is_told(self, unit):
         late = replace(unit, trigger=unit.trigger + 0.05)
         findings = reconstruct_crash([late], ENTRY, window=(-0.2, 0.5)).findings
-        assert any(f.quantity == "entry" and "50.58 ms before" in f.what for f in findings)
+        assert any(f.quantity == "entry" and "50.46 ms before" in f.what for f in findings)
 
     def test_a_quiet_drive_is_no_rest_to_begin_at(self, unit):
         def late(triad):
