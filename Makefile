@@ -59,14 +59,14 @@ bench: $(VENV)/.dev
 	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m benchmarks
 
 messages: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) tests/cli/test_messages.py
+	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) -m '' tests/cli/test_messages.py
 
 statements: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) tests/cli/test_reproduce.py \
+	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' tests/cli/test_reproduce.py \
 		tests/unit/systems/test_reproduce_tadic.py
 
 pictures: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) tests/cli/test_pictures.py \
+	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py \
 		tests/unit/systems/test_reproduce_tadic.py
 
 docs: $(VENV)/.dev

@@ -177,6 +177,7 @@ def _without_usual(lines: list[str]) -> list[str]:
     return kept
 
 
+@pytest.mark.slow
 def test_every_message_is_as_the_manual_has_it(page):
     if os.environ.get("STRAPDOWN_WRITE_MESSAGES"):
         PAGE.write_text(page, encoding="utf-8")

@@ -6,6 +6,7 @@ from strapdown.cli.console import console, print_table
 from strapdown.report.crash_check_tables import comparison_table
 from strapdown.report.crash_limits import limitations
 from strapdown.report.crash_tables import answers_table, path_table
+from strapdown.report.crash_values import spaced
 from strapdown.report.crash_words import headline
 from strapdown.report.document import TableBlock
 from strapdown.systems.crash_case import CaseResult
@@ -19,13 +20,15 @@ def print_crash(result: CaseResult) -> None:
     for block in (answers_table(result), path_table(result), comparison_table(result)):
         if block is not None and block.rows:
             _print(block)
-    out.print(headline(result), style="bold")
+    out.print(spaced(headline(result)), style="bold")
     found = limitations(result)
     if found:
         out.print("\nWhat limits it (more in the report):")
         for head, _ in found:
-            out.print(f"  - {head}")
+            out.print(f"  - {spaced(head)}")
 
 
 def _print(block: TableBlock) -> None:
-    print_table(block.columns, block.rows, text=block.text, strong=block.strong)
+    rows = [[spaced(cell) for cell in row] for row in block.rows]
+    columns = [spaced(name) for name in block.columns]
+    print_table(columns, rows, text=block.text, strong=block.strong)

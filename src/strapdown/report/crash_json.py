@@ -15,6 +15,7 @@ from strapdown.crash.unit_comparison import UnitComparison
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.crash.velocity_change import EventChanges, VelocityChange
 from strapdown.report import crash_assumptions, crash_limits, crash_words
+from strapdown.report.crash_values import spaced
 from strapdown.systems.case_references import ReferenceAnswer
 from strapdown.systems.case_severity import SeverityAnswer, main_event
 from strapdown.systems.crash_case import CaseResult
@@ -44,7 +45,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "title": result.spec.title,
         "number": result.spec.number,
         "conventions": dict(crash_assumptions.CONVENTIONS),
-        "headline": crash_words.headline(result),
+        "headline": spaced(crash_words.headline(result)),
         "main": made.main.name,
         "answers": [_unit(unit) for unit in made.answers],
         "comparison": None if made.comparison is None else _comparison(made.comparison),
@@ -81,7 +82,7 @@ def _named(value: Any, key: str = "") -> Any:
 
 
 def _pairs(rows: tuple[tuple[str, str], ...]) -> list[dict[str, str]]:
-    return [{"what": head, "text": text} for head, text in rows]
+    return [{"what": spaced(head), "text": spaced(text)} for head, text in rows]
 
 
 def _about(value: float, half: float) -> dict[str, float]:

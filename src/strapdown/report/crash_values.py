@@ -20,6 +20,7 @@ __all__ = [
     "plain",
     "recorder",
     "side_words",
+    "spaced",
     "speed",
     "speed_range",
 ]
@@ -137,3 +138,8 @@ def axis_names(result: CaseResult) -> tuple[str, str, str]:
     if entry.kind == "gnss" or entry.heading_deg:
         return ("north", "east", "down")
     return ("forward", "right", "down")
+
+
+def spaced(text: str) -> str:
+    """Return a text with ordinary spaces, for what is searched and not set on a page."""
+    return text.replace(GAP, " ")

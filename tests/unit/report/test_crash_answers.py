@@ -20,6 +20,7 @@ from strapdown.report.crash_case import file_name
 from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
 from strapdown.report.crash_json import crash_json
 from strapdown.report.crash_limits import limitations
+from strapdown.report.crash_values import spaced
 from strapdown.report.simulation import simulate
 from strapdown.systems.case_references import compare_reference
 from strapdown.systems.case_severity import case_severity, main_event
@@ -132,7 +133,7 @@ def test_nothing_to_compare_with_and_what_does_not_agree(result):
     first, *others = result.references
     assert first.unit == result.reconstruction.main.name
     off = replace(result, references=(replace(first, consistent=False), *others))
-    assert heads(off) - USUAL == {"cameras: not within the bounds"}
+    assert heads(off) - USUAL == {"Not within the bounds of what else is known: cameras"}
     # That of a recorder by itself stands in the table, and does not limit the answer.
     other = replace(result, references=(first, replace(others[0], consistent=False)))
     assert heads(other) == USUAL
@@ -146,9 +147,9 @@ def test_what_was_assumed_is_said_with_its_reason(result):
     )
     texts = dict(limitations(replace(result, spec=spec)))
     (head,) = set(texts) - USUAL
-    assert head == "IMU2: something is assumed that was not measured"
-    assert "standard deviation of 2° of each angle between 0 s and 0.2 s" in texts[head]
-    assert texts[head].endswith("Reason stated: film of IMU1")
+    assert head == "IMU2: not everything was measured"
+    assert "standard deviation of 2° between 0 s and 0.2 s" in spaced(texts[head])
+    assert texts[head].endswith("Reason stated: film of IMU1.")
 
 
 def prepared_of(result, change):
@@ -163,8 +164,16 @@ def prepared_of(result, change):
 @pytest.mark.parametrize(
     ("part", "head", "text"),
     [
-        ("clipped", "IMU1: the accelerometer was at the end of its range", "delta-V is too small"),
-        ("gyro_clipped", "IMU1: the gyro was at the end of its range", "attitude after it"),
+        (
+            "clipped",
+            "IMU1: the accelerometer was at the end of its range, and the true delta-V is larger",
+            "no bound here knows how much",
+        ),
+        (
+            "gyro_clipped",
+            "IMU1: the gyro was at the end of its range, and the vehicle turned more",
+            "no bound here knows how much",
+        ),
     ],
 )
 def test_a_sensor_at_its_end(result, part, head, text):
@@ -175,7 +184,7 @@ def test_a_sensor_at_its_end(result, part, head, text):
 
     texts = dict(limitations(prepared_of(result, change)))
     assert set(texts) - USUAL == {head}
-    assert texts[head].startswith("Axis y, 3 samples between ")
+    assert texts[head].startswith("IMU1: its axis y, 3 samples between ")
     assert text in texts[head]
 
 

@@ -13,6 +13,7 @@ from strapdown.report.crash_values import (
     instant,
     plain,
     side_words,
+    spaced,
     speed,
     speed_range,
 )
@@ -60,22 +61,22 @@ def test_a_number_to_so_many_places(value, places, text):
     ],
 )
 def test_a_value_is_rounded_by_its_bound(value, half, text):
-    assert about(value, half, "m") == text
+    assert spaced(about(value, half, "m")) == text
 
 
 def test_a_bound_that_rounds_up_has_a_digit_more_and_never_less():
-    assert about(10.0, 0.0996, "m") == "10.000 ± 0.100 m"
-    assert about(10.0, 9.96, "m") == "10.0 ± 10.0 m"
+    assert spaced(about(10.0, 0.0996, "m")) == "10.000 ± 0.100 m"
+    assert spaced(about(10.0, 9.96, "m")) == "10.0 ± 10.0 m"
 
 
 def test_without_a_unit_nothing_trails():
-    assert about(1.0, 0.1, "") == "1.00 ± 0.10"
+    assert spaced(about(1.0, 0.1, "")) == "1.00 ± 0.10"
 
 
 def test_speeds_are_in_km_per_h_with_m_per_s_beside():
-    assert speed(-10.0, 1.0) == f"{MINUS}36.0 ± 3.6 km/h"
-    assert speed_range(10.0, 1.0) == "32.4 to 39.6 km/h with 95 %; 10.0 ± 1.0 m/s"
-    assert speed_range(0.5, 1.0).startswith(f"{MINUS}1.8 to 5.4 km/h")
+    assert spaced(speed(-10.0, 1.0)) == f"{MINUS}36.0 ± 3.6 km/h"
+    assert spaced(speed_range(10.0, 1.0)) == "32.4 to 39.6 km/h with 95 %; 10.0 ± 1.0 m/s"
+    assert spaced(speed_range(0.5, 1.0)).startswith(f"{MINUS}1.8 to 5.4 km/h")
 
 
 @pytest.mark.parametrize(
@@ -90,13 +91,15 @@ def test_speeds_are_in_km_per_h_with_m_per_s_beside():
     ],
 )
 def test_instants_have_no_idle_zeros(time, text):
-    assert instant(time) == text
+    assert spaced(instant(time)) == text
 
 
 def test_a_direction_that_nothing_bounds_is_said_to_be_none():
     open_one = AngleInterval(math.nan, math.nan, True)
-    assert angle_range(open_one) == "not determined: no direction is excluded with 95 %"
-    assert angle_range(AngleInterval(-3.44, 0.26, False)) == f"{MINUS}3.4° to 0.3° with 95 %"
+    assert spaced(angle_range(open_one)) == "not determined: no direction is excluded with 95 %"
+    assert (
+        spaced(angle_range(AngleInterval(-3.44, 0.26, False))) == f"{MINUS}3.4° to 0.3° with 95 %"
+    )
 
 
 @pytest.mark.parametrize(

@@ -56,6 +56,9 @@ AS_WRITTEN = {
     "high-g-range": ("IMU high-G\tMMA3202, MMA1213\t200 Hz\t±100 g",),
 }
 
+# The paper is re-made once for all of them, which takes half a minute.
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def progress():
