@@ -55,6 +55,7 @@ def deviations(*, spun, seed):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_bounds_hold_what_they_say_where_the_assumption_is_true():
     """Turns of 4 deg and 0.8 m/s aside, drawn as stated.
 
@@ -68,6 +69,7 @@ def test_bounds_hold_what_they_say_where_the_assumption_is_true():
     assert within.min() >= 0.95 - 3.0 * 0.0126
 
 
+@pytest.mark.slow
 def test_a_turn_that_grows_with_the_velocity_lost_is_within_the_bounds():
     """As an eccentric impact turns a vehicle: late, so that it does less than the bounds say."""
     within = (np.abs(deviations(spun=True, seed=5)) < 1.96).mean(axis=0)

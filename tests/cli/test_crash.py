@@ -274,6 +274,7 @@ def test_a_command_line_that_is_not_understood(run_cli):
     assert run_cli("crash", "case.toml", "--fast").code == 2
 
 
+@pytest.mark.slow
 def test_it_verifies_where_it_stands_without_its_records(sealed_crash, run_cli, copied_crash):
     done = run_cli("verify", copied_crash)
     assert done.out.startswith("identical\n"), done.out

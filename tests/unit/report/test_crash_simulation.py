@@ -155,6 +155,7 @@ def test_the_camera_path_is_read_as_a_table(folder):
 
 
 @pytest.mark.parametrize("name", [*CRASHED, "short-rest", "tadic-pole"])
+@pytest.mark.slow
 def test_the_answers_of_a_sound_case_hold_the_truth(name, answers):
     """Change of velocity of each event of each unit, and the ends of the paths."""
     found, crash = answers(name), CASES[name].crash
