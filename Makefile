@@ -37,7 +37,7 @@ demo: $(VENV)/.run
 	$(BIN)/strapdown demo --out demo --force
 
 test: $(VENV)/.test
-	@$(FRESH) $(PYTEST) -n 2 --dist loadscope
+	@$(FRESH) $(PYTEST) -n 2
 
 test-slow: $(VENV)/.test
 	@$(FRESH) $(PYTEST) -m slow

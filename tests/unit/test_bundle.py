@@ -277,6 +277,7 @@ def test_a_forged_simulation_is_found_elsewhere(tmp_path, name):
     assert verify(seal.path).verdict == "changed"
 
 
+@pytest.mark.slow
 def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
     simulate("alexiev-fig2e", tmp_path / "logs", rate=20)
     monkeypatch.chdir(tmp_path)

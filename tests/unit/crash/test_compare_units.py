@@ -116,6 +116,7 @@ def unit(
 A, B, C = (-0.6, 0.5, -0.2), (0.4, -0.5, 0.1), (0.9, 0.3, -0.3)
 
 
+@pytest.mark.slow
 def test_honest_units_agree_and_their_chi_square_is_one():
     chi, freedom, against, total = [], 0, [], []
     for k in range(25):

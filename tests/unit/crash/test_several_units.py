@@ -140,6 +140,7 @@ def test_one_unknown_of_two_units_stands_once(four):
     assert not lab.rate[lab.names.index("LAB1 timing")].any()
 
 
+@pytest.mark.slow
 def test_errors_of_combined_paths_are_what_they_state():
     squares = []
     for seed in range(20):
