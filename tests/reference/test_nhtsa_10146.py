@@ -8,6 +8,7 @@ of the car's centre of mass. There is no vehicle rate gyro and no film.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pymap3d
@@ -379,3 +380,18 @@ class TestHeads:
         # Far below the limit of 700 of FMVSS 208, as in every car of its year; twins differ by
         # 2.5 times what their gains do.
         assert found == pytest.approx([hic15, hic15], rel=0.01)
+
+
+def test_a_case_that_names_the_header_is_the_same_from_its_sealed_copy(recordings, tmp_path):
+    from strapdown.config.crash_case_file import read_case_spec
+    from strapdown.systems.crash_case import whole_records
+
+    folder = recordings("crash_nhtsa_10146")
+    text = (Path(__file__).parent / "cases" / "nhtsa_10146.toml").read_text(encoding="utf-8")
+    case = tmp_path / "case.toml"
+    case.write_text(text.replace("STRAPDOWN_DATA", folder.parent.as_posix()), encoding="utf-8")
+    records, spec = whole_records(read_case_spec(case))
+    again, same = whole_records(spec)
+    assert list(records) == list(again) == [str(folder)]
+    assert [r.path for r in records.values()] == [r.path for r in again.values()] == [folder]
+    assert same == spec

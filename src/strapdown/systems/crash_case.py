@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from strapdown.config.crash_case import CaseSpec, TriadSpec
@@ -170,7 +170,10 @@ def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
         )
         for unit in spec.units
     )
-    records = {moved[path]: record for path, record in read.items()}
+    # A record has one name, by whichever of its files it was given: the bundle has the folder.
+    records = {
+        moved[path]: replace(record, path=Path(moved[path])) for path, record in read.items()
+    }
     return records, spec.model_copy(update={"units": units})
 
 
