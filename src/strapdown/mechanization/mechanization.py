@@ -12,7 +12,9 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.earth import RATE
+from strapdown._kernels.level import LEVEL
 from strapdown._kernels.ned import ALT, LAT, LON, POLE, ROW, Q, V, reverse_increments
+from strapdown._kernels.ned_level import ned_correct, ned_levels
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
@@ -63,6 +65,10 @@ class Mechanization(ABC):
     name: ClassVar[str]
     summary: ClassVar[str]
     source: ClassVar[str]
+    #: Numbers in a row of its history.
+    row: ClassVar[int] = ROW
+    #: Third component of up in its level axes: -1 where they are north-east-down.
+    level_up: ClassVar[float] = -1.0
 
     def __post_init__(self) -> None:
         find_ellipsoid(self.ellipsoid)
@@ -106,6 +112,44 @@ class Mechanization(ABC):
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
         """Advance `state` over rows of increments; return the steps made, and why no more."""
+
+    def levels(self, history: Array) -> Array:
+        """Return what a filter needs to know of each row of a history.
+
+        Parameters
+        ----------
+        history : ndarray, (n, `row`)
+
+        Returns
+        -------
+        ndarray, (n, 14)
+            In level axes l: quaternion body to level, velocity, unit vector of the Earth's axis,
+            height, rate of the level relative to the Earth (`_kernels.level`).
+        """
+        out = np.empty((len(history), LEVEL))
+        ned_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
+        return out
+
+    def correct(self, state: Array, error: ArrayLike) -> Array:
+        """Take an error off a state.
+
+        Parameters
+        ----------
+        state : ndarray
+            It is not changed.
+        error : array_like, (9,)
+            State less truth, in level axes of the state: displacement in m, difference of the
+            velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
+            to the Earth, ``C_state = exp([psi x]) C_true``.
+
+        Returns
+        -------
+        ndarray
+        """
+        after = state.copy()
+        earth = find_ellipsoid(self.ellipsoid).parameters()
+        ned_correct(after, np.asarray(error, dtype=np.float64), earth)
+        return after
 
     def nav_state(self, state: Array, time: float) -> NavState:
         """Return the place, velocity and attitude of a state.

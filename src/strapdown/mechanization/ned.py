@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from strapdown._kernels import ned as kernel
 from strapdown.ellipsoids import find_ellipsoid
@@ -48,24 +49,21 @@ class NorthEastDown(Mechanization):
         ndarray, (15,)
         """
         down = 0.0 if self.height == "held" else start.v_n[2]
-        sine = math.sin(start.lat)
+        place = [start.lat, start.lon, start.alt]
+        level = self._level(start.lat)
+        return np.array([*place, *start.v_n[:2], down, *start.q_nb, *level, 0.0, 0.0])
+
+    def correct(self, state: Array, error: ArrayLike) -> Array:
+        """Take an error off a state, as `Mechanization.correct`."""
+        after = super().correct(state, error)
+        after[kernel.SINE : kernel.PRIME + 1] = self._level(float(after[kernel.LAT]))
+        return after
+
+    def _level(self, lat: float) -> tuple[float, float, float]:
+        """Sine and cosine of the latitude, and the radius of the prime vertical over a."""
+        sine = math.sin(lat)
         squared = find_ellipsoid(self.ellipsoid).eccentricity_squared
-        return np.array(
-            [
-                start.lat,
-                start.lon,
-                start.alt,
-                start.v_n[0],
-                start.v_n[1],
-                down,
-                *start.q_nb,
-                sine,
-                math.cos(start.lat),
-                1.0 / math.sqrt(1.0 - squared * sine * sine),
-                0.0,
-                0.0,
-            ]
-        )
+        return sine, math.cos(lat), 1.0 / math.sqrt(1.0 - squared * sine * sine)
 
     def advance_rows(
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array

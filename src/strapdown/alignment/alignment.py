@@ -1,0 +1,72 @@
+"""What every alignment returns: an attitude at an instant, with its uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import Finding
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Alignment:
+    """Attitude of a body at one instant, and how well it is known.
+
+    Attributes
+    ----------
+    method : str
+        Which one found it.
+    time : float, s
+        The instant at which it holds.
+    q_nb : ndarray, (4,)
+        Body forward-right-down to north-east-down, scalar first.
+    covariance : ndarray, (3, 3), rad²
+        Of the rotation vector ``phi`` in north-east-down axes with
+        ``C_estimated = exp([phi x]) C_true``: the components north and east are tilts, down is
+        the error of the heading with its sign: a heading that is too large has a positive one.
+    gyro_bias, accel_bias : ndarray, (3,), rad/s and m/s², optional
+        Where the method tells them, body axes: reading less truth.
+    gyro_bias_sd, accel_bias_sd : ndarray, (3,), optional
+    findings : tuple of Finding
+        Assumptions that do not hold, and what the sensors cannot tell.
+    """
+
+    method: str
+    time: float
+    q_nb: Array
+    covariance: Array
+    gyro_bias: Array | None = None
+    accel_bias: Array | None = None
+    gyro_bias_sd: Array | None = None
+    accel_bias_sd: Array | None = None
+    findings: tuple[Finding, ...] = field(default=())
+
+    @property
+    def roll_pitch_heading(self) -> Array:
+        """Attitude as 3-2-1 angles, (3,), deg."""
+        return rotation.euler_from_quaternion(self.q_nb)
+
+    @property
+    def sd_deg(self) -> Array:
+        """Standard deviations of roll, pitch and heading, (3,), deg, to first order.
+
+        Near a pitch of ±90° those of roll and heading grow without bound.
+        """
+        _, pitch, heading = np.radians(self.roll_pitch_heading)
+        # phi_n = turning of the three axes by which the angles turn: heading about down, pitch
+        # about the horizontal right, roll about forward.
+        s, c = np.sin(heading), np.cos(heading)
+        axes = np.array(
+            [
+                [np.cos(pitch) * c, -s, 0.0],
+                [np.cos(pitch) * s, c, 0.0],
+                [-np.sin(pitch), 0.0, 1.0],
+            ]
+        )
+        angles = np.linalg.solve(axes, np.eye(3))
+        return np.degrees(np.sqrt(np.diagonal(angles @ self.covariance @ angles.T)))

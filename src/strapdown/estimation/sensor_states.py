@@ -1,0 +1,49 @@
+"""Errors of the sensors as states: what each does to rate and force, and how it changes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.estimation.states import StateBlock
+
+Array = NDArray[np.float64]
+
+#: First axis of a coupling: a constant part, and the parts per rate x, y, z and per force x, y, z.
+COUPLING = 7
+
+
+@dataclass(frozen=True, eq=False)
+class SensorStates:
+    """A block of k states of the sensors.
+
+    Attributes
+    ----------
+    block : StateBlock
+    sd : ndarray, (k,)
+        At the start, in the unit of the block.
+    gyro, accel : ndarray, (7, 3, k)
+        What they add to the measured rate and specific force in body axes, linear in both:
+        ``(gyro[0] + sum rate_i gyro[1 + i] + sum force_i gyro[4 + i]) @ states``. Zero for states
+        that only measurements see, such as a lever arm.
+    correlation_time : float, s
+        Of a first-order Gauss-Markov process; infinite for constants and random walks.
+    drive : ndarray, (k,)
+        White noise that drives them, as a density: unit/√s, so that a random walk has a variance
+        of ``drive² t``; zero for constants.
+    """
+
+    block: StateBlock
+    sd: Array
+    gyro: Array
+    accel: Array
+    correlation_time: float
+    drive: Array
+
+    @property
+    def decay(self) -> float:
+        """One over the correlation time, 1/s."""
+        return 0.0 if math.isinf(self.correlation_time) else 1.0 / self.correlation_time
