@@ -65,6 +65,8 @@ class ErrorModel(ABC):
     summary: ClassVar[str]
     source: ClassVar[str]
     core: ClassVar[tuple[StateBlock, ...]]
+    #: Whether the states are the physical errors themselves.
+    states_are_physical: ClassVar[bool] = False
 
     @cached_property
     def layout(self) -> StateLayout:

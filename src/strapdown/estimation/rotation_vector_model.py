@@ -37,6 +37,7 @@ class RotationVectorModel(ErrorModel):
     name: ClassVar[str] = "rotation_vector"
     summary: ClassVar[str] = "15 states: displacement, velocity, rotation vector, biases"
     source: ClassVar[str] = "Benson (1975), psi-angle"
+    states_are_physical: ClassVar[bool] = True
     core: ClassVar[tuple[StateBlock, ...]] = (
         StateBlock("displacement", AXES, "m"),
         StateBlock("velocity", AXES, "m/s"),
