@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,11 @@ class ErrorFilter:
     rule: UpdateRule | None = None
     step: float = 0.1
 
+    @cached_property
+    def earth(self) -> Array:
+        """Ellipsoid of the mechanization, as kernels take it."""
+        return find_ellipsoid(self.mechanization.ellipsoid).parameters()
+
     def begin(self, start: NavState, P: Array) -> FilterState:
         """Return the state at a start.
 
@@ -130,8 +136,7 @@ class ErrorFilter:
         history = np.empty((len(rows) + 1, used.row))
         history[0] = state.row
         after = state.mechanization.copy()
-        earth = find_ellipsoid(used.ellipsoid).parameters()
-        made, why = used.advance_rows(after, rows, np.empty(0), earth, history[1:])
+        made, why = used.advance_rows(after, rows, np.empty(0), self.earth, history[1:])
         if why:
             raise DivergenceError(
                 f"the state has diverged with the sample at {time[made]:.9g} s",

@@ -67,6 +67,8 @@ class ErrorModel(ABC):
     core: ClassVar[tuple[StateBlock, ...]]
     #: Whether the states are the physical errors themselves.
     states_are_physical: ClassVar[bool] = False
+    #: Whether it has a state of the height.
+    has_height: ClassVar[bool] = True
 
     @cached_property
     def layout(self) -> StateLayout:
