@@ -15,11 +15,12 @@ from strapdown import rotation
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import AXIS, Q_LB, V_L
 from strapdown.alignment.site import Site
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL, Segment
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.sensor_states import stacked
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
@@ -56,7 +57,8 @@ def position_observation(
     """
     used = filter_.mechanization
     here = used.nav_state(state.mechanization, state.time)
-    apart = used.level_from_ned(state.row) @ state_error(here, home)[:3]
+    earth = find_ellipsoid(used.ellipsoid)
+    apart = used.level_from_ned(state.row) @ displacement_between(here, home, earth)
     rows = 2 if used.height == "held" or not filter_.model.has_height else 3
     H = np.zeros((rows, filter_.model.physical_size))
     H[:, :rows] = np.eye(rows)
