@@ -130,6 +130,20 @@ class Mechanization(ABC):
         ned_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
 
+    def history_row(self, state: Array) -> Array:
+        """Return a state as a row of a history, (`row`,)."""
+        return state[: self.row].copy()
+
+    def level_from_ned(self, row: Array) -> Array:
+        """Return the matrix that turns vectors from north-east-down into level axes, (3, 3).
+
+        Parameters
+        ----------
+        row : ndarray, (`row`,)
+            Of a history.
+        """
+        return np.eye(3)
+
     def correct(self, state: Array, error: ArrayLike) -> Array:
         """Take an error off a state.
 
