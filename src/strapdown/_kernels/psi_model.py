@@ -223,6 +223,50 @@ def noise_of_step(f, matrix, dt, gyro_noise, accel_noise, decay, drive, held, ad
 
 
 @njit(cache=True, error_model="numpy")
+def means_of_steps(levels, rows, at, longest, matrix):
+    """Fill `matrix` (6, 3) with means over the steps from `at` on, up to `longest` seconds.
+
+    Rows 0 to 2: C_lb; row 3: C_lb f; rows 4 and 5: rate and force of the body. Returns the first
+    step that is not among them, and their time.
+    """
+    dt = 0.0
+    matrix[:, :] = 0.0
+    end = at
+    count = rows.shape[0]
+    while end < count and (end == at or dt + rows[end, 0] <= longest * 1.000001):
+        h = rows[end, 0]
+        a, b = levels[end], levels[end + 1]
+        # Between the two ends; the sign of a quaternion is not its own.
+        sign = 1.0
+        if (
+            a[Q_LB] * b[Q_LB]
+            + a[Q_LB + 1] * b[Q_LB + 1]
+            + a[Q_LB + 2] * b[Q_LB + 2]
+            + a[Q_LB + 3] * b[Q_LB + 3]
+            < 0.0
+        ):
+            sign = -1.0
+        qw, qx = a[Q_LB] + sign * b[Q_LB], a[Q_LB + 1] + sign * b[Q_LB + 1]
+        qy, qz = a[Q_LB + 2] + sign * b[Q_LB + 2], a[Q_LB + 3] + sign * b[Q_LB + 3]
+        norm = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+        c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
+        start = dcm_from_quat(a[Q_LB], a[Q_LB + 1], a[Q_LB + 2], a[Q_LB + 3])
+        for i in range(3):
+            for j in range(3):
+                matrix[i, j] += h * c[3 * i + j]
+                # Velocity increments are in the axes of the start of their step.
+                matrix[3, i] += start[3 * i + j] * rows[end, 4 + j]
+            matrix[4, i] += rows[end, 1 + i]
+            matrix[5, i] += rows[end, 4 + i]
+        dt += h
+        end += 1
+    for i in range(6):
+        for j in range(3):
+            matrix[i, j] /= dt
+    return end, dt
+
+
+@njit(cache=True, error_model="numpy")
 def psi_transitions(
     levels,
     rows,
@@ -258,40 +302,7 @@ def psi_transitions(
     at = 0
     count = rows.shape[0]
     while at < count:
-        dt = 0.0
-        matrix[:, :] = 0.0
-        end = at
-        # Rows 0 to 2: C_lb; row 3: C_lb f; rows 4 and 5: rate and force of the body.
-        while end < count and (end == at or dt + rows[end, 0] <= longest * 1.000001):
-            h = rows[end, 0]
-            a, b = levels[end], levels[end + 1]
-            # Between the two ends; the sign of a quaternion is not its own.
-            sign = 1.0
-            if (
-                a[Q_LB] * b[Q_LB]
-                + a[Q_LB + 1] * b[Q_LB + 1]
-                + a[Q_LB + 2] * b[Q_LB + 2]
-                + a[Q_LB + 3] * b[Q_LB + 3]
-                < 0.0
-            ):
-                sign = -1.0
-            qw, qx = a[Q_LB] + sign * b[Q_LB], a[Q_LB + 1] + sign * b[Q_LB + 1]
-            qy, qz = a[Q_LB + 2] + sign * b[Q_LB + 2], a[Q_LB + 3] + sign * b[Q_LB + 3]
-            norm = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
-            c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
-            start = dcm_from_quat(a[Q_LB], a[Q_LB + 1], a[Q_LB + 2], a[Q_LB + 3])
-            for i in range(3):
-                for j in range(3):
-                    matrix[i, j] += h * c[3 * i + j]
-                    # Velocity increments are in the axes of the start of their step.
-                    matrix[3, i] += start[3 * i + j] * rows[end, 4 + j]
-                matrix[4, i] += rows[end, 1 + i]
-                matrix[5, i] += rows[end, 4 + i]
-            dt += h
-            end += 1
-        for i in range(6):
-            for j in range(3):
-                matrix[i, j] /= dt
+        end, dt = means_of_steps(levels, rows, at, longest, matrix)
         # The level row of the middle; attitude and force are means already.
         middle = levels[(at + end) // 2]
         psi_dynamics(

@@ -257,8 +257,8 @@ def _by_terms(
     states = _unseen(name, tuple(labels or terms), unit, sds)
     on_gyros = sensor == "gyro" or (not sensor and source == RATE)
     coupling = states.gyro if on_gyros else states.accel
-    for k, (row, column) in enumerate(terms):
-        coupling[source + XYZ.index(column), XYZ.index(row), k] = 1.0
+    for k, term in enumerate(terms):
+        coupling[source + XYZ.index(term[1]), XYZ.index(term[0]), k] = 1.0
     return states
 
 
