@@ -170,14 +170,10 @@ def wander_step(
     w = w * (1.5 - 0.5 * (1.0 - e2 * s2) * w * w)
     prime, slope, across, curvature = curving(w, alt, a, e2)
     along = e2 * slope * across * curvature
-    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(
-        q_wb[0], q_wb[1], q_wb[2], q_wb[3]
-    )
+    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(q_wb[0], q_wb[1], q_wb[2], q_wb[3])
     ux, uy, uz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv[0], dv[1], dv[2])
     sx, sy, sz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr[0], dr[1], dr[2])
-    lean, down, steep, loss, bend = gravity_parts(
-        s2, alt, w, curvature, a, e2, gamma, k, f, m
-    )
+    lean, down, steep, loss, bend = gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m)
     vx, vy, vz = v
     ox, oy, oz = rate * px, rate * py, rate * pz
     outward = -lean * alt * pz

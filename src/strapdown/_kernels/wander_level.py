@@ -9,7 +9,7 @@ from numba import njit
 
 from strapdown._kernels.earth import E2, A
 from strapdown._kernels.level import ALT as LEVEL_ALT
-from strapdown._kernels.level import AXIS, LEVEL, OMEGA_EL, Q_LB, V_L, curvatures
+from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L, curvatures
 from strapdown._kernels.ned import turn_back
 from strapdown._kernels.rotation import (
     DEGREES,
