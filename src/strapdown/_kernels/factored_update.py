@@ -153,7 +153,7 @@ def wd_take(W, d, x, H, j, work, s, moved, slope, r):
 
 @njit(cache=True, error_model="numpy")
 def wd_finish(W, d, out):
-    """Write the U and D of ``W d W'`` to `out` (Eq. 15); return -1 or a state that is not finite."""
+    """Write the U and D of ``W d W'`` to `out` (Eq. 15); return -1 or a bad state."""
     mwgs(W, d, out)
     return not_finite(out)
 
