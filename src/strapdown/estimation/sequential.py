@@ -55,3 +55,8 @@ def take_by_rule(
 def contiguous(*arrays: Array) -> list[Array]:
     """Return arrays as the kernels want them."""
     return [np.ascontiguousarray(a, dtype=np.float64) for a in arrays]
+
+
+def own(array: Array) -> Array:
+    """Return a copy that the kernels may change."""
+    return np.array(array, dtype=np.float64, order="C")
