@@ -7,11 +7,16 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from strapdown.estimation.influence import Influence
+from strapdown.estimation.influence_huber import Huber
+from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.exceptions import ConfigError
+
+HUBER = Huber()
 
 
 class ScaleState(NamedTuple):
-    """What has been learnt of one kind of observation; two numbers to keep with the filter.
+    """What has been learnt of one kind of observation: numbers to keep with the filter.
 
     Attributes
     ----------
@@ -19,10 +24,13 @@ class ScaleState(NamedTuple):
         Logarithm of the square of the factor.
     information : float
         Number of observations that it rests on, as far as they told of it.
+    rejected : int
+        How many of the last observations, one after the other, were given no weight.
     """
 
     log_square: float
     information: float
+    rejected: int
 
     @property
     def factor(self) -> float:
@@ -40,6 +48,11 @@ class AdaptiveScale:
     more than clip standard deviations. Each counts by the share of its variance that is the
     observation's own: after an outage, where ``s >> r``, next to nothing is learnt, or forgotten.
 
+    An estimate that is wrong by more than it says would make a function that comes down to nothing
+    reject every observation after it: after an outage in which the error grew to three of its
+    standard deviations, Tukey's does, one by one, though together they leave no doubt. After
+    `patience` rejections in a row `rule` therefore gives Huber's function, which rejects nothing.
+
     The object has no state: what is learnt is a `ScaleState` that its user keeps.
 
     Attributes
@@ -55,6 +68,8 @@ class AdaptiveScale:
     clip : float
         In standard deviations. With 1 the factor rises by 15 % where a tenth of the observations
         are gross errors.
+    patience : int
+        Rejections in a row after which one observation is taken by Huber's function.
     """
 
     memory: float = 100.0
@@ -62,9 +77,10 @@ class AdaptiveScale:
     lowest: float = 0.3
     highest: float = 100.0
     clip: float = 1.0
+    patience: int = 10
 
     def __post_init__(self) -> None:
-        for name in ("memory", "prior", "lowest", "highest", "clip"):
+        for name in ("memory", "prior", "lowest", "highest", "clip", "patience"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ConfigError(
@@ -92,9 +108,16 @@ class AdaptiveScale:
     def begin(self) -> ScaleState:
         """Return the state in which the stated variance holds."""
         bounded = min(max(1.0, self.lowest), self.highest)
-        return ScaleState(2.0 * math.log(bounded), self.prior)
+        return ScaleState(2.0 * math.log(bounded), self.prior, 0)
 
-    def after(self, state: ScaleState, nu: float, s: float, r: float) -> ScaleState:
+    def rule(self, state: ScaleState, influence: Influence) -> RobustUpdate:
+        """Return the rule of the next observation."""
+        given = HUBER if state.rejected >= self.patience else influence
+        return RobustUpdate(given, state.factor)
+
+    def after(
+        self, state: ScaleState, nu: float, s: float, r: float, weight: float = 1.0
+    ) -> ScaleState:
         """Return what is known after an observation.
 
         Parameters
@@ -107,15 +130,18 @@ class AdaptiveScale:
             Variance of the prediction, ``h P h'``.
         r : float
             Variance of the observation as stated, without the factor.
+        weight : float
+            What the rule gave it; 0 is a rejection.
 
         Returns
         -------
         ScaleState
         """
+        rejected = state.rejected + 1 if weight == 0.0 else 0
         own = math.exp(state.log_square) * r
         total = s + own
         if not (math.isfinite(nu) and total > 0.0 and own > 0.0):
-            return state
+            return ScaleState(state.log_square, state.information, rejected)
         share = own / total
         mean, within = self._expected
         excess = min(nu * nu / total, self.clip * self.clip) - mean
@@ -123,4 +149,4 @@ class AdaptiveScale:
         information += share * share * (1.0 - information / self.memory)
         square = state.log_square + share * excess / (within * information)
         square = min(max(square, 2.0 * math.log(self.lowest)), 2.0 * math.log(self.highest))
-        return ScaleState(square, information)
+        return ScaleState(square, information, rejected)

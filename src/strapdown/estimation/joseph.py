@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -65,7 +66,7 @@ class Plain(CovarianceForm):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -78,7 +79,7 @@ class BiermanThornton(CovarianceForm):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -51,7 +52,7 @@ class Chernodarov(BiermanThornton):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other; see `CovarianceForm.update`."""
         (state,) = contiguous(state)
@@ -66,7 +67,7 @@ class Chernodarov(BiermanThornton):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Predict and take the observations, with one orthogonalisation (Eqs. 6-15)."""
         state, Phi, Q = contiguous(state, Phi, Q)
@@ -81,7 +82,7 @@ class Chernodarov(BiermanThornton):
         predicted: bool,
         x: Array,
         observations: tuple[Array, Array, Array],
-        rule: UpdateRule | None,
+        rule: UpdateRule | Sequence[UpdateRule] | None,
     ) -> tuple[Array, Array, Innovations]:
         kernels = _kernels()
         z, H, R = contiguous(*observations)
