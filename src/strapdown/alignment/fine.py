@@ -91,7 +91,7 @@ class FineAlignment:
 
     mechanization: Mechanization = field(default_factory=NorthEastDown)
     model: type[ErrorModel] = RotationVectorModel
-    form: CovarianceForm = field(default_factory=COVARIANCES["ud"])
+    form: CovarianceForm = field(default_factory=COVARIANCES["joseph"])
     rule: UpdateRule | None = None
     interval: float = 1.0
     observe: tuple[str, ...] = ("rate", "position", "velocity")
@@ -179,12 +179,14 @@ class FineAlignment:
         if standing is None:
             state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
             whole = filter_.predict(state, time, rows)[1]
-            standing = measured_standing(filter_, whole, int(ends[0]), LEAST)
+            standing = measured_standing(whole, int(ends[0]), LEAST)
         home = home_of(site, begin)
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = Epochs(filter_)
         epochs.add(state, {})
-        for state, seen in settled(filter_, state, time, rows, ends, home, standing, self.observe):
+        run = settled(filter_, state, time, rows, ends, home, standing, self.observe)
+        for after, seen in run:
+            state = after
             epochs.add(state, seen)
             if progress is not None:
                 progress((state.time - begin) / (float(time[-1]) - begin))

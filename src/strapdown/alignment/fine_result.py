@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.stationary import Standing
 from strapdown.estimation.covariance import Innovations
@@ -78,9 +77,7 @@ class Epochs:
         self._rows: list[Array] = []
         self._seen: dict[str, list[tuple[float, Observation, Innovations]]] = {}
 
-    def add(
-        self, state: FilterState, seen: Mapping[str, tuple[Observation, Innovations]]
-    ) -> None:
+    def add(self, state: FilterState, seen: Mapping[str, tuple[Observation, Innovations]]) -> None:
         """Take an epoch."""
         alignment = self.alignment(state)
         assert alignment.gyro_bias is not None and alignment.accel_bias is not None

@@ -5,6 +5,7 @@ Chernodarov (2009), Eqs. (16)-(18): the rate of the Earth, the place, no velocit
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,16 +15,19 @@ from strapdown import rotation
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import AXIS, Q_LB, V_L
 from strapdown.alignment.site import Site
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL, Segment
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.sensor_states import stacked
-from strapdown.mechanization.state_error import state_error
+from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
+# Fewer say little of how much they vary.
+LEAST_STRETCHES = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,8 @@ def position_observation(
     """
     used = filter_.mechanization
     here = used.nav_state(state.mechanization, state.time)
-    apart = used.level_from_ned(state.row) @ state_error(here, home)[:3]
+    earth = find_ellipsoid(used.ellipsoid)
+    apart = used.level_from_ned(state.row) @ displacement_between(here, home, earth)
     rows = 2 if used.height == "held" or not filter_.model.has_height else 3
     H = np.zeros((rows, filter_.model.physical_size))
     H[:, :rows] = np.eye(rows)
@@ -112,15 +117,17 @@ def rate_observation(filter_: ErrorFilter, segment: Segment, standing: Standing)
     )
 
 
-def measured_standing(filter_: ErrorFilter, segment: Segment, every: int, least: Standing) -> Standing:
+def measured_standing(segment: Segment, every: int, least: Standing) -> Standing:
     """Find from a run without observations how still a body stands.
 
-    Drifts of a run are smooth; what a second difference from epoch to epoch leaves is the body's own
-    motion, 6 times its variance where epochs are independent.
+    A filter takes what moves the body as independent from epoch to epoch. What sways slowly, or
+    settles, is not: so the motion is looked at over stretches of 1, 2, 4 ... epochs, and that
+    counts which independent motion would have to be for the stretch where it is largest. The drift
+    of the run itself is smooth, and left out by differences: the third for velocity, the fourth
+    for the place.
 
     Parameters
     ----------
-    filter_ : ErrorFilter
     segment : Segment
         Of the whole record.
     every : int
@@ -133,30 +140,38 @@ def measured_standing(filter_: ErrorFilter, segment: Segment, every: int, least:
     Standing
     """
     used = segment.mechanization
-    epochs = segment.history[::every]
-    levels = used.levels(epochs)
-    velocity = levels[:, V_L : V_L + 3]
-    dt = float(segment.increments[:every, 0].sum())
-    place = np.cumsum(velocity, axis=0) * dt
-    all_levels = used.levels(segment.history)
-    matrices = rotation.dcm_from_quaternion(all_levels[:-1, Q_LB : Q_LB + 4])
+    levels = used.levels(segment.history)
+    velocity = levels[::every, V_L : V_L + 3]
+    place = np.cumsum(velocity, axis=0) * float(segment.increments[:every, 0].sum())
+    matrices = rotation.dcm_from_quaternion(levels[:-1, Q_LB : Q_LB + 4])
     turns = np.einsum("kij,kj->ki", matrices, segment.increments[:, 1:4])
-    count = (len(turns) // every) * every
-    turns = turns[:count].reshape(-1, every, 3).sum(axis=1)
+    turns = _stretches(turns, every).sum(axis=1)
     return Standing(
-        position=np.maximum(_second_difference(place), least.position),
-        velocity=np.maximum(_second_difference(velocity), least.velocity),
-        turn=np.maximum(_spread(turns - np.median(turns, axis=0)), least.turn),
+        position=np.maximum(_as_independent(place, 4), least.position),
+        velocity=np.maximum(_as_independent(velocity, 3), least.velocity),
+        turn=np.maximum(_as_independent(turns, 1), least.turn),
     )
 
 
-def _second_difference(values: Array) -> Array:
-    return _spread(np.diff(values, n=2, axis=0)) / np.sqrt(6.0)
+def _as_independent(values: Array, order: int) -> Array:
+    """Deviation of independent epochs whose means over stretches would vary as much, (3,)."""
+    # Of a difference of independent numbers: the sum of the squares of its binomials.
+    gain = math.sqrt(math.comb(2 * order, order))
+    found = np.zeros(3)
+    length = 1
+    while len(values) // length >= order + LEAST_STRETCHES:
+        means = _stretches(values, length).mean(axis=1)
+        apart = np.diff(means, n=order, axis=0)
+        spread = np.sqrt(np.square(apart).mean(axis=0)) / gain
+        found = np.maximum(found, spread * math.sqrt(length))
+        length *= 2
+    return found
 
 
-def _spread(values: Array) -> Array:
-    """Robust standard deviation of each column about zero."""
-    return np.asarray(1.4826 * np.median(np.abs(values), axis=0))
+def _stretches(values: Array, length: int) -> Array:
+    """Cut into stretches, (m, length, 3); what is left over at the end is left out."""
+    count = len(values) // length
+    return values[: count * length].reshape(count, length, values.shape[1])
 
 
 def home_of(site: Site, time: float) -> NavState:

@@ -17,9 +17,7 @@ __all__ = ["resting_sd", "resting_states"]
 Array = NDArray[np.float64]
 
 
-def resting_sd(
-    sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike
-) -> tuple[Array, Array]:
+def resting_sd(sensors: ImuUncertainty, rate: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
     """Return what gyros and accelerometers may read too much while rate and force stay the same.
 
     Scale factors, misalignments and g-sensitivities are then a part of the bias: no rest can tell

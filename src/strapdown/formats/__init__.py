@@ -20,6 +20,7 @@ from strapdown.formats import (
     npz,
     parquet,
     phyphox,
+    psins,
     sensor_folder,
     sensor_logger,
     sensorstream,
@@ -54,6 +55,7 @@ READERS: dict[str, Reader] = {
     "sensor-folder": Reader(
         "folder or zip of one text table a sensor", sensor_folder.detect, sensor_folder.read
     ),
+    "psins": Reader("PSINS increments (.imu)", psins.detect, psins.read),
     "npy-folder": Reader("folder of NumPy arrays (.npy)", npy_folder.detect, npy_folder.read),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, csv.read),
     "npz": Reader("NumPy archive (.npz)", npz.detect, npz.read),

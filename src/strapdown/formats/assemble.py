@@ -113,7 +113,15 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     )
     truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)
     return Recording(
-        raw.name, raw.files, stamps.origin, imu, truth, scored, tuple(readings), tuple(findings)
+        name=raw.name,
+        files=raw.files,
+        origin=stamps.origin,
+        imu=imu,
+        truth=truth,
+        scored=scored,
+        readings=tuple(readings),
+        findings=tuple(findings),
+        start=raw.start,
     )
 
 

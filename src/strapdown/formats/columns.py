@@ -151,6 +151,16 @@ _MAGNETIC = {"g": "gauss", "mg": "mG"}
 UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
+# By word, the axis of the body and its sign.
+_DIRECTIONS = {
+    "forward": (0, 1.0),
+    "back": (0, -1.0),
+    "backward": (0, -1.0),
+    "right": (1, 1.0),
+    "left": (1, -1.0),
+    "down": (2, 1.0),
+    "up": (2, -1.0),
+}
 _AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
@@ -339,7 +349,8 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     Parameters
     ----------
     text : str
-        Three of ``x y z`` with an optional sign, as in ``x,-y,-z``.
+        Three of ``x y z`` with an optional sign, as in ``x,-y,-z``; or where the sensor's x, y
+        and z point: ``forward-left-up``, which is the same.
 
     Returns
     -------
@@ -352,6 +363,8 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     ConfigError
         It is not a permutation of three axes with signs.
     """
+    if said := _directions(text):
+        return said
     parts = [p.strip().lower() for p in text.split(",")]
     names = [p.lstrip("+-") for p in parts]
     if sorted(names) != ["x", "y", "z"] or any(
@@ -361,6 +374,22 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
             f"'{text}' does not name three axes",
             quantity="--axes",
             remedy="name the sensor axis that points forward, right and down, as in x,-y,-z for "
-            "a sensor whose own axes point forward, left and up",
+            "a sensor whose own axes point forward, left and up; or say forward-left-up",
         )
     return [_AXES.index(n) for n in names], [-1.0 if p.startswith("-") else 1.0 for p in parts]
+
+
+def _directions(text: str) -> tuple[list[int], list[float]] | None:
+    """Where the sensor's x, y, z point, in words, as what forward, right and down are."""
+    words = re.split(r"[\s,\-]+", text.strip().lower())
+    if len(words) != 3 or any(w not in _DIRECTIONS for w in words):
+        return None
+    said = [_DIRECTIONS[w] for w in words]
+    if sorted(body for body, _ in said) != [0, 1, 2]:
+        raise ConfigError(
+            f"'{text}' names one direction twice",
+            quantity="--axes",
+            remedy="say where x, y and z of the sensor point, as in right-forward-up",
+        )
+    axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
+    return axis, [said[k][1] for k in axis]

@@ -16,7 +16,7 @@ from strapdown.results import Reading
 
 Array = NDArray[np.float64]
 
-__all__ = ["Origin", "RawLog", "ReadOptions", "Recording", "TruthInSensorAxes"]
+__all__ = ["Origin", "RawLog", "ReadOptions", "Recording", "StatedStart", "TruthInSensorAxes"]
 
 
 @dataclass(frozen=True)
@@ -68,6 +68,27 @@ class TruthInSensorAxes:
     scored: NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class StatedStart:
+    """Where and how a log says that it begins; kept for people, and used by no reader.
+
+    Attributes
+    ----------
+    lat_deg, lon_deg : float, deg
+        Geodetic, north and east positive.
+    alt : float, m
+    roll_pitch_heading_deg : tuple of float, deg
+        Body forward-right-down to north-east-down.
+    velocity_ned : tuple of float, m/s
+    """
+
+    lat_deg: float
+    lon_deg: float
+    alt: float
+    roll_pitch_heading_deg: tuple[float, float, float]
+    velocity_ned: tuple[float, float, float]
+
+
 @dataclass
 class RawLog:
     """The columns of a file as they stand in it.
@@ -93,6 +114,8 @@ class RawLog:
         Where the file states them.
     truth : TruthInSensorAxes or None
     findings : list of Finding
+    start : StatedStart or None
+        Where the file states one.
     """
 
     name: str
@@ -106,6 +129,7 @@ class RawLog:
     axes: str | None = None
     truth: TruthInSensorAxes | None = None
     findings: list[Finding] = field(default_factory=list)
+    start: StatedStart | None = None
 
     def row(self, sample: int) -> int:
         """Row of the file, counted from 1, in which a sample stands."""
@@ -146,6 +170,8 @@ class Recording:
         What every column was taken for.
     findings : tuple of Finding
         What a person should know about it.
+    start : StatedStart or None
+        What the file says of its place and attitude at the start.
     """
 
     name: str
@@ -156,3 +182,4 @@ class Recording:
     scored: NDArray[np.bool_] | None
     readings: tuple[Reading, ...]
     findings: tuple[Finding, ...]
+    start: StatedStart | None = None

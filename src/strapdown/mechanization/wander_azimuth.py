@@ -107,6 +107,12 @@ class WanderAzimuth(Mechanization):
         level.wander_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
 
+    def level_from_ned(self, row: Array) -> Array:
+        """Return the matrix from north-east-down to xi, eta, zeta, (3, 3)."""
+        angle = self.wander_angle(row[None, :])[0]
+        s, c = math.sin(angle), math.cos(angle)
+        return np.array([[s, c, 0.0], [c, -s, 0.0], [0.0, 0.0, -1.0]])
+
     def correct(self, state: Array, error: ArrayLike) -> Array:
         """Take an error off a state, as `Mechanization.correct`."""
         after = state.copy()

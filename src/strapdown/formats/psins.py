@@ -1,0 +1,285 @@
+"""Increments of a strapdown unit as the PSINS toolbox keeps them (``.imu``).
+
+Its log of a SIMU: ``%`` comments, three lines of header, then six counts a sample:
+
+    pitch, roll, yaw (deg), VE, VN, VU (m/s)        yaw counter-clockwise from north
+    lat, lon (deg), h (m), t0 (s), step (ms), g (m/s²)
+    scale of each gyro (arcsec), of each accelerometer (µg·s)
+
+and its plain matrices: increments in rad and m/s, and the time in the last of seven columns.
+Axes right, forward, up; an increment belongs to the interval that ends at its stamp.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.recording import RawLog, StatedStart
+
+Array = NDArray[np.float64]
+Lines = list[tuple[int, str]]
+SUFFIX = ".imu"
+#: Which sensor axis points forward, right, down.
+AXES = "y,x,-z"
+GYROS = [f"dtheta_{a}" for a in "xyz"]
+ACCELS = [f"dv_{a}" for a in "xyz"]
+_ARCSEC = math.pi / 180.0 / 3600.0
+# The header's lines, each with what stands in it.
+_HEADER = (
+    ("attitude and velocity", "pitch, roll, yaw in deg, VE, VN, VU in m/s"),
+    ("place and clock", "lat, lon in deg, height in m, t0 in s, step in ms, g in m/s²"),
+    ("scale factors", "three gyro scales in arcsec, three accelerometer scales in µg·s"),
+)
+# A unit that is carried or stands still feels gravity to so much, on the median of its samples.
+_GRAVITY = (9.6, 10.0)  # m/s²
+_STEPS = (1e-5, 1.0)  # s
+_COPY = "copy the file again, or correct that line"
+
+
+def detect(path: Path) -> bool:
+    """Tell whether the name is that of increments of PSINS."""
+    return path.is_file() and path.suffix.lower() == SUFFIX
+
+
+def read(path: Path) -> RawLog:
+    """Read the increments of a strapdown unit.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Columns ``dtheta_x`` … in rad and ``dv_x`` … in m/s, with ``time`` at the end of each
+        interval: of a SIMU log by the scale factors and the clock of its header, whose place
+        and attitude are kept as `StatedStart`; of a plain matrix of seven columns where the
+        last is a steady clock and the norm of the velocity increments over a step is that of
+        gravity. Any other text is read as a table is.
+
+    Raises
+    ------
+    DataError
+        It is no text, the header is bad, a row has another width or holds no whole number.
+    """
+    data = path.read_bytes()
+    text, findings = csv.decoded(data, path.name)
+    numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
+    comments = [line for _, line in numbered if csv.is_comment(line)]
+    lines = [(row, line) for row, line in numbered if not csv.is_comment(line)]
+    ended = text.endswith(("\n", "\r"))
+    if any("psins" in c.lower() for c in comments):
+        return _simu(path, lines, ended, findings)
+    return _matrix(path, lines, ended, findings) or csv.parse(data, path.name, (path,))
+
+
+# --- the log of a SIMU ------------------------------------------------------------------
+
+
+def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog:
+    attitude, place, scales = (_header(path.name, lines, k) for k in range(3))
+    start = _start(path.name, attitude, place, (lines[0][0], lines[1][0]))
+    t0, step, g = place[3], 1e-3 * place[4], place[5]
+    row = lines[1][0]
+    if not _STEPS[0] <= step <= _STEPS[1]:
+        _refuse(path.name, row, "sampling interval", f"{place[4]:g} ms is none", _HEADER[1][1])
+    if not 9.7 <= g <= 9.9:
+        _refuse(path.name, row, "g", f"{g:g} m/s² is no gravity of the Earth", _HEADER[1][1])
+    if min(scales) <= 0:
+        what = f"{min(scales):g} is no scale factor"
+        _refuse(path.name, lines[2][0], "scale factors", what, _HEADER[2][1])
+    counts, rows = _counts(path.name, lines[3:], ended, findings)
+    factors: Array = np.array(
+        [s * _ARCSEC for s in scales[:3]] + [s * 1e-6 * g for s in scales[3:]]
+    )
+    stamps = np.asarray(t0 + step * np.arange(1.0, len(counts) + 1.0))
+    roll, pitch, heading = start.roll_pitch_heading_deg
+    findings.append(
+        Finding(
+            f"the header states roll {roll:.3f}°, pitch {pitch:.3f}° and heading {heading:.3f}° "
+            f"at the start, at {start.lat_deg:.6f}°, {start.lon_deg:.6f}°, {start.alt:g} m, and "
+            "calls that perhaps inaccurate; kept as what the file says, used by no computation",
+            file=path.name,
+            quantity="start",
+        )
+    )
+    return _log(path, stamps, np.asarray(counts * factors), rows, AXES, findings, start)
+
+
+def _header(file: str, lines: Lines, which: int) -> list[float]:
+    """Six numbers of one line of the header."""
+    what, holds = _HEADER[which]
+    if len(lines) <= which:
+        raise DataError(
+            f"the file ends before line {which + 1} of its header ({what})",
+            file=file,
+            remedy="copy the file again: a SIMU log has three lines of header",
+        )
+    row, line = lines[which]
+    fields = line.split()
+    if len(fields) != 6:
+        said = f"{len(fields)} numbers in line {which + 1} of the header, where 6 belong"
+        _refuse(file, row, what, said, holds)
+    values = [_number(f) for f in fields]
+    for text, value in zip(fields, values, strict=True):
+        if not math.isfinite(value):
+            _refuse(file, row, what, f"'{text}' is no finite number", holds)
+    return values
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return math.nan
+
+
+def _refuse(file: str, row: int, quantity: str, what: str, holds: str) -> None:
+    raise DataError(
+        what, file=file, row=row, quantity=quantity, remedy=f"that line holds: {holds}; {_COPY}"
+    )
+
+
+def _start(
+    file: str, attitude: list[float], place: list[float], rows: tuple[int, int]
+) -> StatedStart:
+    pitch, roll, yaw, east, north, up = attitude
+    lat, lon, alt = place[:3]
+    if abs(lat) > 90.0:
+        _refuse(file, rows[1], "latitude", f"{lat:g}° is beyond a pole", _HEADER[1][1])
+    if abs(lon) > 360.0:
+        _refuse(file, rows[1], "longitude", f"{lon:g}° is more than a turn", _HEADER[1][1])
+    if abs(pitch) > 90.0:
+        _refuse(file, rows[0], "pitch", f"{pitch:g}° is beyond 90°", _HEADER[0][1])
+    # Turned about up, then right, then forward: with yaw reversed the 3-2-1 angles of
+    # forward-right-down.
+    return StatedStart(lat, lon, alt, (roll, pitch, 0.0 - yaw), (north, east, 0.0 - up))
+
+
+def _counts(
+    file: str, lines: Lines, ended: bool, findings: list[Finding]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Whole numbers of all samples, and the rows that they stand in."""
+    block, rows = _block(file, lines, 6, ended, findings)
+    bad = np.argwhere(block != np.round(block))
+    if bad.size:
+        i, j = (int(k) for k in bad[0])
+        raise DataError(
+            f"{block[i, j]:g} is no whole number, and a SIMU log holds counts of its scale "
+            f"factors ({len(np.unique(bad[:, 0]))} such rows in all)",
+            file=file,
+            row=int(rows[i]),
+            quantity=(GYROS + ACCELS)[j],
+            remedy="correct that row; increments in rad and m/s belong in a file without the "
+            "comments and the header of a SIMU log",
+        )
+    return block, rows
+
+
+# --- plain matrices ---------------------------------------------------------------------
+
+
+def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> RawLog | None:
+    """Increments in rad and m/s with their time, where the numbers are such; else None."""
+    if len(lines) < 3 or any(len(line.split()) != 7 for _, line in lines[:3]):
+        return None
+    if not all(math.isfinite(_number(f)) for _, line in lines[:3] for f in line.split()):
+        return None
+    block, rows = _block(path.name, lines, 7, ended, findings)
+    time = block[:, 6]
+    steps = np.diff(time)
+    usual = float(np.median(steps)) if steps.size else 0.0
+    steady = _STEPS[0] <= usual <= _STEPS[1] and float(np.mean(abs(steps - usual) < 0.1 * usual))
+    if not steady or steady < 0.9:
+        return None
+    force = float(np.median(np.linalg.norm(block[:, 3:6], axis=1))) / usual
+    turned = float(np.median(np.linalg.norm(block[:, :3], axis=1))) / usual
+    if not _GRAVITY[0] <= force <= _GRAVITY[1] or not turned < 2.0 * math.pi:
+        return None
+    up = float(np.median(block[:, 5])) / usual > 0.5 * force
+    findings.append(
+        Finding(
+            "seven columns without a header, the last a clock of "
+            f"{1.0 / usual:.4g} Hz, and {force:.4g} m/s² of force: taken for a matrix of "
+            "PSINS, increments in rad and m/s"
+            + (", axes right, forward, up" if up else "; gravity is not on its third axis"),
+            file=path.name,
+            remedy="if not, state units and axes (--gyro-unit, --accel-unit, --axes)",
+        )
+    )
+    return _log(path, time, block[:, :6], rows, AXES if up else None, findings, None)
+
+
+# --- both -------------------------------------------------------------------------------
+
+
+def _block(
+    file: str, lines: Lines, width: int, ended: bool, findings: list[Finding]
+) -> tuple[Array, NDArray[np.int64]]:
+    """Numbers of all rows; a last row that may have lost digits is left out."""
+    if lines and (not ended or len(lines[-1][1].split()) < width):
+        findings.append(
+            Finding(
+                "the last line does not end as the others do, and may be cut; it was left out",
+                file=file,
+                row=lines[-1][0],
+                remedy="if more is missing, copy the file again",
+            )
+        )
+        lines = lines[:-1]
+    if not lines:
+        raise DataError(
+            "a header, and no samples under it",
+            file=file,
+            remedy="check that the recording was saved and copied whole",
+        )
+    for row, line in lines:
+        if (count := len(line.split())) != width:
+            raise DataError(
+                f"{count} numbers, where every sample has {width}",
+                file=file,
+                row=row,
+                remedy="correct or delete that row",
+            )
+    try:
+        flat = np.array(" ".join(line for _, line in lines).split(), dtype=np.float64)
+    except ValueError:
+        row, text = next(
+            (row, f) for row, line in lines for f in line.split() if math.isnan(_number(f))
+        )
+        raise DataError(
+            f"'{text}' is not a number", file=file, row=row, remedy="correct or delete that row"
+        ) from None
+    return flat.reshape(-1, width), np.array([row for row, _ in lines], dtype=np.int64)
+
+
+def _log(
+    path: Path,
+    stamps: Array,
+    increments: Array,
+    rows: NDArray[np.int64],
+    axes: str | None,
+    findings: list[Finding],
+    start: StatedStart | None,
+) -> RawLog:
+    names = GYROS + ACCELS
+    stated = {"time": ("time", "s")}
+    stated |= {f"dtheta_{a}": (f"gyro_{a}", "rad") for a in "xyz"}
+    stated |= {f"dv_{a}": (f"accel_{a}", "m/s") for a in "xyz"}
+    return RawLog(
+        name=path.name,
+        files=(path,),
+        columns={"time": stamps} | {n: increments[:, k] for k, n in enumerate(names)},
+        rows=rows,
+        stated=stated,
+        sampling="mean",
+        axes=axes,
+        findings=findings,
+        start=start,
+    )
