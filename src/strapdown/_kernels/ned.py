@@ -40,8 +40,9 @@ OPTIONS = 7
 # A step that takes a larger part of the way around the pole is beyond the series of `displace`.
 LARGEST_TURN = 0.01
 
-# Why a run ends before its increments do.
-DONE, POLE, DIVERGED = 0, 1, 2
+# Why a run ends before its increments do. The last is for axes that have no pole: a step goes
+# farther around the Earth than `LARGEST_TURN`.
+DONE, POLE, DIVERGED, LEAP = 0, 1, 2, 3
 
 THIRD = 1.0 / 3.0
 SIXTH = 1.0 / 6.0
@@ -267,15 +268,21 @@ def guide_height(alt, vd, pull, since, before, reference, dt, mode, tau, spring)
 
 
 @njit(cache=True, inline="always")
-def verdict(alt, vn, ve, vd, qw, cosine, turn, limit, speed, lowest, highest):
-    """Whether a state is one that this mechanization may go on from."""
-    # So written, NaN in any of them is a divergence.
-    if not (
+def within(alt, vn, ve, vd, qw, cosine, speed, lowest, highest):
+    """Whether a state means anything."""
+    # So written, NaN in any of them does not.
+    return (
         vn * vn + ve * ve + vd * vd <= speed * speed
         and lowest <= alt <= highest
         and abs(qw) <= 2.0
         and abs(cosine) <= 2.0
-    ):
+    )
+
+
+@njit(cache=True, inline="always")
+def verdict(alt, vn, ve, vd, qw, cosine, turn, limit, speed, lowest, highest):
+    """Whether a state is one that this mechanization may go on from."""
+    if not within(alt, vn, ve, vd, qw, cosine, speed, lowest, highest):
         return DIVERGED
     if cosine < limit or abs(turn) > LARGEST_TURN:
         return POLE

@@ -107,6 +107,37 @@ class CovarianceForm(ABC):
         innovations : Innovations
         """
 
+    def epoch(
+        self,
+        state: Array,
+        Phi: Array,
+        Q: Array,
+        x: Array,
+        z: Array,
+        H: Array,
+        R: Array,
+        rule: UpdateRule | None = None,
+    ) -> tuple[Array, Array, Innovations]:
+        """Predict, then take the observations: a form may do both together for less.
+
+        Parameters
+        ----------
+        state : ndarray, (n, n)
+            Before the prediction.
+        Phi, Q : ndarray, (n, n)
+            As for `predict`.
+        x : ndarray, (n,)
+            Estimate, predicted already.
+        z, H, R, rule
+            As for `update`.
+
+        Returns
+        -------
+        state, x, innovations
+            As from `update`.
+        """
+        return self.update(self.predict(state, Phi, Q), x, z, H, R, rule)
+
     @abstractmethod
     def matrix(self, state: Array) -> Array:
         """Return P, (n, n), exactly symmetric."""

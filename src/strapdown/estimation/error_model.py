@@ -65,6 +65,10 @@ class ErrorModel(ABC):
     summary: ClassVar[str]
     source: ClassVar[str]
     core: ClassVar[tuple[StateBlock, ...]]
+    #: Whether the states are the physical errors themselves.
+    states_are_physical: ClassVar[bool] = False
+    #: Whether it has a state of the height.
+    has_height: ClassVar[bool] = True
 
     @cached_property
     def layout(self) -> StateLayout:

@@ -47,3 +47,29 @@ class SensorStates:
     def decay(self) -> float:
         """One over the correlation time, 1/s."""
         return 0.0 if math.isinf(self.correlation_time) else 1.0 / self.correlation_time
+
+
+def stacked(blocks: tuple[SensorStates, ...], size: int) -> tuple[Array, Array, Array, Array]:
+    """Put blocks side by side, as kernels take them.
+
+    Parameters
+    ----------
+    blocks : tuple of SensorStates
+    size : int
+        Number of their states.
+
+    Returns
+    -------
+    gyro, accel : ndarray, (7, 3, size)
+    decay : ndarray, (size,), 1/s
+    drive : ndarray, (size,)
+    """
+    gyro, accel = np.zeros((COUPLING, 3, size)), np.zeros((COUPLING, 3, size))
+    decay, drive = np.zeros(size), np.zeros(size)
+    at = 0
+    for one in blocks:
+        end = at + len(one.block)
+        gyro[:, :, at:end], accel[:, :, at:end] = one.gyro, one.accel
+        decay[at:end], drive[at:end] = one.decay, one.drive
+        at = end
+    return gyro, accel, decay, drive

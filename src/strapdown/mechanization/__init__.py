@@ -7,6 +7,7 @@ from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.run import NavigationRun, navigate_segments, run_mechanization
 from strapdown.mechanization.tadic import Tadic
 from strapdown.mechanization.tracker import NavTracker
+from strapdown.mechanization.wander_azimuth import WanderAzimuth
 
 __all__ = [
     "HEIGHTS",
@@ -16,8 +17,13 @@ __all__ = [
     "NavigationRun",
     "NorthEastDown",
     "Tadic",
+    "WanderAzimuth",
     "navigate_segments",
     "run_mechanization",
 ]
 
-MECHANIZATIONS: dict[str, type[Mechanization]] = {"ned": NorthEastDown, "tadic": Tadic}
+MECHANIZATIONS: dict[str, type[Mechanization]] = {
+    "ned": NorthEastDown,
+    "tadic": Tadic,
+    "wander_azimuth": WanderAzimuth,
+}

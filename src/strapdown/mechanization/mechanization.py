@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,7 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import LEVEL
-from strapdown._kernels.ned import ALT, LAT, LON, POLE, ROW, Q, V, reverse_increments
+from strapdown._kernels.ned import (
+    ALT,
+    LARGEST_TURN,
+    LAT,
+    LEAP,
+    LON,
+    POLE,
+    ROW,
+    Q,
+    V,
+    reverse_increments,
+)
 from strapdown._kernels.ned_level import ned_correct, ned_levels
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import find_ellipsoid
@@ -43,7 +55,7 @@ class Mechanization(ABC):
     height_time_constant : float, s
         Of each of the three poles of that loop, 1 to 1000, however often references come.
     latitude_limit_deg : float, deg
-        Where north is no longer used: beyond it a run stops.
+        Where north is no longer used: beyond it a run stops. A wander azimuth has no such limit.
     largest_speed : float, m/s
         Above it the state is taken to have diverged.
     height_limits : tuple of float, m
@@ -69,6 +81,11 @@ class Mechanization(ABC):
     row: ClassVar[int] = ROW
     #: Third component of up in its level axes: -1 where they are north-east-down.
     level_up: ClassVar[float] = -1.0
+    #: Places of the height and of the velocity in a state and in a row.
+    alt_at: ClassVar[int] = ALT
+    v_at: ClassVar[int] = V
+    #: Compiled function that takes one sample (`_kernels.sample`), where there is one.
+    update: ClassVar[Callable[..., int] | None] = None
 
     def __post_init__(self) -> None:
         find_ellipsoid(self.ellipsoid)
@@ -129,6 +146,20 @@ class Mechanization(ABC):
         out = np.empty((len(history), LEVEL))
         ned_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
+
+    def history_row(self, state: Array) -> Array:
+        """Return a state as a row of a history, (`row`,)."""
+        return state[: self.row].copy()
+
+    def level_from_ned(self, row: Array) -> Array:
+        """Return the matrix that turns vectors from north-east-down into level axes, (3, 3).
+
+        Parameters
+        ----------
+        row : ndarray, (`row`,)
+            Of a history.
+        """
+        return np.eye(3)
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
         """Take an error off a state.
@@ -212,9 +243,10 @@ class Mechanization(ABC):
         -------
         state : ndarray
             After the last step.
-        history : ndarray, (n, 10)
-            Latitude and longitude in rad, height in m, velocity north, east, down in m/s, and
-            ``q_nb`` after each step; backward the first row is the start of the first step.
+        history : ndarray, (n, `row`)
+            After each step; backward the first row is the start of the first step. Of
+            north-east-down: latitude and longitude in rad, height in m, velocity north, east,
+            down in m/s, and ``q_nb``.
 
         Raises
         ------
@@ -226,7 +258,7 @@ class Mechanization(ABC):
             of another length.
         """
         rows = values_of(increments, MOTION)
-        history = np.empty((len(rows), ROW))
+        history = np.empty((len(rows), self.row))
         after = state.copy()
         self.advance_into(after, rows, increments, heights, history, backward=backward)
         return after, history
@@ -243,6 +275,7 @@ class Mechanization(ABC):
     ) -> None:
         """As `advance`, in place; `rows` are those of `increments`."""
         reference = self._heights(heights, len(rows))
+        velocity = slice(self.v_at, self.v_at + 3)
         earth = find_ellipsoid(self.ellipsoid).parameters()
         if backward:
             # The same motion met backward is a motion with opposite velocity on an Earth that
@@ -251,7 +284,7 @@ class Mechanization(ABC):
             reverse_increments(forward, rows)
             reference = reference[::-1].copy()
             earth[RATE] *= -1.0
-            state[V : V + 3] *= -1.0
+            state[velocity] *= -1.0
         made, why = self.advance_rows(state, rows, reference, earth, history)
         if why:
             at = len(rows) - 1 - made if backward else made
@@ -259,9 +292,9 @@ class Mechanization(ABC):
                 self._refuse_start(state, increments)
             self._refuse(why, at, increments, history[made - 1] if made else None)
         if backward:
-            state[V : V + 3] *= -1.0
+            state[velocity] *= -1.0
             history[:] = history[::-1].copy()
-            history[:, V : V + 3] *= -1.0
+            history[:, velocity] *= -1.0
 
     def trajectory(
         self, time: ArrayLike, history: Array, source: str | None = None
@@ -271,7 +304,7 @@ class Mechanization(ABC):
         Parameters
         ----------
         time : array_like, (n,), s
-        history : ndarray, (n, 10)
+        history : ndarray, (n, `row`)
         source : str, optional
             Name for messages.
 
@@ -280,13 +313,21 @@ class Mechanization(ABC):
         DataFrame
         """
         rows = np.empty((len(history), len(TRAJECTORY)))
-        trajectory_rows(history, rows)
+        self.fill_trajectory(history, rows)
         table = pd.DataFrame(
             rows, index=pd.Index(np.asarray(time), name="time"), columns=TRAJECTORY, copy=False
         )
         table.attrs["source"] = source
         check_trajectory(table)
         return table
+
+    def fill_trajectory(self, history: Array, out: Array) -> None:
+        """Fill rows of a Trajectory table from rows of a history."""
+        trajectory_rows(history, out)
+
+    def latitude(self, row: Array) -> float:
+        """Return the geodetic latitude of a row of a history, rad."""
+        return float(row[LAT])
 
     def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
         if self.height != "damped":
@@ -328,10 +369,11 @@ class Mechanization(ABC):
 
     def _refuse_start(self, state: Array, increments: pd.DataFrame) -> None:
         """Refuse a state that was outside of the limits before any step."""
-        speed, (lowest, highest) = float(np.linalg.norm(state[V : V + 3])), self.height_limits
-        if speed > self.largest_speed or not lowest <= state[ALT] <= highest:
+        speed, alt = self._speed(state), float(state[self.alt_at])
+        lowest, highest = self.height_limits
+        if speed > self.largest_speed or not lowest <= alt <= highest:
             raise DivergenceError(
-                f"the state to begin with, {state[ALT]:.6g} m high and at {speed:.6g} m/s, is "
+                f"the state to begin with, {alt:.6g} m high and at {speed:.6g} m/s, is "
                 f"outside of {lowest:g} to {highest:g} m, or above {self.largest_speed:g} m/s",
                 file=increments.attrs.get("source"),
                 quantity="state",
@@ -339,14 +381,17 @@ class Mechanization(ABC):
                 "height_limits or largest_speed",
             )
 
+    def _speed(self, row: Array) -> float:
+        return float(np.linalg.norm(row[self.v_at : self.v_at + 3]))
+
     def _refuse(self, why: int, step: int, increments: pd.DataFrame, last: Array | None) -> None:
         time = float(increments.index[step])
         row = increments.iloc[step]
         before = ""
         if last is not None:
             before = (
-                f"; before it {np.degrees(last[LAT]):.6f} deg of latitude, {last[ALT]:.6g} m of "
-                f"height, {np.linalg.norm(last[V : V + 3]):.6g} m/s"
+                f"; before it {np.degrees(self.latitude(last)):.6f} deg of latitude, "
+                f"{last[self.alt_at]:.6g} m of height, {self._speed(last):.6g} m/s"
             )
         source = increments.attrs.get("source")
         if why == POLE:
@@ -357,6 +402,14 @@ class Mechanization(ABC):
                 file=source,
                 quantity="lat",
                 remedy="end the run before it; north-east-down has no meaning at a pole",
+            )
+        if why == LEAP:
+            raise DivergenceError(
+                f"with the sample at {time:.9g} s (step {step + 1}, of {row['dt']:.4g} s) the place "
+                f"moves by more than {LARGEST_TURN:g} rad around the Earth{before}",
+                file=source,
+                quantity="state",
+                remedy="a step so long has no course between its ends: cut the log there",
             )
         given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
         raise DivergenceError(

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown._kernels.ned import ROW
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import motion_increments
 from strapdown.mechanization.mechanization import Mechanization
@@ -41,7 +40,7 @@ class NavigationRun:
         first.
     time : ndarray, (n,), s
         Stamps of the states: both sides of every step.
-    history : ndarray, (n, 10)
+    history : ndarray, (n, `mechanization.row`)
         The states as the kernels have them: `Mechanization.advance`.
     findings : tuple of Finding
         What a person should know of the increments.
@@ -116,8 +115,8 @@ def run_mechanization(
     _check_start(start, float(ends[-1]) if backward else begin, increments)
     state = mechanization.begin(start)
     rows = values_of(increments, MOTION)
-    history = np.empty((len(rows) + 1, ROW))
-    history[-1 if backward else 0] = state[:ROW]
+    history = np.empty((len(rows) + 1, mechanization.row))
+    history[-1 if backward else 0] = state[: mechanization.row]
     others = history[:-1] if backward else history[1:]
     mechanization.advance_into(state, rows, increments, heights, others, backward=backward)
     return NavigationRun(

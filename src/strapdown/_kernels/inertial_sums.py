@@ -1,0 +1,91 @@
+"""Specific force summed in the body's axes at the first instant, held still in inertial space."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from strapdown._kernels.rotation import (
+    dcm_from_quat,
+    quat_from_rotvec,
+    quat_multiply,
+    quat_normalise,
+)
+
+# A product of unit quaternions drifts from norm one by 1e-16 a step: this keeps it there.
+NORMALISE_EVERY = 1000
+
+
+@njit(cache=True, error_model="numpy")
+def inertial_sums(rows, last, turned, fallen, velocity, attitude, times, turns, pushes):
+    """Sum motion increments; rows (n, 10) are dt, phi, dv, dr, and last (m,) ends m nodes.
+
+    fallen (n + 1, 3) is the second integral of the force at every stamp, and turned (n + 1, 4)
+    the body's attitude. At the end of each node: velocity (m, 3), the first integral, and
+    attitude (m, 4). Of each node: times (m, 3, 3), the integral of C; turns and pushes
+    (m, 3, 3, 3), the sums of C[:, i] phi[j] and C[:, i] dv[j]: what an error of axis i that is
+    proportional to the input of axis j adds.
+    """
+    w, x, y, z = 1.0, 0.0, 0.0, 0.0
+    v = np.zeros(3)
+    s = np.zeros(3)
+    dv = np.empty(3)
+    dr = np.empty(3)
+    c = np.empty((3, 3))
+    node = 0
+    fallen[0, :] = 0.0
+    turned[0, 0], turned[0, 1], turned[0, 2], turned[0, 3] = w, x, y, z
+    for k in range(rows.shape[0]):
+        dt = rows[k, 0]
+        c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(w, x, y, z)
+        c[0, 0], c[0, 1], c[0, 2] = c11, c12, c13
+        c[1, 0], c[1, 1], c[1, 2] = c21, c22, c23
+        c[2, 0], c[2, 1], c[2, 2] = c31, c32, c33
+        for i in range(3):
+            dv[i] = c[i, 0] * rows[k, 4] + c[i, 1] * rows[k, 5] + c[i, 2] * rows[k, 6]
+            dr[i] = c[i, 0] * rows[k, 7] + c[i, 1] * rows[k, 8] + c[i, 2] * rows[k, 9]
+        for i in range(3):
+            s[i] += v[i] * dt + dr[i]
+            v[i] += dv[i]
+            fallen[k + 1, i] = s[i]
+            for j in range(3):
+                times[node, i, j] += c[i, j] * dt
+                for h in range(3):
+                    turns[node, h, i, j] += c[h, i] * rows[k, 1 + j]
+                    pushes[node, h, i, j] += c[h, i] * rows[k, 4 + j]
+        qw, qx, qy, qz = quat_from_rotvec(rows[k, 1], rows[k, 2], rows[k, 3])
+        w, x, y, z = quat_multiply(w, x, y, z, qw, qx, qy, qz)
+        if (k + 1) % NORMALISE_EVERY == 0:
+            w, x, y, z = quat_normalise(w, x, y, z)
+        turned[k + 1, 0], turned[k + 1, 1], turned[k + 1, 2], turned[k + 1, 3] = w, x, y, z
+        if k == last[node]:
+            for i in range(3):
+                velocity[node, i] = v[i]
+            attitude[node, 0], attitude[node, 1] = w, x
+            attitude[node, 2], attitude[node, 3] = y, z
+            node += 1
+
+
+@njit(cache=True, error_model="numpy")
+def legendre_moments(u, values, out):
+    """Coefficients out (d, k) of values (n, k) in Legendre polynomials of u in [-1, 1].
+
+    Each is (2 d + 1)/2 times the integral of P_d times the values, by the trapezoidal rule.
+    """
+    n, width = values.shape
+    degrees = out.shape[0]
+    out[:, :] = 0.0
+    for i in range(n):
+        before = u[i] - u[i - 1] if i > 0 else 0.0
+        after = u[i + 1] - u[i] if i < n - 1 else 0.0
+        weight = 0.5 * (before + after)
+        older, p = 0.0, 1.0
+        for d in range(degrees):
+            part = weight * p
+            for j in range(width):
+                out[d, j] += part * values[i, j]
+            newer = ((2 * d + 1) * u[i] * p - d * older) / (d + 1)
+            older, p = p, newer
+    for d in range(degrees):
+        for j in range(width):
+            out[d, j] *= 0.5 * (2 * d + 1)

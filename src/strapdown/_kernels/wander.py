@@ -1,0 +1,367 @@
+"""Navigation in a wander azimuth on the ellipsoid: one step, and its loop.
+
+Chernodarov 2009, Eqs. (1), (2), (4). Level axes w are xi, eta, zeta with zeta up; q_ew turns
+vectors from w to the Earth's axes and so holds latitude, longitude and the wander angle; q_ib is
+the attitude of the body in the inertial axes that were the Earth's when the run began. The Earth's
+angle since then is kept by cosine and sine of its half. From the three follows the attitude body
+to level, ``q_wb = conj(q_ew) conj(q_ie) q_ib``.
+
+A step is made as that of north-east-down (`ned`): in axes that are those of w at its start, held
+fixed in inertial space; the new place by geometry from a straight displacement; no transport rate
+is integrated. Nothing is divided by the cosine of the latitude: the Earth's axis comes in by its
+components in w, which are regular everywhere. The turn of the level in a step is about a horizontal
+axis; what azimuth that leaves after many steps is nothing physical, as place, velocity and attitude
+have it alike.
+
+What is summed over a run, the two quaternions and the Earth's angle, is summed with what rounding
+left of the step before (Kahan 1965), so that a day of steps of a millisecond loses nothing.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from strapdown._kernels.earth import gravity_parts
+from strapdown._kernels.ned import (
+    DIVERGED,
+    DONE,
+    FREE,
+    HIGHEST,
+    LARGEST_TURN,
+    LEAP,
+    LOWEST,
+    MODE,
+    SIXTH,
+    SPEED,
+    SPRING,
+    TAU,
+    TWELFTH,
+    guide_height,
+    rotate,
+    turn_back,
+    within,
+)
+from strapdown._kernels.rotation import dcm_from_quat, quat_from_rotvec, quat_multiply
+
+# Places in the state: quaternion w to Earth, height in m, velocity in w in m/s, quaternion body to
+# w; quaternion body to inertial; what rounding left of the two that are summed; cosine and sine of
+# half the Earth's angle and what rounding left of them; the radius of the prime vertical over a;
+# and the memory of the vertical loop, as `ned.PULL` and `ned.SINCE`.
+Q_EW, ALT, V, Q_WB = 0, 4, 5, 8
+Q_IB, LOW_EW, LOW_IB, SPIN, PRIME, PULL, SINCE = 12, 16, 20, 24, 28, 29, 30
+STATE = 31
+# The part of the state that is kept of every step.
+ROW = 12
+
+TWO_THIRDS = 2.0 / 3.0
+THIRD = 1.0 / 3.0
+
+
+@njit(cache=True, inline="always")
+def add(high, low, more):
+    """Sum and what rounding left of it."""
+    more += low
+    total = high + more
+    return total, more - (total - high)
+
+
+@njit(cache=True, inline="always")
+def earth_axis(w, x, y, z):
+    """Components in w of the unit vector of the Earth's axis, from q_ew."""
+    return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w + z * z - (x * x + y * y)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def curving(w, alt, a, e2):
+    """Radius N of the prime vertical, derivative of N s by s, and curvatures across and along.
+
+    s is the sine of the latitude, `w` N over a; the curvatures are those of the level surface at
+    the height, across and along the meridian.
+    """
+    prime = a * w
+    slope = prime * w * w
+    return prime, slope, 1.0 / (prime + alt), 1.0 / (slope * (1.0 - e2) + alt)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def shift(kx, ky, s, w, prime, slope, across, curvature, alt, e2, rx, ry, rz):
+    """Tilt of the normal, as the tangent of its angle along xi and eta, and rise, by a straight way.
+
+    A point of normal n and height h is ``(N + h) n - e² N s p``, p the Earth's axis and s = p . n.
+    So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s: one equation
+    for d, solved by one step of Newton from its first order. What is left out is of
+    ``e⁴ (r/R)³``.
+    """
+    first = slope * curvature * (kx * rx + ky * ry)
+    change = first
+    tx, ty, t2, more, sine = 0.0, 0.0, 0.0, 0.0, 0.0
+    for again in range(2):
+        pull = e2 * change
+        more = rz + pull * s
+        u = more * across
+        inverse = across * (1.0 - u * (1.0 - u * (1.0 - u)))
+        tx = (rx + pull * kx) * inverse
+        ty = (ry + pull * ky) * inverse
+        t2 = tx * tx + ty * ty
+        if again == 0:
+            lost = t2 * (0.5 - 0.375 * t2)
+            sine = (1.0 - lost) * (kx * tx + ky * ty) - s * lost
+            found = slope * sine * (1.0 + 1.5 * e2 * s * w * w * sine)
+            change += (found - first) * (prime + alt) * curvature
+    rise = rz + (prime + alt + more) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
+    return tx, ty, t2, rise
+
+
+@njit(cache=True, inline="always")
+def tilt(tx, ty, t2):
+    """Quaternion from the new w to the old one, less 1, of a tilt by tangents; its zeta is 0."""
+    half = 0.5 - t2 * (0.1875 - 0.12109375 * t2)
+    return -t2 * (0.125 - 0.0859375 * t2), -ty * half, tx * half
+
+
+@njit(cache=True, inline="always")
+def half_turn(y):
+    """Cosine less 1 and sine of a small angle."""
+    y2 = y * y
+    return -y2 * (0.5 - y2 * (1.0 / 24.0)), y * (1.0 - y2 * (SIXTH - y2 * (1.0 / 120.0)))
+
+
+@njit(cache=True, inline="always")
+def multiply_on(q, low, d, x, y, z):
+    """Quaternion times (1 + d, x, y, z), drawn to norm 1, and what rounding left.
+
+    Only what is across q changes the rotation; the norm may have the rounding of its square.
+    """
+    w0, x0, y0, z0 = q
+    d += 0.5 * (1.0 - (w0 * w0 + x0 * x0 + y0 * y0 + z0 * z0))
+    w1, w2 = add(w0, low[0], d * w0 - (x0 * x + y0 * y + z0 * z))
+    x1, x2 = add(x0, low[1], d * x0 + (w0 * x + y0 * z - z0 * y))
+    y1, y2 = add(y0, low[2], d * y0 + (w0 * y + z0 * x - x0 * z))
+    z1, z2 = add(z0, low[3], d * z0 + (w0 * z + x0 * y - y0 * x))
+    return (w1, x1, y1, z1), (w2, x2, y2, z2)
+
+
+@njit(cache=True, inline="always")
+def body_to_level(q_ew, c, s, q_ib):
+    """Quaternion q_wb from the place, the half angle of the Earth and the attitude in inertial."""
+    w, x, y, z = q_ib
+    return quat_multiply(
+        q_ew[0],
+        -q_ew[1],
+        -q_ew[2],
+        -q_ew[3],
+        c * w + s * z,
+        c * x + s * y,
+        c * y - s * x,
+        c * z - s * w,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def wander_step(
+    q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, dt, phi, dv, dr, a, e2, gamma, k, rate, f, m
+):
+    """State after a step of motion increments, and the squared tangent of the level's tilt."""
+    px, py, pz = earth_axis(q_ew[0], q_ew[1], q_ew[2], q_ew[3])
+    s2 = pz * pz
+    # One Newton step from its value a step before, as in `ned`.
+    w = w * (1.5 - 0.5 * (1.0 - e2 * s2) * w * w)
+    prime, slope, across, curvature = curving(w, alt, a, e2)
+    along = e2 * slope * across * curvature
+    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(
+        q_wb[0], q_wb[1], q_wb[2], q_wb[3]
+    )
+    ux, uy, uz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv[0], dv[1], dv[2])
+    sx, sy, sz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr[0], dr[1], dr[2])
+    lean, down, steep, loss, bend = gravity_parts(
+        s2, alt, w, curvature, a, e2, gamma, k, f, m
+    )
+    vx, vy, vz = v
+    ox, oy, oz = rate * px, rate * py, rate * pz
+    outward = -lean * alt * pz
+    gx, gy, gz = outward * px, outward * py, -down
+
+    # Mean displacement over the step, by Hermite's cubic through its two ends.
+    half = 0.5 * dt
+    twelfth = TWELFTH * dt
+    sixth = SIXTH * dt * dt
+    lift = ox * vy - oy * vx
+    mx = half * vx + 0.5 * sx - twelfth * ux + sixth * (gx - (oy * vz - oz * vy))
+    my = half * vy + 0.5 * sy - twelfth * uy + sixth * (gy - (oz * vx - ox * vz))
+    mz = half * vz + 0.5 * sz - twelfth * uz + sixth * (gz - lift)
+
+    # Change of the normal to the mean place, and gravity there; as in `ned`, but that the level
+    # does not turn about the vertical.
+    toward = along * (px * mx + py * my)
+    nx = across * mx + toward * px
+    ny = across * my + toward * py
+    north = px * nx + py * ny
+    rise = TWO_THIRDS * (mx * nx + my * ny) + mz - sixth * lift
+    inward = lean * (alt * north + rise * pz)
+    level = lean * alt * s2
+    more_x = level * nx - inward * px
+    more_y = level * ny - inward * py
+    more_z = -(pz * steep * north + rise * (loss + rise * bend))
+    gx += more_x
+    gy += more_y
+    gz += more_z
+    zx = half * ox - ny
+    zy = half * oy + nx
+    zz = half * oz
+    second = TWO_THIRDS * gz
+    turn_x = zy * gz - zz * gy + second * zx * zz
+    turn_y = zz * gx - zx * gz + second * zy * zz
+    turn_z = zx * gy - zy * gx - second * (zx * zx + zy * zy)
+    dt2 = dt * dt
+    rx = dt * (vx - (oy * mz - oz * my)) + sx + dt2 * (0.5 * gx - SIXTH * more_x + THIRD * turn_x)
+    ry = dt * (vy - (oz * mx - ox * mz)) + sy + dt2 * (0.5 * gy - SIXTH * more_y + THIRD * turn_y)
+    rz = dt * (vz - (ox * my - oy * mx)) + sz + dt2 * (0.5 * gz - SIXTH * more_z + THIRD * turn_z)
+    # The Earth's rate times the displacement.
+    xx, xy, xz = oy * rz - oz * ry, oz * rx - ox * rz, ox * ry - oy * rx
+    wx = vx + ux + dt * (gx + turn_x) - xx
+    wy = vy + uy + dt * (gy + turn_y) - xy
+    wz = vz + uz + dt * (gz + turn_z) - xz
+
+    # Relative to the Earth: turned back by its rate, r - o x (int t dr - o x r dt²/6).
+    bx = dt * (rx - mx) - sixth * xx
+    by = dt * (ry - my) - sixth * xy
+    bz = dt * (rz - mz) - sixth * xz
+    tx, ty, t2, up = shift(
+        px,
+        py,
+        pz,
+        w,
+        prime,
+        slope,
+        across,
+        curvature,
+        alt,
+        e2,
+        rx - (oy * bz - oz * by),
+        ry - (oz * bx - ox * bz),
+        rz - (ox * by - oy * bx),
+    )
+
+    fd, fx, fy = tilt(tx, ty, t2)
+    yd, ys = half_turn(0.5 * rate * dt)
+    # The velocity is turned by the Earth's turn and the level's.
+    fw = 1.0 + fd
+    yw = 1.0 + yd
+    vx, vy, vz = turn_back(
+        yw * fw - ys * (px * fx + py * fy),
+        yw * fx + ys * (px * fw - pz * fy),
+        yw * fy + ys * (py * fw + pz * fx),
+        ys * (px * fy - py * fx + pz * fw),
+        wx,
+        wy,
+        wz,
+    )
+    q_ew, low_ew = multiply_on(q_ew, low_ew, fd, fx, fy, 0.0)
+    bw, b1, b2, b3 = quat_from_rotvec(phi[0], phi[1], phi[2])
+    q_ib, low_ib = multiply_on(q_ib, low_ib, bw - 1.0, b1, b2, b3)
+    c, s = spin[0], spin[1]
+    yd += 0.5 * (1.0 - (c * c + s * s))
+    c1, c2 = add(c, spin[2], yd * c - ys * s)
+    s1, s2 = add(s, spin[3], yd * s + ys * c)
+    return (
+        q_ew,
+        low_ew,
+        alt + up,
+        (vx, vy, vz),
+        body_to_level(q_ew, c1, s1, q_ib),
+        q_ib,
+        low_ib,
+        (c1, s1, c2, s2),
+        w,
+        t2,
+    )
+
+
+@njit(cache=True, inline="always")
+def four(state, at):
+    return state[at], state[at + 1], state[at + 2], state[at + 3]
+
+
+@njit(cache=True, inline="always")
+def put(state, at, numbers):
+    for j in range(len(numbers)):
+        state[at + j] = numbers[j]
+
+
+@njit(cache=True, inline="always")
+def wander_verdict(alt, v, q_wb, q_ew, t2, speed, lowest, highest):
+    """Whether a state is one that this mechanization may go on from."""
+    if not within(alt, v[0], v[1], v[2], q_wb[0], q_ew[0], speed, lowest, highest):
+        return DIVERGED
+    if t2 > LARGEST_TURN * LARGEST_TURN:
+        return LEAP
+    return DONE
+
+
+@njit(cache=True, error_model="numpy")
+def wander_advance(state, increments, reference, earth, options, history):
+    """Advance over a segment, as `ned.ned_advance`; `history` takes the first twelve numbers."""
+    q_ew, low_ew = four(state, Q_EW), four(state, LOW_EW)
+    q_ib, low_ib = four(state, Q_IB), four(state, LOW_IB)
+    q_wb, spin = four(state, Q_WB), four(state, SPIN)
+    alt, v, w = state[ALT], (state[V], state[V + 1], state[V + 2]), state[PRIME]
+    pull, since = state[PULL], state[SINCE]
+    a, e2, gamma, k = earth[0], earth[1], earth[2], earth[3]
+    rate, f, m = earth[4], earth[5], earth[6]
+    mode, tau, spring = options[MODE], options[TAU], options[SPRING]
+    speed, lowest, highest = options[SPEED], options[LOWEST], options[HIGHEST]
+    steps = increments.shape[0]
+    why = DONE
+    made = steps
+    for i in range(steps):
+        before = alt
+        dt = increments[i, 0]
+        q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, t2 = wander_step(
+            q_ew,
+            low_ew,
+            alt,
+            v,
+            q_wb,
+            q_ib,
+            low_ib,
+            spin,
+            w,
+            dt,
+            (increments[i, 1], increments[i, 2], increments[i, 3]),
+            (increments[i, 4], increments[i, 5], increments[i, 6]),
+            (increments[i, 7], increments[i, 8], increments[i, 9]),
+            a,
+            e2,
+            gamma,
+            k,
+            rate,
+            f,
+            m,
+        )
+        if mode != FREE:
+            height = math.nan
+            if reference.shape[0] > 0:
+                height = reference[i]
+            alt, vd, pull, since = guide_height(
+                alt, -v[2], pull, since, before, height, dt, mode, tau, spring
+            )
+            v = (v[0], v[1], -vd)
+        why = wander_verdict(alt, v, q_wb, q_ew, t2, speed, lowest, highest)
+        if why != DONE:
+            made = i
+            break
+        history[i, 0], history[i, 1], history[i, 2], history[i, 3] = q_ew
+        history[i, ALT] = alt
+        history[i, 5], history[i, 6], history[i, 7] = v
+        history[i, 8], history[i, 9], history[i, 10], history[i, 11] = q_wb
+        put(state, Q_IB, q_ib)
+        put(state, LOW_EW, low_ew)
+        put(state, LOW_IB, low_ib)
+        put(state, SPIN, spin)
+        state[PRIME], state[PULL], state[SINCE] = w, pull, since
+    if made > 0:
+        for j in range(ROW):
+            state[j] = history[made - 1, j]
+    return made, why

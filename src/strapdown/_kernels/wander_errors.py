@@ -1,0 +1,213 @@
+"""Growth of the errors of a wander-azimuth mechanization, by the variation of its equations.
+
+Chernodarov 2009: ``2 q0' = q0 (x) w_ib`` (1), ``2 q1' = q1 (x) w_ew`` (2) and
+``V' = C_wb f + g - (2 W + w_ew) x V`` (4), with w_ew of V through the curvature of the level surface
+and without a vertical part. Their variation is written in variables that are left of the errors of
+the quaternions when the rotation of the axes is taken out, without any approximation:
+``dq1 = 1/2 q1 (x) (n1, theta)`` and ``dq0 = 1/2 q_iw (x) (n0, eps) (x) q_wb``. The norms n0 and n1
+do not change. theta and eps, in level axes w, are the rotations of the computed level relative to
+the Earth and of the computed body relative to inertial space:
+
+    theta' = -w_ew x theta + dw
+    dV'    = -(C f) x (eps - theta) + C df + dg - (2 W + w_ew) x dV - (2 dW + dw) x V
+    eps'   = -(W + w_ew) x eps + C dw_ib
+
+The level axes have the Earth's axis p (unit vector) where the true ones have p - dp,
+``dp = p x theta``; so dW is the Earth's rate along it, dg the slope of gravity along the sine of the
+latitude, which is the third component of p, and dw has a part from dV and one from dp. States:
+theta (3), dV (3), eps (3), then k states of the sensors. There is no state of the height.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
+from strapdown._kernels.level import ALT, AXIS, LEVEL, OMEGA_EL, V_L, curvatures
+from strapdown._kernels.psi_model import (
+    compose_transition,
+    couple,
+    exponential,
+    means_of_steps,
+    minus_cross,
+    noise_of_step,
+)
+
+THETA, DV, EPS, CORE = 0, 3, 6, 9
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def curvature_slopes(sine, alt, a, e2, across, along):
+    """Derivatives of the two curvatures of `level.curvatures` by the sine of the latitude."""
+    w2 = 1.0 / (1.0 - e2 * sine * sine)
+    prime = a * math.sqrt(w2)
+    meridian = prime * (1.0 - e2) * w2
+    growth = e2 * sine * w2
+    return (
+        -across * across * prime * growth,
+        along * growth * (3.0 - across * prime - 3.0 * meridian / (meridian + alt)),
+    )
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def gravity_slope(sine, alt, earth):
+    """Derivative of the length of normal gravity by the sine of the latitude, m/s²."""
+    w = 1.0 / math.sqrt(1.0 - earth[E2] * sine * sine)
+    # Slopes by latitude have a factor cosine, which is taken as 1 here.
+    _, _, _, _, slope, _, _ = gravity_around(
+        sine,
+        1.0,
+        alt,
+        w,
+        0.0,
+        earth[A],
+        earth[E2],
+        earth[GAMMA],
+        earth[K],
+        earth[F],
+        earth[M],
+    )
+    return slope
+
+
+@njit(cache=True, error_model="numpy")
+def turn_of_level(level, earth, by_v, by_p):
+    """Fill the derivatives of w_ew by V and by the Earth's axis, each (3, 3).
+
+    ``w_ew = zeta x B V`` with B the tensor of curvature: ``across + along k k'``, k the horizontal
+    part of the axis.
+    """
+    kx, ky, sine = level[AXIS], level[AXIS + 1], level[AXIS + 2]
+    vx, vy = level[V_L], level[V_L + 1]
+    across, along = curvatures(sine, level[ALT], earth[A], earth[E2])
+    across_s, along_s = curvature_slopes(sine, level[ALT], earth[A], earth[E2], across, along)
+    north = kx * vx + ky * vy
+    by_v[:, :] = 0.0
+    by_v[0, 0], by_v[0, 1] = -along * kx * ky, -(across + along * ky * ky)
+    by_v[1, 0], by_v[1, 1] = across + along * kx * kx, along * kx * ky
+    by_p[:, :] = 0.0
+    by_p[0, 0], by_p[0, 1] = -along * ky * vx, -along * (north + ky * vy)
+    by_p[1, 0], by_p[1, 1] = along * (north + kx * vx), along * kx * vy
+    by_p[0, 2] = -(across_s * vy + along_s * ky * north)
+    by_p[1, 2] = across_s * vx + along_s * kx * north
+
+
+@njit(cache=True, error_model="numpy")
+def plus_product(f, row, column, matrix, x, y, z, sign):
+    """Add ``sign matrix [(x, y, z) x]`` to the block at (row, column)."""
+    for i in range(3):
+        a, b, c = matrix[i, 0], matrix[i, 1], matrix[i, 2]
+        f[row + i, column] += sign * (b * z - c * y)
+        f[row + i, column + 1] += sign * (c * x - a * z)
+        f[row + i, column + 2] += sign * (a * y - b * x)
+
+
+@njit(cache=True, error_model="numpy")
+def wander_dynamics(
+    f, level, matrix, specific, rate, force, gyro, accel, held, earth, by_v, by_p, turn
+):
+    """Fill the first nine rows of F, (9, 9 + k); arguments as of `psi_model.psi_dynamics`.
+
+    The three last are room to work in, (3, 3) each. With a height that is held the vertical
+    velocity is known.
+    """
+    wx, wy, wz = level[OMEGA_EL], level[OMEGA_EL + 1], level[OMEGA_EL + 2]
+    spin = earth[RATE]
+    px, py, pz = level[AXIS], level[AXIS + 1], level[AXIS + 2]
+    vx, vy, vz = level[V_L], level[V_L + 1], level[V_L + 2]
+    turn_of_level(level, earth, by_v, by_p)
+    f[:, :] = 0.0
+    minus_cross(f, THETA, THETA, wx, wy, wz)
+    plus_product(f, THETA, THETA, by_p, px, py, pz, 1.0)
+    for i in range(3):
+        for j in range(3):
+            f[THETA + i, DV + j] = by_v[i, j]
+    minus_cross(f, DV, DV, 2.0 * spin * px + wx, 2.0 * spin * py + wy, 2.0 * spin * pz + wz)
+    # V x dw, and V x (2 dW + dw) by the axis.
+    for j in range(3):
+        a, b, c = by_v[0, j], by_v[1, j], by_v[2, j]
+        f[DV, DV + j] += vy * c - vz * b
+        f[DV + 1, DV + j] += vz * a - vx * c
+        f[DV + 2, DV + j] += vx * b - vy * a
+        by_p[j, j] += 2.0 * spin
+        a, b, c = by_p[0, j], by_p[1, j], by_p[2, j]
+        turn[0, j] = vy * c - vz * b
+        turn[1, j] = vz * a - vx * c
+        turn[2, j] = vx * b - vy * a
+    turn[2, 2] -= gravity_slope(pz, level[ALT], earth)
+    minus_cross(f, DV, THETA, -specific[0], -specific[1], -specific[2])
+    plus_product(f, DV, THETA, turn, px, py, pz, 1.0)
+    minus_cross(f, DV, EPS, specific[0], specific[1], specific[2])
+    minus_cross(f, EPS, EPS, spin * px + wx, spin * py + wy, spin * pz + wz)
+    couple(f, DV, matrix, accel, rate, force)
+    couple(f, EPS, matrix, gyro, rate, force)
+    if held:
+        f[DV + 2, :] = 0.0
+        f[:, DV + 2] = 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def wander_transitions(
+    levels,
+    rows,
+    longest,
+    gyro,
+    accel,
+    decay,
+    drive,
+    gyro_noise,
+    accel_noise,
+    held,
+    earth,
+    phi,
+    q,
+    f,
+    step,
+    added,
+    gamma,
+    work,
+    matrix,
+    level,
+):
+    """Fill the transition and the covariance of noise, as `psi_model.psi_transitions`.
+
+    `matrix` (15, 3) and `level` (one row) are room to work in, too.
+    """
+    n = phi.shape[0]
+    for i in range(n):
+        for j in range(n):
+            phi[i, j] = 1.0 if i == j else 0.0
+            q[i, j] = 0.0
+    if held:
+        phi[DV + 2, DV + 2] = 0.0
+    at = 0
+    while at < rows.shape[0]:
+        end, dt = means_of_steps(levels, rows, at, longest, matrix[:6])
+        for j in range(LEVEL):
+            level[j] = 0.5 * (levels[at, j] + levels[end, j])
+        wander_dynamics(
+            f,
+            level,
+            matrix,
+            matrix[3],
+            matrix[4],
+            matrix[5],
+            gyro,
+            accel,
+            held,
+            earth,
+            matrix[6:9],
+            matrix[9:12],
+            matrix[12:15],
+        )
+        noise_of_step(
+            f, matrix, dt, gyro_noise, accel_noise, decay, drive, False, added, gamma, step
+        )
+        if held:
+            for j in range(n):
+                added[DV + 2, j] = added[j, DV + 2] = 0.0
+        exponential(f, decay, dt, step, work)
+        compose_transition(step, added, phi, q, work)
+        at = end

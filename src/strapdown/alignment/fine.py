@@ -1,0 +1,331 @@
+"""Fine alignment: a filter over the errors of a mechanization of a body that stands still."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.fine_findings import fine_findings
+from strapdown.alignment.fine_result import Epochs, FineResult
+from strapdown.alignment.site import Site
+from strapdown.alignment.stationary import (
+    Standing,
+    home_of,
+    measured_standing,
+    position_observation,
+    rate_observation,
+    velocity_observation,
+)
+from strapdown.estimation.covariance import CovarianceForm, Innovations
+from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
+from strapdown.estimation.observation import Observation
+from strapdown.estimation.resting_sensors import resting_states
+from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.update_rule import UpdateRule
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.increments import motion_increments
+from strapdown.mechanization import NorthEastDown, run_mechanization
+from strapdown.mechanization.mechanization import Mechanization
+from strapdown.nav_state import NavState
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GYRO, MOTION
+from strapdown.tables.checks import is_number, values_of
+
+__all__ = ["FineAlignment"]
+
+Array = NDArray[np.float64]
+
+# A body on a floor in a town moves by so much; less is not claimed.
+LEAST = Standing(
+    position=np.full(3, 1e-3),  # m
+    velocity=np.full(3, 3e-4),  # m/s
+    turn=np.zeros(3),  # rad
+)
+# Tilt and heading before the filter: much more than a coarse alignment leaves, for it was made of
+# the same rests, by the same biases, and says nothing that the filter does not find by itself.
+WIDER = 10.0
+LEAST_TILT, LEAST_HEADING = math.radians(0.1), math.radians(1.0)
+MOST_TILT, MOST_HEADING = math.radians(5.0), math.radians(20.0)
+# Fewer epochs tell nothing of how still a body stands.
+LEAST_EPOCHS = 10
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class FineAlignment:
+    """Attitude, drifts and biases of a body at rest, with what cannot be known of them.
+
+    Chernodarov (2009), Eqs. (16)-(18): the turn that is measured is that of the Earth, the place
+    stays, the velocity is zero. What no rest can tell apart stays apart in the covariance: a tilt
+    from a horizontal accelerometer bias, the heading from an east drift.
+
+    Attributes
+    ----------
+    mechanization : Mechanization
+        Its height free, so that the vertical bias is seen.
+    model : type of ErrorModel
+    form : CovarianceForm
+    rule : UpdateRule, optional
+        How far an observation is believed; without one, all of it.
+    interval : float, s
+        From epoch to epoch.
+    observe : tuple of str
+        Of ``rate``, ``position``, ``velocity``.
+    standing : Standing, optional
+        How still the body stands; found from the record, if not given.
+
+    Raises
+    ------
+    ConfigError
+        An option means nothing.
+    """
+
+    mechanization: Mechanization = field(default_factory=NorthEastDown)
+    model: type[ErrorModel] = RotationVectorModel
+    form: CovarianceForm = field(default_factory=COVARIANCES["joseph"])
+    rule: UpdateRule | None = None
+    interval: float = 1.0
+    observe: tuple[str, ...] = ("rate", "position", "velocity")
+    standing: Standing | None = None
+
+    def __post_init__(self) -> None:
+        if not is_number(self.interval) or not 0.0 < self.interval <= 60.0:
+            raise ConfigError(
+                f"{self.interval!r} s is no interval of observations",
+                quantity="interval",
+                remedy="give 1 s, or another time up to 60 s",
+            )
+        unknown = [name for name in self.observe if name not in OBSERVATIONS]
+        if unknown or "velocity" not in self.observe:
+            raise ConfigError(
+                f"{', '.join(self.observe) or 'nothing'} is not what a rest tells",
+                quantity="observe",
+                remedy=f"give velocity and any of {', '.join(OBSERVATIONS)}",
+            )
+        if self.mechanization.height == "damped":
+            raise ConfigError(
+                "the height is damped, and a filter has no states for its loop",
+                quantity="height",
+                remedy="use height='free' or 'held'",
+            )
+
+    def align(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        coarse: Alignment,
+        progress: Progress | None = None,
+    ) -> FineResult:
+        """Align.
+
+        Parameters
+        ----------
+        imu : DataFrame
+            Imu table of the rest; it begins or ends where the coarse alignment holds.
+        site : Site
+        sensors : ImuUncertainty
+        coarse : Alignment
+            The attitude at the first or at the last sample, within 20 deg of the truth.
+        progress : callable, optional
+            Told the share that is done.
+
+        Returns
+        -------
+        FineResult
+
+        Raises
+        ------
+        DataError
+            The record is too short, or the coarse alignment belongs to another instant.
+        """
+        increments = motion_increments(imu)
+        begin = float(increments.index[0] - increments["dt"].iloc[0])
+        start = self._start(increments, site, coarse, begin)
+        force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
+        rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
+        filter_ = ErrorFilter(
+            self.mechanization,
+            self.model(
+                gyro_noise=sensors.gyro.axis("noise_density"),
+                accel_noise=sensors.accel.axis("noise_density"),
+                sensors=resting_states(sensors, rate, force),
+            ),
+            self.form,
+            self.rule,
+        )
+        rows = values_of(increments, MOTION)
+        time = increments.index.to_numpy(dtype=np.float64)
+        ends = epoch_ends(begin, time, self.interval)
+        if ends.size < LEAST_EPOCHS:
+            raise DataError(
+                f"a record of {time[-1] - begin:.6g} s has {ends.size} epochs of "
+                f"{self.interval:g} s",
+                file=imu.attrs.get("source"),
+                quantity="time",
+                remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
+                "usual",
+            )
+        standing = self.standing
+        if standing is None:
+            state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
+            whole = filter_.predict(state, time, rows)[1]
+            standing = measured_standing(whole, int(ends[0]), LEAST)
+        home = home_of(site, begin)
+        state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
+        epochs = Epochs(filter_)
+        epochs.add(state, {})
+        run = settled(filter_, state, time, rows, ends, home, standing, self.observe)
+        for after, seen in run:
+            state = after
+            epochs.add(state, seen)
+            if progress is not None:
+                progress((state.time - begin) / (float(time[-1]) - begin))
+        used = slice(0, int(ends[-1]))
+        result = FineResult(
+            alignment=epochs.alignment(state),
+            at_start=self._carried_back(filter_, epochs, state, increments.iloc[used]),
+            history=epochs.history(),
+            innovations=epochs.innovations(),
+            standing=standing,
+            filter=filter_,
+            state=state,
+            source=imu.attrs.get("source"),
+        )
+        return replace(result, findings=fine_findings(result, site))
+
+    def _start(
+        self, increments: pd.DataFrame, site: Site, coarse: Alignment, begin: float
+    ) -> NavState:
+        """The state at the first sample; an attitude at the last one is carried back."""
+        end = float(increments.index[-1])
+        slack = float(increments["dt"].max())
+        home = replace(home_of(site, coarse.time), q_nb=coarse.q_nb)
+        if abs(coarse.time - begin) <= slack:
+            return replace(home, time=begin)
+        if abs(coarse.time - end) <= slack:
+            back = run_mechanization(
+                replace(self.mechanization, height="held"),
+                replace(home, time=end),
+                increments,
+                backward=True,
+            )
+            return replace(home, time=begin, q_nb=back.end.q_nb)
+        raise DataError(
+            f"the coarse alignment holds at {coarse.time:.9g} s, and the record goes from "
+            f"{begin:.9g} to {end:.9g} s",
+            file=increments.attrs.get("source"),
+            quantity="time",
+            remedy="give the attitude at its first or at its last sample",
+        )
+
+    def _carried_back(
+        self, filter_: ErrorFilter, epochs: Epochs, state: FilterState, increments: pd.DataFrame
+    ) -> Alignment:
+        """The attitude at the first sample, by the gyros without their drifts."""
+        clean = increments.copy()
+        clean[list(MOTION)] = filter_.compensated(state, values_of(increments, MOTION))
+        clean.attrs = dict(increments.attrs)
+        last = epochs.alignment(state)
+        end = filter_.mechanization.nav_state(state.mechanization, state.time)
+        still = replace(end, v_n=np.zeros(3))
+        back = run_mechanization(
+            replace(self.mechanization, height="held"), still, clean, backward=True
+        )
+        return replace(last, time=back.end.time, q_nb=back.end.q_nb)
+
+
+OBSERVATIONS = ("rate", "position", "velocity")
+
+
+def settled(
+    filter_: ErrorFilter,
+    state: FilterState,
+    time: Array,
+    rows: Array,
+    ends: NDArray[np.int64],
+    home: NavState,
+    standing: Standing,
+    observe: tuple[str, ...],
+) -> Iterator[tuple[FilterState, dict[str, tuple[Observation, Innovations]]]]:
+    """Go from epoch to epoch over a rest.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    state : FilterState
+    time : ndarray, (k,), s
+        Ends of the steps.
+    rows : ndarray, (k, 10)
+        Motion increments.
+    ends : ndarray of int
+        Number of steps before the end of each epoch.
+    home : NavState
+    standing : Standing
+    observe : tuple of str
+
+    Yields
+    ------
+    state : FilterState
+    seen : dict
+        By name, each observation and its innovations.
+    """
+    at = 0
+    for end in ends.tolist():
+        state, segment = filter_.predict(state, time[at:end], rows[at:end])
+        seen: dict[str, tuple[Observation, Innovations]] = {}
+        for name in observe:
+            observation = _observation(name, filter_, state, segment, home, standing)
+            state, innovations = filter_.observe(state, observation)
+            seen[name] = (observation, innovations)
+        yield state, seen
+        at = end
+
+
+def epoch_ends(begin: float, time: Array, interval: float) -> NDArray[np.int64]:
+    """Number of steps before the end of each whole interval, (m,)."""
+    count = math.floor((float(time[-1]) - begin) / interval + 1e-6)
+    wanted = begin + interval * np.arange(1, count + 1)
+    half = 0.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
+    return np.unique(np.searchsorted(time, wanted - half) + 1).clip(max=time.size)
+
+
+def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standing) -> Array:
+    """Covariance of the physical errors before the first epoch, in north-east-down."""
+    P = np.zeros((filter_.model.physical_size,) * 2)
+    P[0:3, 0:3] = np.diag(standing.position**2)
+    P[3:6, 3:6] = np.diag(standing.velocity**2)
+    tilt = float(np.sqrt(np.diagonal(coarse.covariance)[:2].max()))
+    heading = float(np.sqrt(coarse.covariance[2, 2]))
+    P[6, 6] = P[7, 7] = min(max(WIDER * tilt, LEAST_TILT), MOST_TILT) ** 2
+    P[8, 8] = min(max(WIDER * heading, LEAST_HEADING), MOST_HEADING) ** 2
+    at = PHYSICAL
+    for block in filter_.model.sensors:
+        end = at + len(block.block)
+        P[at:end, at:end] = np.diag(block.sd**2)
+        at = end
+    return P
+
+
+def _observation(
+    name: str,
+    filter_: ErrorFilter,
+    state: FilterState,
+    segment: Segment,
+    home: NavState,
+    standing: Standing,
+) -> Observation:
+    if name == "rate":
+        return rate_observation(filter_, segment, standing)
+    if name == "position":
+        return position_observation(filter_, state, home, standing)
+    return velocity_observation(filter_, state, standing)

@@ -1,0 +1,133 @@
+"""A record summed in the body's axes at its first instant, as alignments need it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.increments import motion_increments
+from strapdown.tables import MOTION
+
+Array = NDArray[np.float64]
+
+__all__ = ["InertialSums", "moments", "sum_inertially"]
+
+# Pieces over which sensor errors are taken for constant: alignment sees what changes over a
+# fifth of the record and more, and knows a piece of a 240th to 1e-4 of its weight.
+NODES = 240
+
+
+@dataclass(frozen=True, eq=False)
+class InertialSums:
+    """Integrals of turn and specific force, in the body's axes at the first sample, m nodes.
+
+    These axes are held still in inertial space; ``C`` turns from the body into them.
+
+    Attributes
+    ----------
+    start, length : float, s
+        First stamp, and time to the last.
+    stamps : ndarray, (n,), s
+        From the first.
+    fallen : ndarray, (n, 3), m
+        Second integral of the specific force at the stamps.
+    turned : ndarray, (n, 4)
+        ``C`` at the stamps, as quaternions.
+    node_length : ndarray, (m,), s
+    node_velocity : ndarray, (m, 3), m/s
+        Integral of the specific force over each node.
+    times : ndarray, (m, 3, 3), s
+        Integral of ``C`` over each node.
+    turns, pushes : ndarray, (m, 3, 3, 3), rad and m/s
+        Sums of ``C[:, i] phi[j]`` and ``C[:, i] dv[j]``, indices (node, component, i, j).
+    """
+
+    start: float
+    length: float
+    stamps: Array
+    fallen: Array
+    turned: Array
+    node_length: Array
+    node_velocity: Array
+    times: Array
+    turns: Array
+    pushes: Array
+
+    @property
+    def middles(self) -> Array:
+        """Middle of each node from the first stamp, (m,), s."""
+        return np.asarray(np.cumsum(self.node_length) - 0.5 * self.node_length)
+
+
+def sum_inertially(imu: pd.DataFrame) -> InertialSums:
+    """Sum an Imu table with specific force.
+
+    Parameters
+    ----------
+    imu : DataFrame
+
+    Returns
+    -------
+    InertialSums
+
+    Raises
+    ------
+    DataError
+        As `increments.motion_increments`.
+    """
+    from strapdown._kernels.inertial_sums import inertial_sums
+
+    increments = motion_increments(imu)
+    rows = np.ascontiguousarray(increments[MOTION].to_numpy(dtype=np.float64))
+    time = imu.index.to_numpy(dtype=np.float64)
+    stamps = time - time[0]
+    n = len(rows)
+    nodes = min(NODES, n)
+    # Nodes end at the stamps nearest to equal parts of the time.
+    edges = np.searchsorted(stamps[1:], stamps[-1] * np.arange(1, nodes + 1) / nodes)
+    last = np.unique(np.minimum(edges, n - 1))
+    last[-1] = n - 1
+    m = len(last)
+    turned, fallen = np.empty((n + 1, 4)), np.empty((n + 1, 3))
+    velocity, attitude = np.empty((m, 3)), np.empty((m, 4))
+    times, turns, pushes = np.zeros((m, 3, 3)), np.zeros((m, 3, 3, 3)), np.zeros((m, 3, 3, 3))
+    inertial_sums(rows, last, turned, fallen, velocity, attitude, times, turns, pushes)
+    ends = stamps[last + 1]
+    return InertialSums(
+        float(time[0]),
+        float(stamps[-1]),
+        stamps,
+        fallen,
+        turned,
+        np.diff(ends, prepend=0.0),
+        np.diff(velocity, axis=0, prepend=np.zeros((1, 3))),
+        times,
+        turns,
+        pushes,
+    )
+
+
+def moments(stamps: Array, values: Array, degrees: int) -> Array:
+    """Coefficients of a record in Legendre polynomials over its length.
+
+    Parameters
+    ----------
+    stamps : ndarray, (n,), s
+        From zero to the length.
+    values : ndarray, (n, k)
+    degrees : int
+
+    Returns
+    -------
+    ndarray, (degrees, k), the unit of `values`
+        Degree zero first.
+    """
+    from strapdown._kernels.inertial_sums import legendre_moments
+
+    out = np.empty((degrees, values.shape[1]))
+    u = 2.0 * stamps / stamps[-1] - 1.0
+    legendre_moments(u, np.ascontiguousarray(values), out)
+    return out

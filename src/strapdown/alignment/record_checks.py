@@ -1,0 +1,98 @@
+"""What a record must be before any attitude is sought in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
+
+Array = NDArray[np.float64]
+
+__all__ = ["LEAST_SAMPLES", "check_record"]
+
+#: Fewer tell no scatter.
+LEAST_SAMPLES = 20
+WHAT_IT_READS = {"gyro": "the rate of the Earth", "accel": "gravity"}
+
+
+def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
+    """Check an Imu table that is to be aligned.
+
+    Parameters
+    ----------
+    imu : DataFrame
+
+    Returns
+    -------
+    tuple of Finding
+        Gaps.
+
+    Raises
+    ------
+    DataError
+        As `tables.check_imu`; there is no accelerometer, there are fewer than 20 samples, or a
+        channel does not change at all while others do.
+    """
+    check_imu(imu)
+    source = imu.attrs.get("source")
+    if ACCEL[0] not in imu.columns:
+        raise DataError(
+            "there is no accelerometer, and an alignment needs the direction of gravity",
+            file=source,
+            quantity="accel",
+            remedy="name its columns when the log is read, or give the initial attitude",
+        )
+    if len(imu) < LEAST_SAMPLES:
+        raise DataError(
+            f"{len(imu)} samples over {imu.index[-1] - imu.index[0]:.3g} s tell no mean and no "
+            "scatter",
+            file=source,
+            quantity="time",
+            remedy=f"align over at least {LEAST_SAMPLES} samples; minutes, to find north",
+        )
+    values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
+    _check_alive(values, source)
+    return _gaps(imu.index.to_numpy(dtype=np.float64), source)
+
+
+def _check_alive(values: Array, source: str | None) -> None:
+    """Refuse a channel that stands still while its neighbours do not."""
+    # An ideal sensor at rest is constant on all channels to rounding, and nothing is said of it.
+    spread = np.ptp(values, axis=0)
+    for name, columns in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
+        still = spread[columns] == 0.0
+        rounding = 1e-12 * np.abs(values[:, columns]).max(initial=0.0)
+        if not still.any() or not (spread[columns] > rounding).any():
+            continue
+        channel = (GYRO if name == "gyro" else ACCEL)[int(np.argmax(still))]
+        value = values[0, columns][int(np.argmax(still))]
+        raise DataError(
+            f"it reads {value:.6g} on all {len(values)} samples while the other axes change: it "
+            f"is dead or stuck, and {WHAT_IT_READS[name]} cannot be told without it",
+            file=source,
+            row=1,
+            quantity=channel,
+            remedy="mend the sensor or its cable, use a redundant unit, or take a stretch in "
+            "which it works",
+        )
+
+
+def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
+    gaps = find_gaps(time)
+    if not gaps:
+        return ()
+    worst = max(gaps, key=lambda gap: gap.length)
+    return (
+        Finding(
+            f"{len(gaps)} gaps, the longest of {worst.length:.3g} s at {worst.start:.6g} s where "
+            f"steps are of {worst.usual:.3g} s: rate and force are taken for straight lines "
+            "across them, and what the body did in them is not known",
+            file=source,
+            row=worst.sample + 1,
+            quantity="time",
+            remedy="align over a stretch without gaps",
+        ),
+    )

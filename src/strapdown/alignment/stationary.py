@@ -1,0 +1,183 @@
+"""What is known of a body that stands still, as observations of a filter.
+
+Chernodarov (2009), Eqs. (16)-(18): the rate of the Earth, the place, no velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown._kernels.earth import RATE
+from strapdown._kernels.level import AXIS, Q_LB, V_L
+from strapdown.alignment.site import Site
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_model import PHYSICAL, Segment
+from strapdown.estimation.observation import Observation
+from strapdown.estimation.sensor_states import stacked
+from strapdown.mechanization.state_error import displacement_between
+from strapdown.nav_state import NavState
+
+Array = NDArray[np.float64]
+
+AXES = ("x", "y", "z")
+# Fewer say little of how much they vary.
+LEAST_STRETCHES = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """How still a body stands, as standard deviations in level axes.
+
+    Attributes
+    ----------
+    position : ndarray, (3,), m
+        Of the place at an epoch about its mean.
+    velocity : ndarray, (3,), m/s
+    turn : ndarray, (3,), rad
+        Of the turn relative to the Earth from one epoch to the next.
+    """
+
+    position: Array
+    velocity: Array
+    turn: Array
+
+
+def position_observation(
+    filter_: ErrorFilter, state: FilterState, home: NavState, standing: Standing
+) -> Observation:
+    """The computed place less that of alignment: (17), as a displacement in level axes.
+
+    In height, too, where the mechanization's is free.
+    """
+    used = filter_.mechanization
+    here = used.nav_state(state.mechanization, state.time)
+    earth = find_ellipsoid(used.ellipsoid)
+    apart = used.level_from_ned(state.row) @ displacement_between(here, home, earth)
+    rows = 2 if used.height == "held" or not filter_.model.has_height else 3
+    H = np.zeros((rows, filter_.model.physical_size))
+    H[:, :rows] = np.eye(rows)
+    return Observation(
+        "position", apart[:rows], H, standing.position[:rows] ** 2, _labels("m")[:rows]
+    )
+
+
+def velocity_observation(
+    filter_: ErrorFilter, state: FilterState, standing: Standing
+) -> Observation:
+    """The computed velocity, which should be zero: (18)."""
+    rows = 2 if filter_.mechanization.height == "held" else 3
+    level = filter_.mechanization.levels(state.row[None, :])[0]
+    H = np.zeros((rows, filter_.model.physical_size))
+    H[:, 3 : 3 + rows] = np.eye(rows)
+    return Observation(
+        "velocity",
+        level[V_L : V_L + rows],
+        H,
+        standing.velocity[:rows] ** 2,
+        _labels("m/s")[:rows],
+    )
+
+
+def rate_observation(filter_: ErrorFilter, segment: Segment, standing: Standing) -> Observation:
+    """The turn that the gyros have measured less that of the Earth: (16).
+
+    The matrix that turns the gyros' axes is that of each instant, inside the integral: a body that
+    rocks comes back, and its rocking leaves only the difference of two angles. In level axes
+    instead of inertial ones, in which a body that stands turns by ``omega_ie dt`` as exactly. The
+    noise of the gyros is in the attitude too; taken as independent of it, which makes the filter's
+    standard deviations too large rather than too small.
+    """
+    model = filter_.model
+    levels = segment.mechanization.levels(segment.history)
+    rows = segment.increments
+    matrices = rotation.dcm_from_quaternion(levels[:-1, Q_LB : Q_LB + 4])
+    turned = np.einsum("kij,kj->i", matrices, rows[:, 1:4])
+    length = float(rows[:, 0].sum())
+    earth = filter_.earth[RATE] * levels[:, AXIS : AXIS + 3].mean(axis=0)
+    size = model.physical_size - PHYSICAL
+    gyro, _, _, _ = stacked(model.sensors, size)
+    weights = np.concatenate([[1.0], rows[:, 1:7].sum(axis=0) / length])
+    H = np.zeros((3, model.physical_size))
+    H[:, 6:9] = -rotation.cross_matrix(turned)
+    mean = np.einsum("k,kij->ij", rows[:, 0], matrices)
+    H[:, PHYSICAL:] = mean @ np.einsum("m,mij->ij", weights, gyro)
+    noise = np.square(model.gyro_noise) * length
+    return Observation(
+        "rate",
+        turned - earth * length,
+        H,
+        standing.turn**2 + (mean / length) ** 2 @ noise,
+        _labels("rad"),
+    )
+
+
+def measured_standing(segment: Segment, every: int, least: Standing) -> Standing:
+    """Find from a run without observations how still a body stands.
+
+    A filter takes what moves the body as independent from epoch to epoch. What sways slowly, or
+    settles, is not: so the motion is looked at over stretches of 1, 2, 4 ... epochs, and that
+    counts which independent motion would have to be for the stretch where it is largest. The drift
+    of the run itself is smooth, and left out by differences: the third for velocity, the fourth
+    for the place.
+
+    Parameters
+    ----------
+    segment : Segment
+        Of the whole record.
+    every : int
+        Steps from epoch to epoch.
+    least : Standing
+        No body is taken to stand more still than this.
+
+    Returns
+    -------
+    Standing
+    """
+    used = segment.mechanization
+    levels = used.levels(segment.history)
+    velocity = levels[::every, V_L : V_L + 3]
+    place = np.cumsum(velocity, axis=0) * float(segment.increments[:every, 0].sum())
+    matrices = rotation.dcm_from_quaternion(levels[:-1, Q_LB : Q_LB + 4])
+    turns = np.einsum("kij,kj->ki", matrices, segment.increments[:, 1:4])
+    turns = _stretches(turns, every).sum(axis=1)
+    return Standing(
+        position=np.maximum(_as_independent(place, 4), least.position),
+        velocity=np.maximum(_as_independent(velocity, 3), least.velocity),
+        turn=np.maximum(_as_independent(turns, 1), least.turn),
+    )
+
+
+def _as_independent(values: Array, order: int) -> Array:
+    """Deviation of independent epochs whose means over stretches would vary as much, (3,)."""
+    # Of a difference of independent numbers: the sum of the squares of its binomials.
+    gain = math.sqrt(math.comb(2 * order, order))
+    found = np.zeros(3)
+    length = 1
+    while len(values) // length >= order + LEAST_STRETCHES:
+        means = _stretches(values, length).mean(axis=1)
+        apart = np.diff(means, n=order, axis=0)
+        spread = np.sqrt(np.square(apart).mean(axis=0)) / gain
+        found = np.maximum(found, spread * math.sqrt(length))
+        length *= 2
+    return found
+
+
+def _stretches(values: Array, length: int) -> Array:
+    """Cut into stretches, (m, length, 3); what is left over at the end is left out."""
+    count = len(values) // length
+    return values[: count * length].reshape(count, length, values.shape[1])
+
+
+def home_of(site: Site, time: float) -> NavState:
+    """The place of alignment as a state."""
+    return NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=time)
+
+
+def _labels(unit: str) -> tuple[str, ...]:
+    return tuple(f"{axis}, {unit}" for axis in AXES)

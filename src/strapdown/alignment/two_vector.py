@@ -1,0 +1,208 @@
+"""Gyrocompassing: the attitude that lays two measured vectors on two known ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.block_means import BlockMeans, block_means, excursion, unexplained
+from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.levelling import level
+from strapdown.alignment.mean_errors import force_covariance, rate_covariance
+from strapdown.alignment.north import DEG_PER_H, latitude_findings, north_findings
+from strapdown.alignment.record_checks import check_record
+from strapdown.alignment.site import Site
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+
+Array = NDArray[np.float64]
+
+__all__ = ["TwoVector", "triad_attitude"]
+
+
+@dataclass(frozen=True)
+class TwoVector(CoarseAlignment):
+    """Mean specific force is up, and the mean rate is the Earth's: for a body that stands still.
+
+    Attributes
+    ----------
+    blocks : int
+        Equal parts of the record, 2 to 1000, whose scatter tells what disturbs the means.
+
+    Raises
+    ------
+    ConfigError
+        The number of blocks is out of range.
+    """
+
+    name: ClassVar[str] = "two_vector"
+    summary: ClassVar[str] = "mean rate and mean specific force of a body at rest (TRIAD)"
+    source: ClassVar[str] = "Black 1964; Britting 1971, sec. 9.2"
+
+    blocks: int = 10
+
+    def __post_init__(self) -> None:
+        if isinstance(self.blocks, bool) or self.blocks not in range(2, 1001):
+            raise ConfigError(
+                f"{self.blocks!r} blocks tell no scatter",
+                quantity="blocks",
+                remedy="use 2 to 1000",
+            )
+
+    def align(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        gnss: pd.DataFrame | None = None,
+    ) -> Alignment:
+        """As `CoarseAlignment.align`."""
+        findings = [*check_record(imu)]
+        source = imu.attrs.get("source")
+        means = block_means(imu, self.blocks)
+        level(means.whole_force)
+        _check_rate(means.whole_rate, site, sensors, source)
+        C_nb = triad_attitude(means.whole_force, means.whole_rate, site)
+
+        rate = C_nb @ rate_covariance(sensors, means.length, means.whole_rate, means.whole_force)
+        force = C_nb @ force_covariance(sensors, means.length, means.whole_force)
+        rate, force = rate @ C_nb.T, force @ C_nb.T
+        loud_rate = unexplained(
+            means.rate, means.length, sensors.gyro.axis("noise_density"), sensors.gyro_drift
+        )
+        loud_force = unexplained(
+            means.force, means.length, sensors.accel.axis("noise_density"), sensors.accel_drift
+        )
+        swing = np.zeros((3, 3))
+        if loud_rate > 1.0:
+            rate = rate + _of_mean(means.rate @ C_nb.T)
+            swing = C_nb @ excursion(imu, sensors.gyro.axis("noise_density")) @ C_nb.T
+        if loud_force > 1.0:
+            force = force + _of_mean(means.force @ C_nb.T)
+        by_force, by_rate = sensitivities(site)
+        covariance = by_force @ force @ by_force.T + by_rate @ rate @ by_rate.T + swing
+        heading_sd = float(np.sqrt(covariance[2, 2]))
+        if loud_rate > 1.0 or loud_force > 1.0:
+            findings.append(_disturbed(means, site, loud_rate, loud_force, swing, source))
+        findings += north_findings(site, heading_sd, sensors, source)
+        findings += latitude_findings(site, *_latitude(means, site, rate, force), source)
+        return Alignment(
+            self.name,
+            float(imu.index[-1]),
+            rotation.quaternion_from_dcm(C_nb),
+            covariance,
+            findings=tuple(findings),
+        )
+
+
+def triad_attitude(force: Array, rate: Array, site: Site) -> Array:
+    """``C_nb`` that lays minus the force on gravity, and the rate into the plane of the Earth's.
+
+    Parameters
+    ----------
+    force, rate : ndarray, (3,)
+        Body axes.
+    site : Site
+
+    Returns
+    -------
+    ndarray, (3, 3)
+    """
+    known = _triad(site.gravity, site.earth_rate)
+    return known @ _triad(-force, rate).T
+
+
+def _triad(first: Array, second: Array) -> Array:
+    a = first / np.sqrt(first @ first)
+    b = np.cross(a, second)
+    b /= max(float(np.sqrt(b @ b)), 1e-300)
+    return np.column_stack([a, b, np.cross(a, b)])
+
+
+def sensitivities(site: Site) -> tuple[Array, Array]:
+    """Attitude error per error of the mean force, and of the mean rate; (3, 3) each, NED.
+
+    ``phi_N = -df_E/g``, ``phi_E = df_N/g``, ``phi_D = df_E tan(lat)/g - dw_E/(w cos(lat))``.
+    """
+    g = float(np.sqrt(site.gravity @ site.gravity))
+    north, _, down = site.earth_rate
+    north = north if abs(north) > 1e-12 else 1e-12
+    by_force = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, -down / north, 0.0]]) / g
+    by_rate = np.zeros((3, 3))
+    by_rate[2, 1] = -1.0 / north
+    return by_force, by_rate
+
+
+def _of_mean(means: Array) -> Array:
+    """Covariance of a mean from the scatter of its parts, as if they were independent."""
+    off = means - means.mean(axis=0)
+    count = len(means)
+    return np.asarray(off.T @ off / (count * (count - 1)))
+
+
+def _check_rate(rate: Array, site: Site, sensors: ImuUncertainty, source: str | None) -> None:
+    """Refuse a mean rate that is a turn, or in another unit."""
+    size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
+    sd = float(np.sqrt(np.square(sensors.gyro.axis("bias")).sum()))
+    if not size > 2.0 * earth + 6.0 * sd:
+        return
+    told = f"the mean rate is {size * DEG_PER_H:.4g} deg/h, and the Earth's is "
+    told += f"{earth * DEG_PER_H:.4g}"
+    if abs(size / earth / np.degrees(1.0) - 1.0) < 0.1:
+        remedy = "the gyros seem to be in deg/s: state the unit when the log is read"
+    else:
+        remedy = (
+            "the body turned, or the bias of the gyros is larger than stated "
+            f"({sd * DEG_PER_H:.3g} deg/h): align while it stands, or state the right sensor"
+        )
+    raise DataError(told, file=source, quantity="gyro", remedy=remedy)
+
+
+def _latitude(means: BlockMeans, site: Site, rate: Array, force: Array) -> tuple[float, float]:
+    """Latitude from the angle between force and rate, and its standard deviation, deg."""
+    f, w = means.whole_force, means.whole_rate
+    sine = float(f @ w / np.sqrt((f @ f) * (w @ w)))
+    lat = np.radians(site.lat_deg)
+    size, g = float(np.sqrt(w @ w)), float(np.sqrt(f @ f))
+    # Across the rate in the plane of the meridian: what turns it against the vertical.
+    across = np.array([-np.sin(lat), 0.0, -np.cos(lat)])
+    variance = float(across @ rate @ across) / size**2 + float(force[0, 0]) / g**2
+    return float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0)))), float(
+        np.degrees(np.sqrt(variance))
+    )
+
+
+def _disturbed(
+    means: BlockMeans,
+    site: Site,
+    loud_rate: float,
+    loud_force: float,
+    swing: Array,
+    source: str | None,
+) -> Finding:
+    headings = np.array(
+        [
+            rotation.euler_from_dcm(triad_attitude(f, w, site))[2]
+            for f, w in zip(means.force, means.rate, strict=True)
+        ]
+    )
+    middle = rotation.euler_from_dcm(triad_attitude(means.whole_force, means.whole_rate, site))[2]
+    off = (headings - middle + 180.0) % 360.0 - 180.0
+    angle = np.degrees(np.sqrt(np.trace(swing)))
+    return Finding(
+        f"the body does not stand still: the mean rates of {len(off)} blocks of "
+        f"{means.length / len(off):.3g} s scatter {loud_rate:.3g} times as much as the noise of "
+        f"the gyros, the mean forces {loud_force:.3g} times as much as that of the "
+        f"accelerometers; the headings of the blocks run from {middle + off.min():.4g} to "
+        f"{middle + off.max():.4g} deg. It swings by {angle:.2g} deg (root mean square) about "
+        "its mean attitude, and what is left of a swing in a mean rate passes for the Earth's",
+        file=source,
+        quantity="gyro",
+        remedy="use inertial_frame, which lets the body rock; or align while nobody moves it",
+    )

@@ -1,0 +1,220 @@
+"""A Kalman filter over the errors of a mechanization, fed back at every observation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown._kernels.compensation import compensate
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation.covariance import CovarianceForm, Innovations
+from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
+from strapdown.estimation.observation import Observation
+from strapdown.estimation.sensor_states import stacked
+from strapdown.estimation.update_rule import UpdateRule
+from strapdown.exceptions import DivergenceError
+from strapdown.mechanization.mechanization import Mechanization
+from strapdown.nav_state import NavState
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FilterState:
+    """Everything that a filter remembers: from here it goes on.
+
+    Attributes
+    ----------
+    time : float, s
+    mechanization : ndarray
+        State of the mechanization, errors taken off.
+    row : ndarray
+        Its row of a history.
+    sensors : ndarray, (k,)
+        Estimates of the sensors' errors, in the order of the model's `sensors`.
+    covariance : ndarray, (n, n)
+        State of the covariance form.
+    """
+
+    time: float
+    mechanization: Array
+    row: Array
+    sensors: Array
+    covariance: Array
+
+
+@dataclass(frozen=True)
+class ErrorFilter:
+    """Closed loop: what is estimated is taken off the mechanization and off the sensors at once.
+
+    It holds no state: `begin` makes one, `predict` and `observe` give a new one.
+
+    Attributes
+    ----------
+    mechanization : Mechanization
+    model : ErrorModel
+    form : CovarianceForm
+    rule : UpdateRule, optional
+        How far an observation is believed; without one, all of it.
+    step : float, s
+        Longest time over which errors grow by means of attitude and force.
+    """
+
+    mechanization: Mechanization
+    model: ErrorModel
+    form: CovarianceForm
+    rule: UpdateRule | None = None
+    step: float = 0.1
+
+    @cached_property
+    def earth(self) -> Array:
+        """Ellipsoid of the mechanization, as kernels take it."""
+        return find_ellipsoid(self.mechanization.ellipsoid).parameters()
+
+    def begin(self, start: NavState, P: Array) -> FilterState:
+        """Return the state at a start.
+
+        Parameters
+        ----------
+        start : NavState
+        P : ndarray, (p, p)
+            Covariance of the physical errors: nine in north-east-down axes, and the sensors'.
+
+        Returns
+        -------
+        FilterState
+        """
+        state = self.mechanization.begin(start)
+        row = self.mechanization.history_row(state)
+        turn = np.eye(self.model.physical_size)
+        level = self.mechanization.level_from_ned(row)
+        for at in (0, 3, 6):
+            turn[at : at + 3, at : at + 3] = level
+        to_states = self.model.from_physical(self.mechanization, start.time, row) @ turn
+        return FilterState(
+            time=start.time,
+            mechanization=state,
+            row=row,
+            sensors=np.zeros(self.model.physical_size - PHYSICAL),
+            covariance=self.form.begin(symmetric(to_states @ P @ to_states.T)),
+        )
+
+    def compensated(self, state: FilterState, rows: Array) -> Array:
+        """Return rows of motion increments without the errors estimated so far, (k, 10)."""
+        gyro, accel, _, _ = stacked(self.model.sensors, state.sensors.size)
+        out = np.empty_like(rows)
+        compensate(rows, gyro, accel, state.sensors, out)
+        return out
+
+    def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
+        """Go on over motion increments.
+
+        Parameters
+        ----------
+        state : FilterState
+        time : ndarray, (k,), s
+            Ends of the steps.
+        rows : ndarray, (k, 10)
+            As the sensors gave them.
+
+        Returns
+        -------
+        state : FilterState
+        segment : Segment
+            The run, of increments without the errors estimated so far.
+
+        Raises
+        ------
+        DivergenceError
+            The mechanization has left the range in which it means anything.
+        """
+        used = self.mechanization
+        rows = self.compensated(state, rows)
+        history = np.empty((len(rows) + 1, used.row))
+        history[0] = state.row
+        after = state.mechanization.copy()
+        made, why = used.advance_rows(after, rows, np.empty(0), self.earth, history[1:])
+        if why:
+            raise DivergenceError(
+                f"the state has diverged with the sample at {time[made]:.9g} s",
+                quantity="state",
+                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+                "gravity, a burst; or begin from a state that is nearer to the truth",
+            )
+        segment = Segment(used, np.concatenate([[state.time], time]), history, rows)
+        Phi, Q = self.model.transition(segment, self.step)
+        blocks = self.model.sensors
+        sensors = state.sensors.copy()
+        at = 0
+        for one in blocks:
+            end = at + len(one.block)
+            sensors[at:end] *= np.exp(-one.decay * (float(time[-1]) - state.time))
+            at = end
+        return (
+            FilterState(
+                time=float(time[-1]),
+                mechanization=after,
+                row=history[-1],
+                sensors=sensors,
+                covariance=self.form.predict(state.covariance, Phi, Q),
+            ),
+            segment,
+        )
+
+    def observe(
+        self, state: FilterState, observation: Observation
+    ) -> tuple[FilterState, Innovations]:
+        """Take an observation, and take off what it tells of the errors.
+
+        Parameters
+        ----------
+        state : FilterState
+        observation : Observation
+            Of this state.
+
+        Returns
+        -------
+        state : FilterState
+        innovations : Innovations
+        """
+        used = self.mechanization
+        to_physical = self.model.to_physical(used, state.time, state.row)
+        covariance, x, innovations = self.form.update(
+            state.covariance,
+            np.zeros(to_physical.shape[1]),
+            observation.z,
+            np.ascontiguousarray(observation.H @ to_physical),
+            observation.R,
+            self.rule,
+        )
+        physical = to_physical @ x
+        corrected = used.correct(state.mechanization, physical[:PHYSICAL])
+        row = used.history_row(corrected)
+        if not self.model.states_are_physical:
+            # States that are components of what has just been corrected are meant of it from now
+            # on: the norm of a quaternion is along the new one.
+            carried = self.model.from_physical(used, state.time, row) @ to_physical
+            covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
+        return (
+            replace(
+                state,
+                mechanization=corrected,
+                row=row,
+                sensors=state.sensors + physical[PHYSICAL:],
+                covariance=covariance,
+            ),
+            innovations,
+        )
+
+    def physical_covariance(self, state: FilterState) -> Array:
+        """Return the covariance of the physical errors, (p, p), in level axes."""
+        T = self.model.to_physical(self.mechanization, state.time, state.row)
+        return symmetric(T @ self.form.matrix(state.covariance) @ T.T)
+
+
+def symmetric(P: Array) -> Array:
+    """Return the symmetric part of a square matrix."""
+    return 0.5 * (P + P.T)
