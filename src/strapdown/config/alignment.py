@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
 
@@ -79,9 +79,7 @@ class AxesTable(TableSpec):
 
     @model_validator(mode="after")
     def _one(self) -> AxesTable:
-        written = [
-            name for name in ("axes", "design", "matrix") if getattr(self, name) is not None
-        ]
+        written = [name for name in ("axes", "design", "matrix") if getattr(self, name) is not None]
         apart = [n for n in ("gyro_matrix", "accel_matrix") if getattr(self, n) is not None]
         if len(written) > 1 or (written and apart):
             two = [*written, *apart][:2]
@@ -119,6 +117,7 @@ class CoarseSpec(ChoiceSpec):
 class FineSpec(ChoiceSpec):
     """The fine alignment: after the coarse one where that has an end of its own, else over all."""
 
+    kind: str = "filter"
     duration_s: Positive | None = None
 
 
@@ -153,6 +152,7 @@ class AlignmentSpec(TableSpec):
     site: SiteTable
     sensors: SensorsTable = SensorsTable()
     coarse: CoarseSpec = CoarseSpec()
+    fine: FineSpec = FineSpec()
     reference: ReferenceTable | None = None
     output: OutputTable = OutputTable()
 

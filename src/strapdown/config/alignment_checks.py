@@ -154,7 +154,9 @@ class _Checks:
 
     def stages(self, spec: AlignmentSpec) -> None:
         given = {"ellipsoid": spec.site.ellipsoid}
-        self.told(("coarse",), lambda: make_choice(spec.coarse, SLOTS["coarse"], given))
+        for name in ("coarse", "fine"):
+            choice = getattr(spec, name)
+            self.told((name,), lambda c=choice, n=name: make_choice(c, SLOTS[n], given))
 
 
 #: An hour at 4 kHz.

@@ -9,17 +9,17 @@ from typing import Any
 
 from pydantic import ValidationError, create_model
 
-from strapdown.config.alignment import AlignmentSpec, CoarseSpec
+from strapdown.config.alignment import AlignmentSpec, CoarseSpec, FineSpec
 from strapdown.config.alignment_checks import check_alignment
 from strapdown.config.alignment_wanted import what_alignment_wants, write_of_alignment
 from strapdown.config.case_keys import canonical
 from strapdown.config.case_paths import with_absolute_paths
 from strapdown.config.choice import ChoiceSpec, choice_form, with_kinds
+from strapdown.config.crash_checks import Written
 from strapdown.config.explain import explained
 from strapdown.config.placeholders import refuse_placeholders
 from strapdown.config.slots import SLOTS
 from strapdown.config.toml_file import TomlFile, read_toml
-from strapdown.config.crash_checks import Written
 
 __all__ = ["STAGES", "alignment_spec", "read_alignment_spec"]
 
@@ -27,7 +27,10 @@ __all__ = ["STAGES", "alignment_spec", "read_alignment_spec"]
 #: stands there where none is named.
 STAGES: dict[str, tuple[type[ChoiceSpec], str]] = {
     "coarse": (CoarseSpec, "inertial_frame"),
+    "fine": (FineSpec, "filter"),
 }
+#: Stages that a chain can do without, by the kind ``none``.
+MAY_BE_EMPTY = ("prefilter", "fine")
 
 
 def alignment_form(table: Mapping[str, Any], file: TomlFile | None = None) -> type[AlignmentSpec]:
@@ -43,7 +46,13 @@ def alignment_form(table: Mapping[str, Any], file: TomlFile | None = None) -> ty
         given = table.get(name)
         written = given if isinstance(given, Mapping) else {}
         form = choice_form(
-            SLOTS[name], written, base, default=default, file=file, path=(name,)
+            SLOTS[name],
+            written,
+            base,
+            default=default,
+            empty=name in MAY_BE_EMPTY,
+            file=file,
+            path=(name,),
         )
         try:
             stages[name] = (form, form())

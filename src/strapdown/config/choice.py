@@ -11,7 +11,7 @@ from pydantic import StrictBool, StrictInt, StrictStr, create_model
 
 from strapdown.config.crash_case import Number
 from strapdown.config.shown import shown
-from strapdown.config.slots import SLOTS, Option, Slot, options_of
+from strapdown.config.slots import Option, Slot, options_of
 from strapdown.config.spec import TableSpec
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
@@ -34,6 +34,7 @@ def choice_form(
     base: type[ChoiceSpec] = ChoiceSpec,
     *,
     default: str = "",
+    empty: bool = False,
     file: TomlFile | None = None,
     path: KeyPath = (),
 ) -> type[ChoiceSpec]:
@@ -48,6 +49,8 @@ def choice_form(
         What the table has beside the module's options.
     default : str
         Kind where the table names none.
+    empty : bool
+        Whether the slot may stay empty, by the kind ``none``.
     file, path : TomlFile, tuple
         Where the table stands, for messages.
 
@@ -57,10 +60,10 @@ def choice_form(
         There is no such kind.
     """
     kind = given.get("kind", default)
-    if kind == NONE and default == NONE:
+    if kind == NONE and empty and NONE not in slot.entries:
         return create_model("none", __base__=base, kind=(StrictStr, NONE))
     if not isinstance(kind, str) or kind not in slot.entries:
-        raise _unknown(slot, kind, default, file, path)
+        raise _unknown(slot, kind, empty, file, path)
     entry = slot.entries[kind]
     known: dict[str, Any] = {"kind": (StrictStr, kind)}
     for option in options_of(entry):
@@ -73,9 +76,9 @@ NONE = "none"
 
 
 def _unknown(
-    slot: Slot, kind: Any, default: str, file: TomlFile | None, path: KeyPath
+    slot: Slot, kind: Any, empty: bool, file: TomlFile | None, path: KeyPath
 ) -> ConfigError:
-    kinds = [*slot.entries, *([NONE] if default == NONE else [])]
+    kinds = [*slot.entries, *([NONE] if empty else [])]
     what = f"there is no {shown(kind)}" if kind else "it is missing"
     remedy = nearest(str(kind), kinds) if kind else f"write kind = …; known: {', '.join(kinds)}"
     if file is None:
@@ -95,7 +98,7 @@ def _field(
         return (ChoiceSpec | None), None
     written = inner if isinstance(inner, Mapping) else {} if inner is None else {"kind": inner}
     kind = NONE if nothing else option.default if isinstance(option.default, str) else ""
-    form = choice_form(option.slot, written, default=kind, file=file, path=path)
+    form = choice_form(option.slot, written, default=kind, empty=nothing, file=file, path=path)
     if inner is None and kind:
         return form, form(kind=kind)
     return form, ...

@@ -18,9 +18,7 @@ PLACEHOLDER = "?"
 MOST = 60
 
 
-def refuse_placeholders(
-    file: TomlFile, wanted_of: Callable[[KeyPath], str] = wanted_at
-) -> None:
+def refuse_placeholders(file: TomlFile, wanted_of: Callable[[KeyPath], str] = wanted_at) -> None:
     """Name every value that is still open.
 
     Raises

@@ -9,6 +9,15 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
+from strapdown.alignment.fine import FineAlignment
+from strapdown.estimation.covariance import CovarianceForm
+from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.error_model import ErrorModel
+from strapdown.estimation.influence import Influence
+from strapdown.estimation.influences import INFLUENCES
+from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.update_rule import UpdateRule
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
@@ -36,13 +45,22 @@ class Slot:
     entries: Mapping[str, type]
 
 
+FINE_ALIGNMENTS: dict[str, type[FineAlignment]] = {"filter": FineAlignment}
+ERROR_MODELS: dict[str, type[ErrorModel]] = {"rotation_vector": RotationVectorModel}
+UPDATE_RULES: dict[str, type] = {"robust": RobustUpdate}
+
 SLOTS: dict[str, Slot] = {
     "coarse": Slot("coarse", "Coarse alignments", CoarseAlignment, COARSE_ALIGNMENTS),
+    "fine": Slot("fine", "Fine alignments", FineAlignment, FINE_ALIGNMENTS),
     "mechanization": Slot("mechanization", "Mechanizations", Mechanization, MECHANIZATIONS),
+    "error_model": Slot("error_model", "Error models", ErrorModel, ERROR_MODELS),
+    "covariance": Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
+    "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
+    "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
 }
 
 #: Fields that a chain fills by itself, and no person writes.
-GIVEN = ("ellipsoid",)
+GIVEN = ("ellipsoid", "gyro_noise", "accel_noise")
 _PLAIN = (float, int, bool, str)
 
 
