@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -84,7 +85,7 @@ class CovarianceForm(ABC):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other.
 
@@ -97,8 +98,9 @@ class CovarianceForm(ABC):
         H : ndarray, (l, n)
         R : ndarray, (l,)
             Variances of observations that are independent of each other.
-        rule : UpdateRule, optional
-            How much of an observation is believed; all of each, if not given.
+        rule : UpdateRule, or a sequence of them, optional
+            How much of an observation is believed, one rule for all or one for each; all of
+            each, if not given.
 
         Returns
         -------
@@ -106,6 +108,37 @@ class CovarianceForm(ABC):
         x : ndarray, (n,)
         innovations : Innovations
         """
+
+    def epoch(
+        self,
+        state: Array,
+        Phi: Array,
+        Q: Array,
+        x: Array,
+        z: Array,
+        H: Array,
+        R: Array,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
+    ) -> tuple[Array, Array, Innovations]:
+        """Predict, then take the observations: a form may do both together for less.
+
+        Parameters
+        ----------
+        state : ndarray, (n, n)
+            Before the prediction.
+        Phi, Q : ndarray, (n, n)
+            As for `predict`.
+        x : ndarray, (n,)
+            Estimate, predicted already.
+        z, H, R, rule
+            As for `update`.
+
+        Returns
+        -------
+        state, x, innovations
+            As from `update`.
+        """
+        return self.update(self.predict(state, Phi, Q), x, z, H, R, rule)
 
     @abstractmethod
     def matrix(self, state: Array) -> Array:

@@ -1,0 +1,127 @@
+"""What is asked of the matrices that a covariance form is given."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+
+Array = NDArray[np.float64]
+
+#: How far correlations may be from symmetric, and below zero as eigenvalues, in n roundings.
+ROUNDINGS = 1e3
+
+
+def checked_covariance(P: Array) -> Array:
+    """Return a covariance as an array of its own, exactly symmetric.
+
+    Parameters
+    ----------
+    P : array_like, (n, n)
+
+    Returns
+    -------
+    ndarray, (n, n)
+
+    Raises
+    ------
+    DataError
+        P is not square, not finite, not symmetric, or not positive semidefinite.
+    """
+    P = np.array(P, dtype=np.float64, order="C")
+    if P.ndim != 2 or P.shape[0] != P.shape[1] or not P.size:
+        raise _bad(f"has the shape {P.shape}", "give a square matrix (n, n)")
+    if not np.isfinite(P).all():
+        i, j = np.argwhere(~np.isfinite(P))[0]
+        raise _bad(f"is {P[i, j]} in row {i + 1}, column {j + 1}", "give a finite number")
+    variances = np.diagonal(P)
+    if (variances < 0.0).any():
+        i = int(np.argmin(variances))
+        raise _bad(f"has a variance of {P[i, i]:.6g} in row {i + 1}", "give none below zero")
+    sd = np.sqrt(variances)
+    known = sd == 0.0
+    if (P[known] != 0.0).any():
+        i = int(np.flatnonzero(known & (P != 0.0).any(axis=1))[0])
+        raise _bad(
+            f"has no variance in row {i + 1}, and yet a covariance with another state",
+            "make the whole row and column zero, or give the state a variance",
+        )
+    unit = np.where(known, 1.0, sd)
+    correlation = P / unit[:, None] / unit
+    tolerance = ROUNDINGS * len(P) * np.finfo(np.float64).eps
+    if np.abs(correlation - correlation.T).max() > tolerance:
+        i, j = np.unravel_index(np.argmax(np.abs(correlation - correlation.T)), P.shape)
+        raise _bad(
+            f"is not symmetric: {P[i, j]:.9g} in row {i + 1}, column {j + 1}, "
+            f"{P[j, i]:.9g} in row {j + 1}, column {i + 1}",
+            "give (P + P') / 2 if the difference is rounding",
+        )
+    P = 0.5 * (P + P.T)
+    lowest = float(np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0])
+    if lowest < -tolerance:
+        raise _bad(
+            f"has a negative eigenvalue: {lowest:.3g} of its correlations",
+            "no errors have such a covariance: look for a wrong sign or unit",
+        )
+    return P
+
+
+def _bad(what: str, remedy: str) -> DataError:
+    return DataError(f"the covariance {what}", quantity="P", remedy=remedy)
+
+
+def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
+    """Raise `DataError` where the shapes of a prediction do not fit."""
+    for name, given in (("Phi", Phi), ("Q", Q)):
+        if given.shape != state.shape:
+            raise DataError(
+                f"{name} has the shape {given.shape}, and the covariance {state.shape}",
+                quantity=name,
+                remedy="give both for the same states",
+            )
+
+
+def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
+    """Return what to raise where a predicted variance is no variance."""
+    for name, given in (("Phi", Phi), ("Q", Q)):
+        if not np.isfinite(given).all():
+            i, j = np.argwhere(~np.isfinite(given))[0]
+            return DataError(
+                f"{name} is {given[i, j]} in row {i + 1}, column {j + 1}",
+                quantity=name,
+                remedy="look at the step or the sample of which it was made",
+            )
+    return DataError(
+        f"the predicted variance of state {row + 1} is no variance",
+        quantity="Q",
+        remedy="give a Q that is symmetric and has no negative eigenvalue",
+    )
+
+
+def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
+    """Raise `DataError` where the shapes of an epoch's observations do not fit."""
+    if H.ndim != 2 or H.shape[1] != len(x) or not H.shape[0] == len(z) == len(R):
+        raise DataError(
+            f"z has the shape {z.shape}, H {H.shape}, R {R.shape}, and there are {len(x)} states",
+            quantity="H",
+            remedy="give z (l,), H (l, n) and R (l,), the variances",
+        )
+
+
+def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
+    """Return what to raise where observation j cannot be used."""
+    if not R[j] >= 0.0 or not np.isfinite(R[j]):
+        return DataError(
+            f"the variance of observation {j + 1} is {R[j]:.6g}",
+            quantity="R",
+            remedy="give a finite variance; leave out what was not observed",
+        )
+    which, number = (
+        ("difference from its prediction", nu) if not np.isfinite(nu) else ("expected variance", s)
+    )
+    return DataError(
+        f"the {which} is {number} in observation {j + 1}",
+        quantity="z",
+        remedy="leave out what was not observed; if z is finite, look at H and at the estimate",
+    )
