@@ -90,27 +90,28 @@ def shift(kx, ky, s, w, prime, slope, across, curvature, alt, e2, rx, ry, rz):
     """Tilt of the normal, as the tangent of its angle along xi and eta, and rise, by a straight way.
 
     A point of normal n and height h is ``(N + h) n - e² N s p``, p the Earth's axis and s = p . n.
-    So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s: one equation
-    for d, solved by one step of Newton from its first order. What is left out is of
-    ``e⁴ (r/R)³``.
+    So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s, of which the
+    first three orders in r are taken: what is left out is of ``e² (r/R)⁴`` and ``e⁴ (r/R)³``.
     """
+    far = prime + alt
     first = slope * curvature * (kx * rx + ky * ry)
-    change = first
-    tx, ty, t2, more, sine = 0.0, 0.0, 0.0, 0.0, 0.0
-    for again in range(2):
-        pull = e2 * change
-        more = rz + pull * s
-        u = more * across
-        inverse = across * (1.0 - u * (1.0 - u * (1.0 - u)))
-        tx = (rx + pull * kx) * inverse
-        ty = (ry + pull * ky) * inverse
-        t2 = tx * tx + ty * ty
-        if again == 0:
-            lost = t2 * (0.5 - 0.375 * t2)
-            sine = (1.0 - lost) * (kx * tx + ky * ty) - s * lost
-            found = slope * sine * (1.0 + 1.5 * e2 * s * w * w * sine)
-            change += (found - first) * (prime + alt) * curvature
-    rise = rz + (prime + alt + more) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
+    pull = e2 * first
+    u = (rz + pull * s) * across
+    tx, ty = (rx + pull * kx) * across, (ry + pull * ky) * across
+    t2 = tx * tx + ty * ty
+    sine = kx * tx + ky * ty
+    lost = 0.5 * t2
+    # The second and the third order of the change of s, but for what d's own have on it: that is
+    # the factor (N + h) / (M + h).
+    more = u * (u * sine + s * t2 - sine) - lost * (s + sine)
+    bend = 1.5 * e2 * s * w * w * (sine + more) * (sine + more)
+    pull = e2 * (first + slope * far * curvature * (more + bend))
+    u = (rz + pull * s) * across
+    inverse = across * ((1.0 - u) * (1.0 + u * u))
+    tx, ty = (rx + pull * kx) * inverse, (ry + pull * ky) * inverse
+    t2 = tx * tx + ty * ty
+    sine += more
+    rise = rz + (far + rz + pull * s) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
     return tx, ty, t2, rise
 
 
@@ -159,7 +160,7 @@ def body_to_level(q_ew, c, s, q_ib):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def wander_step(
     q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, dt, phi, dv, dr, a, e2, gamma, k, rate, f, m
 ):
@@ -316,9 +317,8 @@ def wander_advance(state, increments, reference, earth, options, history):
     why = DONE
     made = steps
     for i in range(steps):
-        before = alt
         dt = increments[i, 0]
-        q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, t2 = wander_step(
+        e1, e2_low, alt1, v1, b1, i1, i_low, spin1, w1, t2 = wander_step(
             q_ew,
             low_ew,
             alt,
@@ -344,24 +344,29 @@ def wander_advance(state, increments, reference, earth, options, history):
             height = math.nan
             if reference.shape[0] > 0:
                 height = reference[i]
-            alt, vd, pull, since = guide_height(
-                alt, -v[2], pull, since, before, height, dt, mode, tau, spring
+            alt1, vd, pull1, since1 = guide_height(
+                alt1, -v1[2], pull, since, alt, height, dt, mode, tau, spring
             )
-            v = (v[0], v[1], -vd)
-        why = wander_verdict(alt, v, q_wb, q_ew, t2, speed, lowest, highest)
+            v1 = (v1[0], v1[1], -vd)
+        why = wander_verdict(alt1, v1, b1, e1, t2, speed, lowest, highest)
         if why != DONE:
             made = i
             break
+        if mode != FREE:
+            pull, since = pull1, since1
+        q_ew, low_ew, alt, v, q_wb, q_ib, low_ib = e1, e2_low, alt1, v1, b1, i1, i_low
+        spin, w = spin1, w1
         history[i, 0], history[i, 1], history[i, 2], history[i, 3] = q_ew
         history[i, ALT] = alt
         history[i, 5], history[i, 6], history[i, 7] = v
         history[i, 8], history[i, 9], history[i, 10], history[i, 11] = q_wb
-        put(state, Q_IB, q_ib)
-        put(state, LOW_EW, low_ew)
-        put(state, LOW_IB, low_ib)
-        put(state, SPIN, spin)
-        state[PRIME], state[PULL], state[SINCE] = w, pull, since
-    if made > 0:
-        for j in range(ROW):
-            state[j] = history[made - 1, j]
+    put(state, Q_EW, q_ew)
+    state[ALT] = alt
+    put(state, V, v)
+    put(state, Q_WB, q_wb)
+    put(state, Q_IB, q_ib)
+    put(state, LOW_EW, low_ew)
+    put(state, LOW_IB, low_ib)
+    put(state, SPIN, spin)
+    state[PRIME], state[PULL], state[SINCE] = w, pull, since
     return made, why
