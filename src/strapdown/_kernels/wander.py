@@ -170,13 +170,12 @@ def wander_step(
     # One Newton step from its value a step before, as in `ned`.
     w = w * (1.5 - 0.5 * (1.0 - e2 * s2) * w * w)
     prime, slope, across, curvature = curving(w, alt, a, e2)
-    along = e2 * slope * across * curvature
     c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(
         q_wb[0], q_wb[1], q_wb[2], q_wb[3]
     )
     ux, uy, uz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv[0], dv[1], dv[2])
     sx, sy, sz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr[0], dr[1], dr[2])
-    lean, down, steep, loss, bend = gravity_parts(
+    lean, down, steep, loss, loss2 = gravity_parts(
         s2, alt, w, curvature, a, e2, gamma, k, f, m
     )
     vx, vy, vz = v
@@ -184,36 +183,54 @@ def wander_step(
     outward = -lean * alt * pz
     gx, gy, gz = outward * px, outward * py, -down
 
-    # Mean displacement over the step, by Hermite's cubic through its two ends.
+    # Mean displacement over the step, by Hermite's cubic through its two ends; as the force turns
+    # with the plumb line, which it meets, so must gravity.
     half = 0.5 * dt
     twelfth = TWELFTH * dt
     sixth = SIXTH * dt * dt
     lift = ox * vy - oy * vx
-    mx = half * vx + 0.5 * sx - twelfth * ux + sixth * (gx - (oy * vz - oz * vy))
-    my = half * vy + 0.5 * sy - twelfth * uy + sixth * (gy - (oz * vx - ox * vz))
+    swing = 0.25 * dt * gz
+    veer_x, veer_y = oy * vz - oz * vy, oz * vx - ox * vz
+    mx = half * vx + 0.5 * sx - twelfth * ux
+    my = half * vy + 0.5 * sy - twelfth * uy
+    mx += sixth * (gx - veer_x + swing * (oy + across * vx))
+    my += sixth * (gy - veer_y - swing * (ox - across * vy))
     mz = half * vz + 0.5 * sz - twelfth * uz + sixth * (gz - lift)
 
-    # Change of the normal to the mean place, and gravity there; as in `ned`, but that the level
-    # does not turn about the vertical.
-    toward = along * (px * mx + py * my)
-    nx = across * mx + toward * px
-    ny = across * my + toward * py
+    # Mean change of the normal, and gravity at the mean place. On the way over the Earth the body
+    # is turned back by its rate. What is of the second order grows with the square of time, whose
+    # mean is 4/3 of the square of the mean: so much of what climbing and the change of the
+    # curvature do, as in `shift`.
+    ex, ey = mx - sixth * veer_x, my - sixth * veer_y
+    sine = curvature * (px * ex + py * ey)
+    pull = e2 * slope * sine
+    u = (mz + pull * pz) * across
+    qx, qy = (ex + pull * px) * across, (ey + pull * py) * across
+    more = -(u * sine + 0.5 * pz * (qx * qx + qy * qy))
+    bend = 1.5 * e2 * pz * w * w * sine * sine
+    pull = 2.0 * TWO_THIRDS * e2 * slope * (prime + alt) * curvature * across * (more + bend)
+    u *= 2.0 * TWO_THIRDS
+    nx, ny = qx - u * qx + pull * px, qy - u * qy + pull * py
     north = px * nx + py * ny
     rise = TWO_THIRDS * (mx * nx + my * ny) + mz - sixth * lift
     inward = lean * (alt * north + rise * pz)
     level = lean * alt * s2
     more_x = level * nx - inward * px
     more_y = level * ny - inward * py
-    more_z = -(pz * steep * north + rise * (loss + rise * bend))
+    more_z = -(pz * steep * north + rise * (loss + rise * loss2))
     gx += more_x
     gy += more_y
     gz += more_z
-    zx = half * ox - ny
-    zy = half * oy + nx
+    # The level's change is in axes that the Earth has turned: twice as much of the product of the
+    # two as in the square of their sum.
     zz = half * oz
+    zx = half * ox - (ny + TWO_THIRDS * zz * nx)
+    zy = half * oy + (nx - TWO_THIRDS * zz * ny)
+    # Of turn and change, too, the product grows with the square of time.
+    grown = gz + THIRD * more_z
     second = TWO_THIRDS * gz
-    turn_x = zy * gz - zz * gy + second * zx * zz
-    turn_y = zz * gx - zx * gz + second * zy * zz
+    turn_x = zy * grown - zz * gy + second * zx * zz
+    turn_y = zz * gx - zx * grown + second * zy * zz
     turn_z = zx * gy - zy * gx - second * (zx * zx + zy * zy)
     dt2 = dt * dt
     rx = dt * (vx - (oy * mz - oz * my)) + sx + dt2 * (0.5 * gx - SIXTH * more_x + THIRD * turn_x)
