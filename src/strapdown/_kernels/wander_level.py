@@ -103,10 +103,11 @@ def wander_places(history, out):
                 history[i, V],
                 history[i, V + 1],
                 history[i, V + 2],
-                history[i, Q_WB],
-                history[i, Q_WB + 1],
-                history[i, Q_WB + 2],
-                history[i, Q_WB + 3],
+                # Half a turn and half a turn is a turn, of which the quaternion is -1.
+                -history[i, Q_WB],
+                -history[i, Q_WB + 1],
+                -history[i, Q_WB + 2],
+                -history[i, Q_WB + 3],
             ),
         )
 
