@@ -18,7 +18,6 @@ from strapdown.report.crash_conventions import MountingPoint, conventions_pictur
 from strapdown.report.crash_delta_v import StatedDeltaV, delta_v_chart
 from strapdown.report.crash_dial import Direction, pdof_dial
 from strapdown.report.crash_direction import pdof_by_shift_chart, pdof_by_window_chart
-from strapdown.report.crash_moments import main_event
 from strapdown.report.crash_motion import (
     attitude_chart,
     place_chart,
@@ -32,6 +31,7 @@ from strapdown.report.crash_signals import UnitSignals, unit_signals
 from strapdown.report.crash_units import accelerations_chart, differences_chart
 from strapdown.report.document import Animation, Picture
 from strapdown.systems.case_references import ReferenceAnswer
+from strapdown.systems.case_severity import main_event
 from strapdown.systems.crash_case import CaseResult
 from strapdown.tables import NED
 
