@@ -15,7 +15,13 @@ from resting import SITE, UNCERTAINTY, resting, roughly
 from strapdown import rotation
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.observability import STAY, manoeuvres_after, null_space
-from strapdown.alignment.stationary import LEAST_STRETCHES, Standing, home_of, observations
+from strapdown.alignment.stationary import (
+    LEAST_STRETCHES,
+    Standing,
+    home_of,
+    rate_observation,
+    still_observations,
+)
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.joseph import Joseph
 from strapdown.estimation.resting_sensors import resting_states
@@ -52,8 +58,11 @@ def _observed(names, seconds=600, every=20):
     for at in range(0, len(rows) - each + 1, each):
         state, segment = filter_.predict(state, time[at : at + each], rows[at : at + each])
         phi, _ = model.transition(segment, 0.1)
+        if "rate" in names:
+            one = rate_observation(filter_, segment, STANDING)
+            found.append(one.H @ so_far / np.sqrt(one.R)[:, None])
         so_far = phi @ so_far
-        for one in observations(filter_, state, segment, home, STANDING, names):
+        for one in still_observations(filter_, state, home, STANDING, names):
             found.append(one.H @ so_far / np.sqrt(one.R)[:, None])
     return np.vstack(found), q_nb
 
