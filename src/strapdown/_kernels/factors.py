@@ -27,24 +27,26 @@ def semidefinite_factor(P, G, d):
     all that follow. Where P is not finite or indefinite, return -1 - state. P is symmetric.
     """
     n = P.shape[0]
-    C, sd, left = np.empty((n, n)), np.empty(n), np.ones(n, dtype=np.bool_)
+    C, sd, per_sd = np.zeros((n, n)), np.empty(n), np.zeros(n)
+    left = np.ones(n, dtype=np.bool_)
     for i in range(n):
         if not 0.0 <= P[i, i] < math.inf:
             return -1 - i
         sd[i] = math.sqrt(P[i, i])
+        if sd[i] > 0.0:
+            per_sd[i] = 1.0 / sd[i]
     for i in range(n):
         d[i] = 0.0
         for j in range(n):
             G[i, j] = 0.0
-            if sd[i] == 0.0 or sd[j] == 0.0:
-                if P[i, j] != 0.0:
-                    return -1 - (i if sd[i] == 0.0 else j)
-                C[i, j] = 0.0
-            else:
-                C[i, j] = P[i, j] / (sd[i] * sd[j])
+            if P[i, j] != 0.0:
+                C[i, j] = P[i, j] * per_sd[i] * per_sd[j]
                 if not abs(C[i, j]) <= 1.0 + INDEFINITE:
                     return -1 - i
-        C[i, i] = 1.0 if sd[i] > 0.0 else 0.0
+                if sd[i] == 0.0 or sd[j] == 0.0:
+                    return -1 - (i if sd[i] == 0.0 else j)
+        if sd[i] > 0.0:
+            C[i, i] = 1.0
     rank = 0
     while rank < n:
         p, pivot = -1, NOTHING * n * EPSILON
@@ -59,7 +61,7 @@ def semidefinite_factor(P, G, d):
         for i in range(n):
             if left[i] and C[p, i] != 0.0:
                 share = C[p, i] / pivot
-                G[i, rank] = share * sd[i] / sd[p]
+                G[i, rank] = share * sd[i] * per_sd[p]
                 for j in range(n):
                     C[i, j] -= share * C[p, j]
         rank += 1
