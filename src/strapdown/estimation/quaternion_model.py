@@ -1,4 +1,4 @@
-"""Seventeen states: velocity in a wander azimuth, two quaternions, and the biases of the sensors."""
+"""Seventeen states: velocity in a wander azimuth, two quaternions, biases of the sensors."""
 
 from __future__ import annotations
 
@@ -111,9 +111,10 @@ class QuaternionModel(ErrorModel):
         fixed = _without_gauge(levels[-1], n)
         begin = self._components(used, segment.time[0], segment.history[0])
         end = self._components(used, segment.time[-1], segment.history[-1])
-        Phi = end[:, :n] @ (fixed @ phi) @ _inverse(begin)[:n] + end[:, n:] @ _inverse(begin)[n:]
-        half = end[:, :n] @ fixed
-        Q = half @ q @ half.T
+        back = _inverse(begin)
+        forth = end[:, :n] @ fixed
+        Phi = forth @ phi @ back[:n] + end[:, n:] @ back[n:]
+        Q = forth @ q @ forth.T
         return Phi, 0.5 * (Q + Q.T)
 
     def to_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
