@@ -214,12 +214,12 @@ def _curvature(used: Mechanization, level: Array) -> Array:
         level[AXIS + 2], level[ALT], earth.semi_major_axis, earth.eccentricity_squared
     )
     k = level[AXIS : AXIS + 2]
-    return across * np.eye(2) + along * np.outer(k, k)
+    tensor: Array = across * np.eye(2) + along * np.outer(k, k)
+    return tensor
 
 
 def _cross(v: Array) -> Array:
-    out: Array = rotation.cross_matrix(v[None])[0]
-    return out
+    return rotation.cross_matrix(v)
 
 
 def _checked(mechanization: Mechanization) -> Mechanization:
