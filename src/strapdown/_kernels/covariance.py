@@ -9,19 +9,21 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
 from strapdown._kernels.observation import expected, moved_state
 
 
 @njit(cache=True, error_model="numpy")
-def dense_predict(P, Phi, Q, turned, out):
-    """Write ``Phi P Phi' + Q`` to `out`, (n, n), exactly symmetric; `turned` (n, n) is work space.
+def dense_predict(P, Phi, Q, out):
+    """Write ``Phi P Phi' + Q`` to `out`, (n, n), exactly symmetric.
 
     Zeros of Phi cost nothing. Return -1, or the first state whose variance is no number or
     negative.
     """
     n = P.shape[0]
+    turned = np.empty((n, n))
     # (Phi P)' = P Phi': the second product may then go along the rows of Phi as the first does.
     row = out[0]
     for i in range(n):
@@ -100,10 +102,12 @@ def joseph_take(P, d, x, H, j, work, s, moved, slope, r):
         for k in range(n):
             P[i, k] -= factor * g[k]
     for i in range(n):
-        total = 0.0
-        for k in range(n):
-            total += P[i, k] * H[j, k]
-        m[i] = slope * (r * K[i] - total)
+        m[i] = slope * r * K[i]
+    for k in range(n):
+        factor = slope * H[j, k]
+        if factor != 0.0:
+            for i in range(n):
+                m[i] -= factor * P[i, k]
     for i in range(n):
         for k in range(n):
             P[i, k] += m[i] * K[k]
@@ -114,11 +118,13 @@ def joseph_take(P, d, x, H, j, work, s, moved, slope, r):
 
 
 @njit(cache=True, error_model="numpy")
-def dense_update(P, x, z, H, R, joseph, work, nu, s):
-    """Take every observation in full; fill `nu` and `s` (``h P h' + R``).
+def dense_update(P, x, z, H, R, joseph, told):
+    """Take every observation in full; fill `told`: innovations and ``h P h' + R``.
 
     Return -1, or the first observation that cannot be used; P and x are then spoiled.
     """
+    nu, s = told[0], told[1]
+    work = np.empty((3, P.shape[0]))
     for j in range(z.shape[0]):
         nu[j], variance = dense_expect(P, P[0], x, z, H, j, work)
         s[j] = variance + R[j]

@@ -62,11 +62,13 @@ def ud_take(ud, d, x, H, j, work, s, moved, slope, r):
 
 
 @njit(cache=True, error_model="numpy")
-def ud_update(ud, x, z, H, R, work, nu, s):
-    """Take every observation in full; fill `nu` and `s` (``h P h' + R``).
+def ud_update(ud, x, z, H, R, told):
+    """Take every observation in full; fill `told`: innovations and ``h P h' + R``.
 
     Return -1, or the first observation that cannot be used; U, D and x are then spoiled.
     """
+    nu, s = told[0], told[1]
+    work = np.empty((4, ud.shape[0]))
     for j in range(z.shape[0]):
         nu[j], variance = ud_expect(ud, ud[0], x, z, H, j, work)
         s[j] = variance + R[j]
@@ -153,17 +155,21 @@ def wd_take(W, d, x, H, j, work, s, moved, slope, r):
 
 @njit(cache=True, error_model="numpy")
 def wd_finish(W, d, out):
-    """Write the U and D of ``W d W'`` to `out` (Eq. 15); return -1 or a state that is not finite."""
+    """Write the U and D of ``W d W'`` to `out` (Eq. 15); return -1 or a bad state."""
     mwgs(W, d, out)
     return not_finite(out)
 
 
 @njit(cache=True, error_model="numpy")
-def wd_update(W, d, x, z, H, R, nu, s):
-    """Take every observation in full; fill `nu` and `s` (``h P h' + R``).
+def wd_epoch(ud, Phi, Q, predicted, x, z, H, R, told, out):
+    """Begin, take every observation in full, and finish.
 
-    Return -1, or the first observation that cannot be used.
+    Return -1, or the first observation that cannot be used; or -2 - state for a bad prediction.
     """
+    nu, s = told[0], told[1]
+    W, d, bad = wd_begin(ud, Phi, Q, predicted, z.shape[0])
+    if bad >= 0:
+        return -2 - bad
     work = np.empty((3, W.shape[1]))
     for j in range(z.shape[0]):
         nu[j], variance = wd_expect(W, d, x, z, H, j, work)
@@ -171,4 +177,5 @@ def wd_update(W, d, x, z, H, R, nu, s):
         if not (R[j] >= 0.0 and math.isfinite(nu[j]) and math.isfinite(s[j])):
             return j
         wd_take(W, d, x, H, j, work, variance, nu[j], 1.0, R[j])
-    return -1
+    bad = wd_finish(W, d, out)
+    return -2 - bad if bad >= 0 else -1

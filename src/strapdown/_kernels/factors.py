@@ -112,7 +112,7 @@ def noise_rank(Q, noise):
 @njit(cache=True, error_model="numpy")
 def stacked(ud, Phi, noise, W, d):
     """Write ``[Phi U, G]`` to the first columns of W and its weights to d; the rest is zero."""
-    n, size = W.shape
+    n = W.shape[0]
     W[:] = 0.0
     d[:] = 0.0
     for i in range(n):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 from strapdown.config.case_wanted import wanted_at
@@ -18,7 +18,7 @@ PLACEHOLDER = "?"
 MOST = 60
 
 
-def refuse_placeholders(file: TomlFile) -> None:
+def refuse_placeholders(file: TomlFile, wanted_of: Callable[[KeyPath], str] = wanted_at) -> None:
     """Name every value that is still open.
 
     Raises
@@ -32,7 +32,7 @@ def refuse_placeholders(file: TomlFile) -> None:
         return
     lines = []
     for path in open_keys[:MOST]:
-        wanted = wanted_at(path)
+        wanted = wanted_of(path)
         lines.append(
             f"  line {file.line(path)}, {place_of(path)}" + (f": {wanted}" if wanted else "")
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -84,7 +85,7 @@ class CovarianceForm(ABC):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other.
 
@@ -97,8 +98,9 @@ class CovarianceForm(ABC):
         H : ndarray, (l, n)
         R : ndarray, (l,)
             Variances of observations that are independent of each other.
-        rule : UpdateRule, optional
-            How much of an observation is believed; all of each, if not given.
+        rule : UpdateRule, or a sequence of them, optional
+            How much of an observation is believed, one rule for all or one for each; all of
+            each, if not given.
 
         Returns
         -------
@@ -116,7 +118,7 @@ class CovarianceForm(ABC):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Predict, then take the observations: a form may do both together for less.
 

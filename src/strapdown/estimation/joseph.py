@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
@@ -16,10 +19,17 @@ from strapdown.estimation.covariance_input import (
     check_prediction,
     checked_covariance,
 )
-from strapdown.estimation.sequential import contiguous, take_by_rule
+from strapdown.estimation.sequential import contiguous, own, take_by_rule
 from strapdown.estimation.update_rule import UpdateRule
 
 Array = NDArray[np.float64]
+
+
+@cache
+def _kernels() -> ModuleType:
+    from strapdown._kernels import covariance
+
+    return covariance
 
 
 @dataclass(frozen=True)
@@ -41,12 +51,10 @@ class Plain(CovarianceForm):
 
     def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
         """Return ``Phi P Phi' + Q``, exactly symmetric."""
-        from strapdown._kernels.covariance import dense_predict
-
         state, Phi, Q = contiguous(state, Phi, Q)
         check_prediction(state, Phi, Q)
         out = np.empty_like(state)
-        row = dense_predict(state, Phi, Q, np.empty_like(state), out)
+        row = _kernels().dense_predict(state, Phi, Q, out)
         if row >= 0 and (self._joseph or not np.isfinite(out).all()):
             raise bad_prediction(row, Phi, Q)
         return out
@@ -58,7 +66,7 @@ class Plain(CovarianceForm):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
 
@@ -67,25 +75,23 @@ class Plain(CovarianceForm):
         DataError
             Shapes that do not fit, or an observation that is not finite.
         """
-        from strapdown._kernels.covariance import (
-            dense_expect,
-            dense_update,
-            joseph_take,
-            plain_take,
-        )
-
+        kernels = _kernels()
         z, H, R = contiguous(z, H, R)
-        P, x = np.array(state, dtype=np.float64), np.array(x, dtype=np.float64)
+        P, x = own(state), own(x)
         check_observations(x, z, H, R)
-        work = np.empty((3, len(x)))
         if rule is not None:
-            take = joseph_take if self._joseph else plain_take
-            return P, x, take_by_rule(dense_expect, take, (P, P[0]), x, (z, H, R), rule, work)
-        nu, s = np.empty((2, len(z)))
-        bad = dense_update(P, x, z, H, R, self._joseph, work, nu, s)
+            take = kernels.joseph_take if self._joseph else kernels.plain_take
+            work = np.empty((3, len(x)))
+            return (
+                P,
+                x,
+                take_by_rule(kernels.dense_expect, take, (P, P[0]), x, (z, H, R), rule, work),
+            )
+        told = np.ones((3, len(z)))
+        bad = kernels.dense_update(P, x, z, H, R, self._joseph, told)
         if bad >= 0:
-            raise bad_observation(bad, nu[bad], s[bad], R)
-        return P, x, Innovations(nu, s, np.ones(len(z)))
+            raise bad_observation(bad, told[0, bad], told[1, bad], R)
+        return P, x, Innovations(told[0], told[1], told[2])
 
     def matrix(self, state: Array) -> Array:
         """Return P: the state."""

@@ -74,8 +74,9 @@ def _rising_root(
             return hi if after <= hi * (1.0 + 1e-12) else None
         if after < lo:
             return lo if after >= lo * (1.0 - 1e-12) else None
-        if abs(after - u) <= 1e-15 * b:
-            return after
+        # All steps go the same way, until rounding turns one back.
+        if (after <= u) if concave else (after >= u):
+            return u
         u = slope_at = after
         excess = u + kappa * psi(u) - b
     return u

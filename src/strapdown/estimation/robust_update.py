@@ -39,12 +39,7 @@ class RobustUpdate:
     source: ClassVar[str] = "Huber 1981, Section 7.8 (weights); Masreliez and Martin 1977"
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.scale) and self.scale > 0.0):
-            raise ConfigError(
-                f"the scale of the robust update is {self.scale}",
-                quantity="scale",
-                remedy="give a finite number above 0: 1 where the stated variances are right",
-            )
+        check_scale(self.scale)
 
     def step(self, nu: float, s: float, r: float) -> Step:
         """Return the step to the minimiser; see `UpdateRule.step`."""
@@ -59,3 +54,13 @@ class RobustUpdate:
         if weight < NO_WEIGHT:
             return Step(0.0, 1.0, r, 0.0)
         return Step(nu, 1.0, r / weight, weight)
+
+
+def check_scale(scale: float) -> None:
+    """Raise `ConfigError` where a scale is not finite and positive."""
+    if not (math.isfinite(scale) and scale > 0.0):
+        raise ConfigError(
+            f"the scale of the update is {scale}",
+            quantity="scale",
+            remedy="give a finite number above 0: 1 where the stated variances are right",
+        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from strapdown.estimation.covariance import Innovations
 from strapdown.estimation.covariance_input import bad_observation
 from strapdown.estimation.update_rule import UpdateRule
+from strapdown.exceptions import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -21,7 +22,7 @@ def take_by_rule(
     parts: tuple[Array, Array],
     x: Array,
     observations: tuple[Array, Array, Array],
-    rule: UpdateRule,
+    rule: UpdateRule | Sequence[UpdateRule],
     work: Array,
 ) -> Innovations:
     """Change the parts of a covariance and x, in place, by every observation.
@@ -34,18 +35,25 @@ def take_by_rule(
         What the kernels keep a covariance in.
     x : ndarray, (n,)
     observations : (z, H, R)
-    rule : UpdateRule
+    rule : UpdateRule, or a sequence of them
     work : ndarray
         What `expect` leaves to `take`.
     """
     z, H, R = observations
     matrix, diagonal = parts
     told = np.empty((3, len(z)))
-    for j, r in enumerate(R.tolist()):
+    steps = [one.step for one in rule] if isinstance(rule, Sequence) else [rule.step] * len(z)
+    if len(steps) != len(z):
+        raise ConfigError(
+            f"there are {len(steps)} rules for {len(z)} observations",
+            quantity="rule",
+            remedy="give one rule for all, or one for each",
+        )
+    for j, (r, step) in enumerate(zip(R.tolist(), steps, strict=True)):
         nu, s = expect(matrix, diagonal, x, z, H, j, work)
         if not (0.0 <= r < math.inf and math.isfinite(nu) and math.isfinite(s)):
             raise bad_observation(j, nu, s, R)
-        moved, slope, used, weight = rule.step(nu, s, r)
+        moved, slope, used, weight = step(nu, s, r)
         if weight != 0.0:
             take(matrix, diagonal, x, H, j, work, s, moved, slope, used)
         told[0, j], told[1, j], told[2, j] = nu, s + r, weight
@@ -55,3 +63,8 @@ def take_by_rule(
 def contiguous(*arrays: Array) -> list[Array]:
     """Return arrays as the kernels want them."""
     return [np.ascontiguousarray(a, dtype=np.float64) for a in arrays]
+
+
+def own(array: Array) -> Array:
+    """Return a copy that the kernels may change."""
+    return np.array(array, dtype=np.float64, order="C")

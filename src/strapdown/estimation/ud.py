@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
@@ -16,10 +19,17 @@ from strapdown.estimation.covariance_input import (
     check_prediction,
     checked_covariance,
 )
-from strapdown.estimation.sequential import contiguous, take_by_rule
+from strapdown.estimation.sequential import contiguous, own, take_by_rule
 from strapdown.estimation.update_rule import UpdateRule
 
 Array = NDArray[np.float64]
+
+
+@cache
+def _kernels() -> tuple[ModuleType, ModuleType]:
+    from strapdown._kernels import factored_update, factors
+
+    return factors, factored_update
 
 
 @dataclass(frozen=True)
@@ -36,15 +46,14 @@ class BiermanThornton(CovarianceForm):
 
     def begin(self, P: Array) -> Array:
         """Return the factors of a covariance; see `CovarianceForm.begin`."""
-        from strapdown._kernels.factors import udu_factor
-
+        factors, _ = _kernels()
         P = checked_covariance(P)
         out = np.empty_like(P)
         # Rounding that the check has passed may still show as a pivot; it is a zero then.
-        if udu_factor(P, out) >= 0:
+        if factors.udu_factor(P, out) >= 0:
             sd = np.sqrt(np.diagonal(P))
             lowest = -np.linalg.eigvalsh(P / np.outer(np.where(sd, sd, 1), np.where(sd, sd, 1)))[0]
-            udu_factor(P + np.diag((2.0 * abs(lowest) + 1e-15) * sd * sd), out)
+            factors.udu_factor(P + np.diag((2.0 * abs(lowest) + 1e-15) * sd * sd), out)
         return out
 
     def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
@@ -55,12 +64,10 @@ class BiermanThornton(CovarianceForm):
         DataError
             Shapes that do not fit; Phi or Q that is not finite; Q with a negative eigenvalue.
         """
-        from strapdown._kernels.factors import udu_predict
-
         state, Phi, Q = contiguous(state, Phi, Q)
         check_prediction(state, Phi, Q)
         out = np.empty_like(state)
-        row = udu_predict(state, Phi, Q, out)
+        row = _kernels()[0].udu_predict(state, Phi, Q, out)
         if row >= 0:
             raise bad_prediction(row, Phi, Q)
         return out
@@ -72,7 +79,7 @@ class BiermanThornton(CovarianceForm):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other; see `CovarianceForm.update`.
 
@@ -81,24 +88,22 @@ class BiermanThornton(CovarianceForm):
         DataError
             Shapes that do not fit, or an observation that is not finite.
         """
-        from strapdown._kernels.factored_update import ud_expect, ud_take, ud_update
-
+        _, kernels = _kernels()
         z, H, R = contiguous(z, H, R)
-        ud, x = np.array(state, dtype=np.float64), np.array(x, dtype=np.float64)
+        ud, x = own(state), own(x)
         check_observations(x, z, H, R)
-        work = np.empty((4, len(x)))
         if rule is not None:
-            return ud, x, take_by_rule(ud_expect, ud_take, (ud, ud[0]), x, (z, H, R), rule, work)
-        nu, s = np.empty((2, len(z)))
-        bad = ud_update(ud, x, z, H, R, work, nu, s)
+            expect, take = kernels.ud_expect, kernels.ud_take
+            work = np.empty((4, len(x)))
+            return ud, x, take_by_rule(expect, take, (ud, ud[0]), x, (z, H, R), rule, work)
+        told = np.ones((3, len(z)))
+        bad = kernels.ud_update(ud, x, z, H, R, told)
         if bad >= 0:
-            raise bad_observation(bad, nu[bad], s[bad], R)
-        return ud, x, Innovations(nu, s, np.ones(len(z)))
+            raise bad_observation(bad, told[0, bad], told[1, bad], R)
+        return ud, x, Innovations(told[0], told[1], told[2])
 
     def matrix(self, state: Array) -> Array:
         """Return ``U D U'``."""
-        from strapdown._kernels.factors import udu_matrix
-
         out = np.empty_like(state)
-        udu_matrix(np.ascontiguousarray(state), out)
+        _kernels()[0].udu_matrix(np.ascontiguousarray(state), out)
         return out

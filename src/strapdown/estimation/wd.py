@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
@@ -15,11 +18,18 @@ from strapdown.estimation.covariance_input import (
     check_observations,
     check_prediction,
 )
-from strapdown.estimation.sequential import contiguous, take_by_rule
+from strapdown.estimation.sequential import contiguous, own, take_by_rule
 from strapdown.estimation.ud import BiermanThornton
 from strapdown.estimation.update_rule import UpdateRule
 
 Array = NDArray[np.float64]
+
+
+@cache
+def _kernels() -> ModuleType:
+    from strapdown._kernels import factored_update
+
+    return factored_update
 
 
 @dataclass(frozen=True)
@@ -42,7 +52,7 @@ class Chernodarov(BiermanThornton):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Take the observations of an epoch, one after the other; see `CovarianceForm.update`."""
         (state,) = contiguous(state)
@@ -57,7 +67,7 @@ class Chernodarov(BiermanThornton):
         z: Array,
         H: Array,
         R: Array,
-        rule: UpdateRule | None = None,
+        rule: UpdateRule | Sequence[UpdateRule] | None = None,
     ) -> tuple[Array, Array, Innovations]:
         """Predict and take the observations, with one orthogonalisation (Eqs. 6-15)."""
         state, Phi, Q = contiguous(state, Phi, Q)
@@ -72,33 +82,27 @@ class Chernodarov(BiermanThornton):
         predicted: bool,
         x: Array,
         observations: tuple[Array, Array, Array],
-        rule: UpdateRule | None,
+        rule: UpdateRule | Sequence[UpdateRule] | None,
     ) -> tuple[Array, Array, Innovations]:
-        from strapdown._kernels.factored_update import (
-            wd_begin,
-            wd_expect,
-            wd_finish,
-            wd_take,
-            wd_update,
-        )
-
+        kernels = _kernels()
         z, H, R = contiguous(*observations)
-        x = np.array(x, dtype=np.float64)
+        x, out = own(x), np.empty_like(state)
         check_observations(x, z, H, R)
-        W, d, row = wd_begin(state, Phi, Q, predicted, len(z))
-        if row >= 0:
-            raise bad_prediction(row, Phi, Q)
-        if rule is not None:
-            work = np.empty((3, W.shape[1]))
-            told = take_by_rule(wd_expect, wd_take, (W, d), x, (z, H, R), rule, work)
-        else:
-            nu, s = np.empty((2, len(z)))
-            bad = wd_update(W, d, x, z, H, R, nu, s)
+        if rule is None:
+            told = np.ones((3, len(z)))
+            bad = kernels.wd_epoch(state, Phi, Q, predicted, x, z, H, R, told, out)
             if bad >= 0:
-                raise bad_observation(bad, nu[bad], s[bad], R)
-            told = Innovations(nu, s, np.ones(len(z)))
-        out = np.empty_like(state)
-        row = wd_finish(W, d, out)
+                raise bad_observation(bad, told[0, bad], told[1, bad], R)
+            if bad < -1:
+                raise bad_prediction(-2 - bad, Phi, Q)
+            return out, x, Innovations(told[0], told[1], told[2])
+        W, d, row = kernels.wd_begin(state, Phi, Q, predicted, len(z))
         if row >= 0:
             raise bad_prediction(row, Phi, Q)
-        return out, x, told
+        work = np.empty((3, W.shape[1]))
+        expect, take = kernels.wd_expect, kernels.wd_take
+        innovations = take_by_rule(expect, take, (W, d), x, (z, H, R), rule, work)
+        row = kernels.wd_finish(W, d, out)
+        if row >= 0:
+            raise bad_prediction(row, Phi, Q)
+        return out, x, innovations

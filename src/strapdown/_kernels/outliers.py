@@ -1,0 +1,210 @@
+"""Samples that their neighbours on both sides contradict: found, and interpolated.
+
+A run of samples is left out and predicted by the polynomial of degree five through three samples
+on either side. How far the prediction is off is judged by how far it usually is: the median of the
+same residual over a window before and one behind.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+# Samples of either side that predict.
+NODES = 3
+# Samples on either side whose range says how much the signal moves.
+AROUND = 10
+# Every so many residuals are counted: those between say little else, for they overlap.
+STRIDE = 3
+# Flags.
+REPLACED, KEPT = 1, 2
+# Part of the residual that the straight lines from either side must confirm.
+CONFIRMED = 0.5
+# Of the converter's step: rounding alone makes up to 1.6 of it.
+STEPS = 2.0
+# At an end of the record, where one window must do, its median scatters more.
+ONE_SIDE = 1.5
+
+
+@njit(cache=True, error_model="numpy")
+def predicted(x, i, m, weights):
+    """Value at one place of the run of m samples that begins at i."""
+    return (
+        weights[0] * x[i - 3]
+        + weights[1] * x[i - 2]
+        + weights[2] * x[i - 1]
+        + weights[3] * x[i + m]
+        + weights[4] * x[i + m + 1]
+        + weights[5] * x[i + m + 2]
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def residuals(raw, low, high, i, m, weights, out):
+    """Fill what sample i of runs of m is off its prediction, for each start."""
+    a, b, c, d, e, f = weights[0], weights[1], weights[2], weights[3], weights[4], weights[5]
+    for j in range(low, high):
+        out[j] = raw[j + i] - (
+            a * raw[j - 3]
+            + b * raw[j - 2]
+            + c * raw[j - 1]
+            + d * raw[j + m]
+            + e * raw[j + m + 1]
+            + f * raw[j + m + 2]
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def median_below(left, row, low, high, value):
+    """Whether fewer than half of them reach the value in size; told as soon as it is known."""
+    most = (high - low + STRIDE - 1) // STRIDE // 2
+    for k in range(low, high, STRIDE):
+        if abs(left[row, k]) >= value:
+            most -= 1
+            if most < 0:
+                return False
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def stands_out(left, row, i, low, high, guard, window, value):
+    """Whether a residual is that large against its like on both sides, or the one that is there."""
+    least = window // 2
+    a, b = max(low, i - guard - window + 1), i - guard + 1
+    c, d = i + guard, min(high, i + guard + window)
+    before, behind = b - a >= least, d - c >= least
+    if not (before or behind):
+        return False
+    if not (before and behind):
+        value = value / ONE_SIDE
+    if before and not median_below(left, row, a, b, value):
+        return False
+    return not behind or median_below(left, row, c, d, value)
+
+
+@njit(cache=True, error_model="numpy")
+def half_range(x, i, m):
+    """Half the range of the samples around a run, without it."""
+    n = x.shape[0]
+    low, high = x[i - 1], x[i - 1]
+    for j in range(max(0, i - AROUND), i):
+        low, high = min(low, x[j]), max(high, x[j])
+    for j in range(i + m, min(n, i + m + AROUND)):
+        low, high = min(low, x[j]), max(high, x[j])
+    return 0.5 * (high - low)
+
+
+@njit(cache=True, error_model="numpy")
+def same_side(line, residual):
+    """Whether a straight line from one side confirms the residual."""
+    return line * residual > 0.0 and abs(line) > CONFIRMED * abs(residual)
+
+
+@njit(cache=True, error_model="numpy")
+def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, least):
+    """Whether the m samples from i on are outliers."""
+    j = i + m - 1
+    first = x[i] - predicted(x, i, m, weights[m - 1, 0])
+    last = x[j] - predicted(x, i, m, weights[m - 1, m - 1])
+    if abs(first) <= least or abs(last) <= least:
+        return False
+    if not same_side(x[i] - 2.0 * x[i - 1] + x[i - 2], first):
+        return False
+    if not same_side(x[j] - 2.0 * x[j + 1] + x[j + 2], last):
+        return False
+    a, b = abs(first) / factor, abs(last) / factor
+    if not stands_out(left, 2 * m - 2, i, low, high, guard, window, a):
+        return False
+    if not stands_out(left, 2 * m - 1, i, low, high, guard, window, b):
+        return False
+    motion = allowed[m - 1] * half_range(x, i, m)
+    a, b = (abs(first) - motion) / factor, (abs(last) - motion) / factor
+    return (
+        a > 0.0
+        and b > 0.0
+        and stands_out(left, 2 * m - 2, i, low, high, guard, window, a)
+        and stands_out(left, 2 * m - 1, i, low, high, guard, window, b)
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def is_odd(x, left, i, low, high, weights, allowed, guard, window, factor, least):
+    """Whether a sample is off its prediction by more than the signal and its noise explain."""
+    size = abs(x[i] - predicted(x, i, 1, weights[0, 0]))
+    if size <= least or not stands_out(left, 0, i, low, high, guard, window, size / factor):
+        return False
+    size -= allowed[0] * half_range(x, i, 1)
+    return size > 0.0 and stands_out(left, 0, i, low, high, guard, window, size / factor)
+
+
+@njit(cache=True, error_model="numpy")
+def fill_run(x, i, m, weights):
+    for k in range(m):
+        x[i + k] = predicted(x, i, m, weights[m - 1, k])
+
+
+@njit(cache=True, error_model="numpy")
+def replace_outliers(
+    raw, work, flags, begin, stop, weights, allowed, guard, window, factor, state, left
+):
+    """Judge the samples from begin to before stop; work and flags are changed in place.
+
+    ``state`` is the converter's step, or minus the least difference so far where it is to be
+    found, then start and length of the last run. A run may reach beyond stop. Returns where to go
+    on.
+    """
+    n, runs = raw.shape[0], weights.shape[0]
+    low, high = NODES, n - runs - NODES + 1
+    for m in range(1, runs + 1):
+        residuals(raw, low, high, 0, m, weights[m - 1, 0], left[2 * m - 2])
+        residuals(raw, low, high, m - 1, m, weights[m - 1, m - 1], left[2 * m - 1])
+    i = begin
+    while i < stop:
+        if state[0] <= 0.0 and i + 1 < n:
+            d = abs(raw[i + 1] - raw[i])
+            if d > 0.0 and d < -state[0]:
+                state[0] = -d
+        if i < NODES or i + NODES > n - 1:
+            i += 1
+            continue
+        least = STEPS * abs(state[0])
+        found = 0
+        for m in range(min(runs, n - NODES - i), 0, -1):
+            if is_run(work, left, i, m, low, high, weights, allowed, guard, window, factor, least):
+                found = m
+                break
+        if found:
+            fill_run(work, i, found, weights)
+            flags[i : i + found] = REPLACED
+            # What was said of the samples before was said with these in it.
+            before, length = int(state[1]), int(state[2])
+            if length > 0 and before + length + NODES > i:
+                work[before : before + length] = raw[before : before + length]
+                if is_run(
+                    work,
+                    left,
+                    before,
+                    length,
+                    low,
+                    high,
+                    weights,
+                    allowed,
+                    guard,
+                    window,
+                    factor,
+                    least,
+                ):
+                    fill_run(work, before, length, weights)
+                else:
+                    flags[before : before + length] = 0
+            for j in range(max(NODES, i - NODES), i):
+                if flags[j] == KEPT and not is_odd(
+                    work, left, j, low, high, weights, allowed, guard, window, factor, least
+                ):
+                    flags[j] = 0
+            state[1], state[2] = i, found
+            i += found
+            continue
+        if is_odd(work, left, i, low, high, weights, allowed, guard, window, factor, least):
+            flags[i] = KEPT
+        i += 1
+    return i

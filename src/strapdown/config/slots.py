@@ -1,0 +1,162 @@
+"""Slots of a chain, and the modules that can stand in each: from their own literal tables."""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Mapping
+from dataclasses import MISSING, Field, dataclass, fields
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
+from strapdown.alignment.fine import FineAlignment
+from strapdown.estimation.covariance import CovarianceForm
+from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.error_model import ErrorModel
+from strapdown.estimation.influence import Influence
+from strapdown.estimation.influences import INFLUENCES
+from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.update_rule import UpdateRule
+from strapdown.mechanization import MECHANIZATIONS, Mechanization
+
+__all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A place of a chain that a module stands in.
+
+    Attributes
+    ----------
+    name : str
+        The table, or the key, of a configuration.
+    title : str
+        For people.
+    base : type
+        What every module of it is.
+    entries : dict of str to type
+        By ``kind``: dataclasses, whose fields are the options.
+    """
+
+    name: str
+    title: str
+    base: type
+    entries: Mapping[str, type]
+
+
+FINE_ALIGNMENTS: dict[str, type[FineAlignment]] = {"filter": FineAlignment}
+ERROR_MODELS: dict[str, type[ErrorModel]] = {"rotation_vector": RotationVectorModel}
+UPDATE_RULES: dict[str, type] = {"robust": RobustUpdate}
+
+SLOTS: dict[str, Slot] = {
+    "coarse": Slot("coarse", "Coarse alignments", CoarseAlignment, COARSE_ALIGNMENTS),
+    "fine": Slot("fine", "Fine alignments", FineAlignment, FINE_ALIGNMENTS),
+    "mechanization": Slot("mechanization", "Mechanizations", Mechanization, MECHANIZATIONS),
+    "error_model": Slot("error_model", "Error models", ErrorModel, ERROR_MODELS),
+    "covariance": Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
+    "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
+    "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
+}
+
+#: Fields that a chain fills by itself, and no person writes.
+GIVEN = ("ellipsoid", "gyro_noise", "accel_noise")
+_PLAIN = (float, int, bool, str)
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option of a module.
+
+    Attributes
+    ----------
+    field : str
+        Of the module's dataclass.
+    key : str
+        Of a configuration: the field with its unit (``metadata={"unit": "s"}``), or the name of
+        the slot whose module it takes.
+    hint : type
+    default : object
+        `dataclasses.MISSING` where it must be written.
+    slot : Slot or None
+    takes_class : bool
+        Whether the field takes a module's class, and no instance.
+    """
+
+    field: str
+    key: str
+    hint: Any
+    default: Any
+    slot: Slot | None = None
+    takes_class: bool = False
+
+
+def options_of(module: type) -> tuple[Option, ...]:
+    """Options of a module, from the fields of its dataclass.
+
+    Parameters
+    ----------
+    module : type
+        An entry of a slot.
+
+    Returns
+    -------
+    tuple of Option
+        Fields that neither a person writes nor a slot fills are left out.
+    """
+    hints = get_type_hints(module)
+    found = []
+    for one in fields(module):
+        if not one.init or one.name in GIVEN:
+            continue
+        hint = hints[one.name]
+        slot = _slot_of(hint)
+        if slot is not None:
+            found.append(Option(one.name, slot.name, hint, _kind(one, slot), slot, _of_class(hint)))
+        elif _plain(hint):
+            unit = one.metadata.get("unit")
+            key = f"{one.name}_{unit}" if unit else one.name
+            found.append(Option(one.name, key, hint, _default(one)))
+    return tuple(found)
+
+
+def _parts(hint: Any) -> tuple[Any, ...]:
+    return get_args(hint) if get_origin(hint) in (Union, types.UnionType) else (hint,)
+
+
+def _slot_of(hint: Any) -> Slot | None:
+    for part in _parts(hint):
+        inner = get_args(part)[0] if get_origin(part) is type else part
+        for slot in SLOTS.values():
+            if inner is slot.base:
+                return slot
+    return None
+
+
+def _of_class(hint: Any) -> bool:
+    return any(get_origin(part) is type for part in _parts(hint))
+
+
+def _plain(hint: Any) -> bool:
+    for part in _parts(hint):
+        if part in (*_PLAIN, type(None)) or str(get_origin(part)) == "typing.Literal":
+            continue
+        if get_origin(part) is tuple and all(_plain(a) for a in get_args(part) if a is not ...):
+            continue
+        return False
+    return True
+
+
+def _default(one: Field[Any]) -> Any:
+    if one.default_factory is not MISSING:
+        return one.default_factory()
+    return one.default
+
+
+def _kind(one: Field[Any], slot: Slot) -> Any:
+    """The kind of the module that stands there if nothing is written; None for no module."""
+    default = _default(one)
+    if default is None or default is MISSING:
+        return default
+    module = default if isinstance(default, type) else type(default)
+    return next((kind for kind, entry in slot.entries.items() if entry is module), None)

@@ -1,0 +1,271 @@
+"""Outliers of evenly sampled channels: found by both sides, interpolated, in segments."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.int8]
+
+__all__ = ["KEPT", "REPLACED", "OutlierDesign", "OutlierState", "Screened"]
+
+#: Flags of `Screened`: as those of the kernel.
+REPLACED, KEPT = 1, 2
+# Median of the size of a normal number, one over.
+TO_SIGMA = 1.482602218505602
+# Samples of either side that predict: a polynomial of degree five.
+NODES = 3
+LEAST_WINDOW, LONGEST_RUN = 16, 5
+
+
+@dataclass(frozen=True, eq=False)
+class Screened:
+    """Samples that have been judged.
+
+    Attributes
+    ----------
+    first : int
+        Number of the first since the record began.
+    values, raw : ndarray, (k, c)
+        With outliers replaced, and as they came.
+    flags : ndarray of int8, (k, c)
+        `REPLACED`, `KEPT` where a sample stands out but both sides do not agree that it should
+        not, as at a step, or zero.
+    """
+
+    first: int
+    values: Array
+    raw: Array
+    flags: Flags
+
+
+@dataclass(frozen=True, eq=False)
+class OutlierState:
+    """What is remembered between segments.
+
+    Attributes
+    ----------
+    first : int
+        Number of the oldest sample that is kept.
+    judged : int
+        Number of the first sample that is not judged yet.
+    given : int
+        Number of the first sample that was not handed out.
+    raw, work : ndarray, (c, n)
+    flags : ndarray of int8, (c, n)
+    ahead : ndarray of int64, (c,)
+        Where each channel goes on: a run may have reached beyond `judged`.
+    own : ndarray, (c, 3)
+        The step of the converter and the last run of each channel.
+    """
+
+    first: int
+    judged: int
+    given: int
+    raw: Array
+    work: Array
+    flags: Flags
+    ahead: NDArray[np.int64]
+    own: Array
+
+
+@dataclass(frozen=True)
+class OutlierDesign:
+    """What an outlier is: a run of few samples that both sides contradict.
+
+    A run is left out and predicted by the polynomial of degree five through three samples on
+    either side. It is replaced by that where, for its first and its last sample,
+
+    - the residual is more than `threshold` standard deviations, by the median of the same
+      residual over `window` samples before it and over as many behind it, the larger of both;
+      what a tone of `bandwidth` with the amplitude seen around it would leave is taken off first;
+    - the straight line through the two samples next to the run lies on the same side by at least
+      half the residual. A step, a kink and each piece of straight line are confirmed by one side,
+      and so never touched.
+
+    A steady tone of any frequency is its own scale, and is never touched either: its largest
+    residual is 0.95 of what the median makes of it.
+
+    Parameters
+    ----------
+    threshold : float
+        In standard deviations of the residual, which has 1.52 times that of white noise (runs of
+        two and three: 1.83 and 2.11). On such noise a sample is wrongly replaced with a
+        probability of ``E[erfc(threshold m / sqrt 2)]`` at most, m the larger of two independent
+        medians: 2.4e-7 for 6 and a window of 128.
+    window : int, samples
+        16 or more, on each side; half of it may be outliers' residuals.
+    longest_run : int, samples
+        1 to 5. A real pulse that is no longer and stands alone in quiet is taken for an outlier.
+    bandwidth : float
+        Of the motion, as a part of the sampling rate: below 0.25.
+
+    Raises
+    ------
+    ConfigError
+        A parameter is out of its range.
+    """
+
+    threshold: float = 6.0
+    window: int = 128
+    longest_run: int = 3
+    bandwidth: float = 0.15
+
+    def __post_init__(self) -> None:
+        for name, good, remedy in (
+            ("threshold", 3.0 <= self.threshold < math.inf, "give 3 or more, as 6"),
+            ("window", self.window >= LEAST_WINDOW, f"give {LEAST_WINDOW} samples or more, as 128"),
+            ("longest_run", 1 <= self.longest_run <= LONGEST_RUN, "give 1 to 5 samples, as 3"),
+            ("bandwidth", 0.0 < self.bandwidth < 0.25, "give a part of the rate, as 0.15"),
+        ):
+            if not good:
+                raise ConfigError(
+                    f"{getattr(self, name)!r} is out of range", quantity=name, remedy=remedy
+                )
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights of the six samples beside a run of m for its sample k: (m - 1, k, 6)."""
+        out = np.zeros((self.longest_run, self.longest_run, 2 * NODES))
+        for m in range(1, self.longest_run + 1):
+            nodes = _nodes(m)
+            for k in range(m):
+                for j, a in enumerate(nodes):
+                    others = np.delete(nodes, j)
+                    out[m - 1, k, j] = np.prod((k - others) / (a - others))
+        return out
+
+    @cached_property
+    def allowed(self) -> Array:
+        """Largest residual of a tone up to `bandwidth`, of its amplitude, by length of run."""
+        frequency = np.linspace(0.0, self.bandwidth, 400)
+        out = np.empty(self.longest_run)
+        for m in range(1, self.longest_run + 1):
+            wave = np.exp(2j * np.pi * np.outer(frequency, _nodes(m)))
+            out[m - 1] = np.abs(1.0 - wave @ self.weights[m - 1, 0]).max()
+        return out
+
+    @property
+    def guard(self) -> int:
+        """Samples from a run's first to the nearest residual that its noise is judged by."""
+        return 2 * NODES + self.longest_run
+
+    @property
+    def ahead(self) -> int:
+        """Samples that must have come after one before it is judged."""
+        return self.guard + self.window + self.longest_run + NODES - 1
+
+    @property
+    def latency(self) -> int:
+        """Samples that must have come after one before it is final: a run behind mends it."""
+        return self.ahead + NODES + self.longest_run
+
+    @property
+    def _behind(self) -> int:
+        return self.guard + self.window + NODES
+
+    def begin(self, channels: int, steps: Array | None = None) -> OutlierState:
+        """Return the state before the first sample.
+
+        Parameters
+        ----------
+        channels : int
+        steps : ndarray, (channels,), optional
+            Step of each channel's converter, zero where there is none. Not given, the least
+            change from sample to sample that has been seen is taken: two such are never outliers.
+        """
+        own = np.zeros((channels, 3))
+        own[:, 0] = -np.inf if steps is None else np.where(np.asarray(steps) > 0.0, steps, TINY)
+        empty = np.empty((channels, 0))
+        return OutlierState(
+            0,
+            0,
+            0,
+            empty,
+            empty,
+            np.empty((channels, 0), np.int8),
+            np.zeros(channels, np.int64),
+            own,
+        )
+
+    def advance(
+        self, state: OutlierState, values: Array, last: bool = False
+    ) -> tuple[OutlierState, Screened]:
+        """Judge what can be judged with a further segment.
+
+        Parameters
+        ----------
+        state : OutlierState
+        values : ndarray, (k, c)
+            Finite; k may be zero.
+        last : bool
+            Whether the record ends with them.
+
+        Returns
+        -------
+        state : OutlierState
+        screened : Screened
+            The same numbers however the record is cut.
+        """
+        from strapdown._kernels.outliers import replace_outliers
+
+        new = np.ascontiguousarray(values.T)
+        raw = np.hstack([state.raw, new])
+        work = np.hstack([state.work, new])
+        flags = np.hstack([state.flags, np.zeros(new.shape, np.int8)])
+        own, on = state.own.copy(), state.ahead.copy()
+        n = raw.shape[1]
+        judged = max(state.judged, state.first + (n if last else n - self.ahead))
+        if judged > state.judged:
+            left = np.empty((2 * self.longest_run, n))
+            for c in range(len(raw)):
+                own[c, 1] -= state.first
+                on[c] = state.first + replace_outliers(
+                    raw[c],
+                    work[c],
+                    flags[c],
+                    on[c] - state.first,
+                    judged - state.first,
+                    self.weights,
+                    self.allowed,
+                    self.guard,
+                    self.window,
+                    self.threshold * TO_SIGMA,
+                    own[c],
+                    left,
+                )
+                own[c, 1] += state.first
+        final = state.first + n if last else max(state.given, judged - NODES - self.longest_run)
+        give = slice(state.given - state.first, final - state.first)
+        screened = Screened(
+            state.given, work[:, give].T.copy(), raw[:, give].T.copy(), flags[:, give].T.copy()
+        )
+        drop = max(0, min(judged - self._behind, final - NODES) - state.first)
+        return (
+            OutlierState(
+                state.first + drop,
+                judged,
+                final,
+                raw[:, drop:].copy(),
+                work[:, drop:].copy(),
+                flags[:, drop:].copy(),
+                on,
+                own,
+            ),
+            screened,
+        )
+
+
+#: A step that no reading shows.
+TINY = 1e-300
+
+
+def _nodes(m: int) -> Array:
+    return np.asarray(np.r_[np.arange(-NODES, 0.0), m + np.arange(0.0, NODES)])

@@ -1,0 +1,111 @@
+"""Outliers replaced, then a linear-phase low-pass and fewer samples: the robust digital filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.dsp.fir_decimation import FirDecimation, FirState, fir_decimation
+from strapdown.dsp.outliers import OutlierDesign, OutlierState
+from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
+from strapdown.prefilter.report import Changed
+
+Array = NDArray[np.float64]
+
+__all__ = ["RobustFir", "RobustFirState"]
+
+
+@dataclass(frozen=True, eq=False)
+class RobustFirState:
+    """Between segments: what screening and low-pass remember."""
+
+    grid: Grid
+    low_pass: FirDecimation
+    outliers: OutlierState
+    fir: FirState
+
+
+@dataclass(frozen=True)
+class RobustFir(Prefilter):
+    """Outliers replaced, a linear-phase FIR, every so manyth sample.
+
+    All channels pass the same weights: between gyros and accelerometers no phase arises, and the
+    delay, half the length, is taken off by the stamps. Constants pass as they are, and the
+    integral of the outputs is that of the samples. What is lost is motion above `passband`:
+    its coning and sculling, too; `Summed` keeps them.
+
+    Parameters
+    ----------
+    rate : float, Hz
+        Of the output: a whole part of that of the samples.
+    passband : float
+        Its end, as a part of the output's Nyquist frequency.
+    attenuation : float, dB
+        From that Nyquist frequency on.
+    outliers : OutlierDesign
+    steps : tuple of float, optional
+        Steps of the converters of the channels, as `OutlierDesign.begin`.
+
+    Notes
+    -----
+    Chernodarov (2009), Figs. 3 to 5, names a robust digital filter at 1 kHz and not its formulas;
+    those of its reference [12] are not in the paper.
+    """
+
+    name: ClassVar[str] = "robust_fir"
+    summary: ClassVar[str] = "outliers replaced, linear-phase low-pass, decimation"
+    source: ClassVar[str] = "Chernodarov 2009, Figs. 3-5; Kaiser 1974"
+
+    rate: float = 100.0
+    passband: float = 0.5
+    attenuation: float = 80.0
+    outliers: OutlierDesign = field(default_factory=OutlierDesign)
+    steps: tuple[float, ...] | None = None
+
+    def low_pass(self, grid: Grid) -> FirDecimation:
+        """The low-pass for samples of a grid."""
+        return fir_decimation(
+            grid.step,
+            whole_factor(self.rate, grid, self.name),
+            means=grid.means,
+            passband=self.passband,
+            attenuation=self.attenuation,
+        )
+
+    def begin(self, grid: Grid, channels: int = 6) -> RobustFirState:
+        """As `Prefilter.begin`."""
+        low_pass = self.low_pass(grid)
+        steps = None if self.steps is None else np.asarray(self.steps, dtype=np.float64)
+        return RobustFirState(
+            grid, low_pass, self.outliers.begin(channels, steps), low_pass.begin(channels)
+        )
+
+    def advance(
+        self, state: RobustFirState, values: Array, last: bool = False
+    ) -> tuple[RobustFirState, Portion]:
+        """As `Prefilter.advance`."""
+        low_pass, grid = state.low_pass, state.grid
+        outliers, part = self.outliers.advance(state.outliers, values, last)
+        fir, out = low_pass.advance(state.fir, part.values)
+        number = low_pass.centre + low_pass.factor * np.arange(state.fir.given, fir.given)
+        portion = Portion(grid.time(number), out, np.empty((0, 10)), Changed.of(part))
+        return RobustFirState(grid, low_pass, outliers, fir), portion
+
+    def figures(self, grid: Grid) -> dict[str, float]:
+        """As `Prefilter.figures`."""
+        low_pass = self.low_pass(grid)
+        return {
+            "delay": low_pass.delay,
+            "latency": low_pass.delay + self.outliers.latency * grid.step,
+            "noise_factor": low_pass.noise_factor,
+            "passband": low_pass.design.passband,
+            "stopband": low_pass.design.stopband,
+            "attenuation": self.attenuation,
+        }
+
+    def sampling(self, grid: Grid) -> str:
+        """Values at the stamps: also those made of means, which lie on both sides of the stamp."""
+        return "instantaneous"

@@ -1,0 +1,211 @@
+"""An alignment, from its specification to everything that a report tells."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.carried import carried_attitude
+from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.fine import FineAlignment
+from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment.site import Site
+from strapdown.config.alignment import AlignmentSpec
+from strapdown.config.choice import make_choice
+from strapdown.config.slots import SLOTS
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.exceptions import DataError, Finding
+from strapdown.results import InputFiles
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.stated_imu import stated_imu
+from strapdown.systems.alignment_readiness import Readiness, readiness_of
+from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
+from strapdown.systems.attitude_source import input_files
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import QUATERNION
+from strapdown.tables.checks import values_of
+
+__all__ = ["AlignmentResult", "run_alignment"]
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class AlignmentResult:
+    """Everything that came of an alignment.
+
+    Attributes
+    ----------
+    spec : AlignmentSpec
+        Resolved: every option of every module.
+    source : AlignmentSource
+    imu : DataFrame
+        Imu table as it was aligned, after the pre-filter.
+    site : Site
+    sensors : ImuUncertainty
+    coarse : Alignment
+    fine : FineResult or None
+    start, end : Alignment
+        The answer at the first and at the last sample.
+    attitude : DataFrame
+        Attitude table over the record: the answer, carried by the gyros.
+    readiness : Readiness
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+        Of reading, pre-filter, coarse and fine alignment, in this order.
+    """
+
+    spec: AlignmentSpec
+    source: AlignmentSource
+    imu: pd.DataFrame
+    site: Site
+    sensors: ImuUncertainty
+    coarse: Alignment
+    fine: FineResult | None
+    start: Alignment
+    end: Alignment
+    attitude: pd.DataFrame
+    readiness: Readiness
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+@one_thread()
+def run_alignment(
+    spec: AlignmentSpec, file: Path | None = None, progress: Progress = _silent
+) -> AlignmentResult:
+    """Read a record and align it.
+
+    Parameters
+    ----------
+    spec : AlignmentSpec
+        With absolute paths.
+    file : Path, optional
+        Where it was read from: an input, too.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    AlignmentResult
+
+    Raises
+    ------
+    ConfigError
+        A file is not there, or an option cannot be.
+    DataError
+        The record cannot be read, or it cannot give the attitude; the message names file, row,
+        quantity and remedy.
+    DivergenceError
+        The filter left what a body at rest can do.
+    """
+    progress("reading", 0.02)
+    source = read_alignment_source(spec)
+    site = Site(
+        spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m, find_ellipsoid(spec.site.ellipsoid)
+    )
+    sensors = sensors_of(spec)
+    given = {"ellipsoid": spec.site.ellipsoid}
+    coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
+    fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
+    imu = source.imu
+    progress("coarse alignment", 0.15)
+    part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
+    coarse = coarse_way.align(part, site, sensors)
+    fine: FineResult | None = None
+    if fine_way is not None:
+        rest = imu if spec.coarse.duration_s is None else _after(imu, part)
+        if spec.fine.duration_s is not None:
+            rest = _first(rest, spec.fine.duration_s)
+        fine = fine_way.align(
+            rest,
+            site,
+            sensors,
+            coarse,
+            lambda share: progress("fine alignment", 0.25 + 0.3 * share),
+        )
+    progress("carrying the attitude over the record", 0.58)
+    answer = coarse if fine is None else fine.alignment
+    attitude = carried_attitude(answer, imu, site)
+    start, end = (_at(answer, attitude, row) for row in (0, -1))
+    progress("trying shorter alignments", 0.6)
+    readiness = readiness_of(
+        coarse_way, imu, site, sensors, attitude, fine, source.truth, spec.reference
+    )
+    files = () if file is None else (input_files("configuration", str(file), (file,)),)
+    findings = [*source.findings, *coarse.findings, *(() if fine is None else fine.findings)]
+    return AlignmentResult(
+        spec=spec,
+        source=source,
+        imu=imu,
+        site=site,
+        sensors=sensors,
+        coarse=coarse,
+        fine=fine,
+        start=start,
+        end=end,
+        attitude=attitude,
+        readiness=readiness,
+        inputs=(*files, *source.inputs),
+        findings=tuple(dict.fromkeys(findings)),
+    )
+
+
+def sensors_of(spec: AlignmentSpec) -> ImuUncertainty:
+    """What is not known of the sensors of a specification."""
+    stated = spec.sensors
+    sensor = None if stated.sensor is None else load_sensor(stated.sensor)
+    return stated_imu(sensor, stated.gyro, stated.accel)
+
+
+def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
+    """The first part of a record, from its first stamp."""
+    time = imu.index.to_numpy(dtype=np.float64)
+    step = float(np.median(np.diff(time)))
+    # A mean belongs to the interval before its stamp.
+    begin = time[0] - (step if imu.attrs["sampling"] == "mean" else 0.0)
+    kept = time <= begin + duration + 1e-6 * step
+    if kept.sum() < 2:
+        raise DataError(
+            f"{duration:g} s hold no two samples",
+            file=imu.attrs.get("source"),
+            quantity="time",
+            remedy="align for longer",
+        )
+    out = imu[kept]
+    out.attrs = dict(imu.attrs)
+    return out
+
+
+def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
+    """What follows a first part, its last sample included."""
+    out = imu.iloc[len(part) - 1 :]
+    out.attrs = dict(imu.attrs)
+    if len(out) < 2:
+        raise DataError(
+            f"nothing is left for the fine alignment: the coarse one takes all "
+            f"{float(imu.index[-1] - imu.index[0]):.6g} s",
+            file=imu.attrs.get("source"),
+            quantity="coarse, duration_s",
+            remedy="give it less, or leave its duration out: then both use the whole record",
+        )
+    return out
+
+
+def _at(answer: Alignment, attitude: pd.DataFrame, row: int) -> Alignment:
+    return replace(
+        answer,
+        time=float(attitude.index[row]),
+        q_nb=values_of(attitude, QUATERNION)[row],
+        findings=(),
+    )

@@ -1,0 +1,224 @@
+"""The record that is aligned: read from a log or simulated, in body axes, cut to its span."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import read_log
+from strapdown.formats.recording import ReadOptions, Recording, StatedStart
+from strapdown.results import InputFiles, Reading
+from strapdown.rotation import euler_from_dcm
+from strapdown.sensors.axes_matrix import (
+    NAMED_AXES,
+    axes_letters,
+    check_axes_matrix,
+    report_transposed,
+)
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
+from strapdown.systems.attitude_source import input_files, sensor_file
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import values_of
+
+__all__ = ["AlignmentSource", "read_alignment_source"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AlignmentSource:
+    """A record to align.
+
+    Attributes
+    ----------
+    name, what : str
+    imu : DataFrame
+        Imu table, body axes, of the span that is used.
+    truth : DataFrame or None
+        Attitude table at the same stamps, of a simulation.
+    start : StatedStart or None
+        What the file says of its place and attitude.
+    readings : tuple of Reading
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+    """
+
+    name: str
+    what: str
+    imu: pd.DataFrame
+    truth: pd.DataFrame | None
+    start: StatedStart | None
+    readings: tuple[Reading, ...]
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+
+
+def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
+    """Read the log of a specification, or simulate its record.
+
+    Parameters
+    ----------
+    spec : AlignmentSpec
+
+    Returns
+    -------
+    AlignmentSource
+
+    Raises
+    ------
+    DataError, ConfigError
+        It cannot be used; the message names file, row and remedy.
+    """
+    if spec.log is None:
+        return _simulated(spec)
+    gyro, accel = _matrices(spec.axes)
+    letters, turn = axes_letters(gyro) if gyro is not None else (spec.axes.axes, None)
+    recording = read_log(spec.log.path, _options(spec.log, letters))
+    findings = list(recording.findings)
+    imu = recording.imu
+    if gyro is not None and accel is not None and turn is not None:
+        plain = gyro.T @ turn  # what the letters did, from body to sensor
+        imu = _turned(imu, turn, accel @ plain)
+        findings += _said(recording, turn, accel @ plain)
+        if ACCEL[0] in imu.columns:
+            force = values_of(imu, ACCEL).mean(axis=0)
+            findings += report_transposed(accel, force, recording.name)
+    imu = _span(imu, spec.log, recording.name)
+    return AlignmentSource(
+        recording.name,
+        "recorded log",
+        imu,
+        None,
+        recording.start,
+        recording.readings,
+        (input_files("log", spec.log.path, recording.files), *_sensor_file(spec)),
+        tuple(findings),
+    )
+
+
+def _options(log: LogTable, axes: str | None) -> ReadOptions:
+    return ReadOptions(
+        columns=dict(log.columns),
+        gyro_unit=log.gyro_unit,
+        accel_unit=log.accel_unit,
+        time_unit=log.time_unit,
+        axes=axes,
+        sampling=log.sampling,
+        rate=log.rate_hz,
+        repair=log.repair,
+    )
+
+
+def _matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:
+    both = axes.matrix if axes.design is None else NAMED_AXES[axes.design]
+    if both is not None:
+        matrix = check_axes_matrix(both)
+        return matrix, matrix
+    if axes.gyro_matrix is None or axes.accel_matrix is None:
+        return None, None
+    return (
+        check_axes_matrix(axes.gyro_matrix, "gyro_matrix"),
+        check_axes_matrix(axes.accel_matrix, "accel_matrix"),
+    )
+
+
+def _turned(imu: pd.DataFrame, gyro: Array, accel: Array) -> pd.DataFrame:
+    out = imu.copy()
+    for columns, turn in ((GYRO, gyro), (ACCEL, accel)):
+        if columns[0] in out.columns and not np.array_equal(turn, np.eye(3)):
+            out[columns] = values_of(imu, columns) @ turn.T
+    out.attrs = dict(imu.attrs)
+    return out
+
+
+def _said(recording: Recording, gyro: Array, accel: Array) -> Sequence[Finding]:
+    """How far the axes that are stated lie beside those that letters can name."""
+    out = []
+    for name, turn in (("gyro", gyro), ("accel", accel)):
+        roll, pitch, heading = euler_from_dcm(turn)
+        if np.abs([roll, pitch, heading]).max() < 1e-6:
+            continue
+        out.append(
+            Finding(
+                f"turned further, by roll {roll:.4g}°, pitch {pitch:.4g}°, heading "
+                f"{heading:.4g}°, as the matrix in the configuration states",
+                file=recording.name,
+                quantity=name,
+            )
+        )
+    return out
+
+
+def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
+    time = imu.index.to_numpy(dtype=np.float64)
+    first = -np.inf if log.from_s is None else log.from_s
+    last = np.inf if log.to_s is None else log.to_s
+    # A stamp that is a sum of steps may miss the instant by its rounding.
+    slack = 1e-6 * float(np.median(np.diff(time)))
+    kept = (time >= first - slack) & (time <= last + slack)
+    if kept.sum() < 2:
+        raise DataError(
+            f"nothing is recorded from {first:g} to {last:g} s: it goes from {time[0]:.6g} to "
+            f"{time[-1]:.6g} s",
+            file=name,
+            quantity="time",
+            remedy="give another span (from_s, to_s; --from, --to, --duration)",
+        )
+    out = imu[kept]
+    out.attrs = dict(imu.attrs)
+    return out
+
+
+def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:
+    found = [*sensor_file(spec.sensors.sensor)]
+    if spec.simulation is not None and spec.simulation.sensor != spec.sensors.sensor:
+        found += sensor_file(spec.simulation.sensor)
+    return tuple(found)
+
+
+def _simulated(spec: AlignmentSpec) -> AlignmentSource:
+    asked = spec.simulation
+    assert asked is not None  # one of the two is there
+    origin = Origin(spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m)
+    ellipsoid = find_ellipsoid(spec.site.ellipsoid)
+    waves = [
+        tuple(Wave(w.amplitude_deg, w.period_s, w.phase_deg) for w in group)
+        for group in (asked.roll_waves, asked.pitch_waves, asked.heading_waves)
+    ]
+    angles = (asked.roll_deg, asked.pitch_deg, asked.heading_deg)
+    motion = (
+        rocking_stand(
+            asked.duration_s,
+            origin,
+            roll_deg=angles[0],
+            pitch_deg=angles[1],
+            heading_deg=angles[2],
+            roll_waves=waves[0],
+            pitch_waves=waves[1],
+            heading_waves=waves[2],
+            ellipsoid=ellipsoid,
+        )
+        if any(waves)
+        else StationaryMotion(asked.duration_s, origin, *angles, ellipsoid)
+    )
+    sensor = asked.sensor or spec.sensors.sensor
+    assert sensor is not None  # checked with the specification
+    imu, truth = simulate_imu(
+        motion,
+        load_sensor(sensor).draw(asked.seed),
+        rate=asked.rate_hz,
+        sampling=asked.sampling,
+        seed=asked.seed,
+        source=spec.name,
+    )
+    what = f"simulated, {Path(sensor).stem}, seed {asked.seed}"
+    return AlignmentSource(spec.name, what, imu, truth, None, (), _sensor_file(spec), ())
