@@ -145,8 +145,10 @@ class FineAlignment:
         Raises
         ------
         DataError
-            The record is too short, or the coarse alignment belongs to another instant.
+            The record is too short, or the coarse alignment belongs to another instant or does not
+            know the heading.
         """
+        _check_coarse(coarse, imu)
         increments = motion_increments(imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         start = self._start(increments, site, coarse, begin)
@@ -197,6 +199,8 @@ class FineAlignment:
             innovations=epochs.innovations(),
             standing=standing,
             interval=self.interval,
+            heading_given=coarse.heading_given,
+            prior_heading_sd_deg=math.degrees(prior_heading_sd(coarse)),
             filter=filter_,
             state=state,
             source=imu.attrs.get("source"),
@@ -294,18 +298,37 @@ def epoch_ends(begin: float, time: Array, interval: float) -> NDArray[np.int64]:
     return np.unique(np.searchsorted(time, wanted - half) + 1).clip(max=time.size)
 
 
+def prior_heading_sd(coarse: Alignment) -> float:
+    """Standard deviation of the heading before the first epoch, rad."""
+    heading = float(np.sqrt(coarse.covariance[2, 2]))
+    if coarse.heading_given:
+        return heading
+    return min(max(WIDER * heading, LEAST_HEADING), MOST_HEADING)
+
+
 def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standing) -> Array:
     """Covariance of the physical errors before the first epoch, in north-east-down."""
     P = np.zeros((filter_.model.physical_size,) * 2)
     P[0:3, 0:3] = np.diag(standing.position**2)
     P[3:6, 3:6] = np.diag(standing.velocity**2)
     tilt = float(np.sqrt(np.diagonal(coarse.covariance)[:2].max()))
-    heading = float(np.sqrt(coarse.covariance[2, 2]))
     P[6, 6] = P[7, 7] = min(max(WIDER * tilt, LEAST_TILT), MOST_TILT) ** 2
-    P[8, 8] = min(max(WIDER * heading, LEAST_HEADING), MOST_HEADING) ** 2
+    P[8, 8] = prior_heading_sd(coarse) ** 2
     at = PHYSICAL
     for block in filter_.model.sensors:
         end = at + len(block.block)
         P[at:end, at:end] = np.diag(block.sd**2)
         at = end
     return P
+
+
+def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
+    sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
+    if not sd <= math.degrees(MOST_HEADING):
+        raise DataError(
+            f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard "
+            f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
+            file=imu.attrs.get("source"),
+            quantity="heading",
+            remedy="state the heading, or align longer, or use gyros of a better grade",
+        )
