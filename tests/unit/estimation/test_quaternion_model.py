@@ -188,10 +188,10 @@ def test_sensors_act_as_in_the_mechanization(case):
             compensate(rows, gyro, accel, states, wrong)
             ends[j, sign] = physical_error(run(mechanization, begin, wrong)[-1], history[-1], WGS84)
     found = np.stack([(ends[j, 1.0] - ends[j, -1.0]) / 2e-6 for j in range(k)], axis=1)
-    # Increments are put wrong as constant errors over each step (5e-5 of what turns within a step
-    # of 0.02 s at 0.4 rad/s); rounding: 1e-9 m over 1e-6.
+    # Means over h = 0.02 s leave out of a product, as of attitude and rate, h²/12 of what both
+    # change in a second (0.4, and 1 of itself): 1e-5. Rounding: 1e-9 m over 1e-6, of 10 or more.
     size = np.maximum(np.abs(found).max(axis=1, keepdims=True), 10.0)
-    np.testing.assert_allclose(ours / size, found / size, atol=2e-4)
+    np.testing.assert_allclose(ours / size, found / size, atol=1e-5)
     assert np.abs(found[:2, :-3]).max(axis=0).min() > 1.0
     assert not found[:, -3:].any()
 
@@ -380,6 +380,19 @@ def test_what_it_is_no_model_of_is_refused(mechanization, said):
         model.from_physical(mechanization, 0.0, row)
     with pytest.raises(ConfigError, match=said):
         model.transition(segment_of(mechanization, row[None], np.zeros((0, 10))), 0.1)
+
+
+def test_with_a_held_height_the_vertical_velocity_is_known():
+    mechanization = WanderAzimuth(height="held")
+    begin = mechanization.begin(start())
+    rows = made_up(begin[8:12], 2.0, 0.02)
+    model = QuaternionModel((1e-5,) * 3, (1e-3,) * 3, (accel_bias(1e-3),))
+    segment = segment_of(mechanization, run(mechanization, begin, rows), rows)
+    Phi, Q = model.transition(segment, 0.1)
+    # As in the mechanization, whatever it was before.
+    assert not Phi[2].any()
+    assert not Phi[:, 2].any()
+    assert not Q[2].any()
 
 
 def test_states_of_the_paper():
