@@ -174,17 +174,16 @@ def wander_correct(state, error, earth):
     w, x, y, z = state[0], state[1], state[2], state[3]
     px, py, pz = earth_axis(w, x, y, z)
     over = 1.0 / math.sqrt(1.0 - e2 * pz * pz)
-    prime, slope, across, curvature = curving(over, state[ALT], a, e2)
+    far, slope, across, curvature = curving(over, state[ALT], a, e2)
     tx, ty, t2, up = shift(
         px,
         py,
         pz,
         over,
-        prime,
+        far,
         slope,
         across,
         curvature,
-        state[ALT],
         e2,
         -error[0],
         -error[1],
