@@ -87,7 +87,7 @@ def curving(w, alt, a, e2):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def shift(kx, ky, s, w, far, slope, across, curvature, e2, rx, ry, rz):
-    """Tilt of the normal, as the tangent of its angle along xi and eta, and rise, by a straight way.
+    """Tilt of the normal, as tangents along xi and eta, and rise, by a straight way r.
 
     A point of normal n and height h is ``(N + h) n - e² N s p``, p the Earth's axis and s = p . n.
     So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s, of which the
@@ -121,6 +121,15 @@ def tilt(tx, ty, t2):
     """Quaternion from the new w to the old one, less 1, of a tilt by tangents; its zeta is 0."""
     half = 0.5 - t2 * (0.1875 - 0.12109375 * t2)
     return -t2 * (0.125 - 0.0859375 * t2), -ty * half, tx * half
+
+
+@njit(cache=True, inline="always")
+def level_with(tx, ty, t2, x, y, z):
+    """Vector in the new w, of one in the old, as `tilt` turns it; up to the sixth order."""
+    less = 0.5 - 0.375 * t2
+    along = tx * x + ty * y
+    lean = z - t2 * less * z + less * along
+    return x - tx * lean, y - ty * lean, (1.0 - t2 * less) * (z + along)
 
 
 @njit(cache=True, inline="always")
@@ -187,14 +196,10 @@ def wander_step(
     far, slope, across, curvature = curving(w, alt, a, e2)
     per = e2 * slope * curvature
     along = per * across
-    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(
-        q_wb[0], q_wb[1], q_wb[2], q_wb[3]
-    )
+    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(q_wb[0], q_wb[1], q_wb[2], q_wb[3])
     ux, uy, uz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv[0], dv[1], dv[2])
     sx, sy, sz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr[0], dr[1], dr[2])
-    lean, down, steep, loss, loss2 = gravity_parts(
-        s2, alt, w, curvature, a, e2, gamma, k, f, m
-    )
+    lean, down, steep, loss, loss2 = gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m)
     vx, vy, vz = v
     ox, oy, oz = rate * px, rate * py, rate * pz
     outward = -lean * alt * pz
@@ -282,20 +287,11 @@ def wander_step(
         rz - (ox * by - oy * bx),
     )
 
-    fd, fx, fy = tilt(tx, ty, t2)
+    # The velocity is turned back by the Earth's turn and then by the level's.
     yd, ys = half_turn(0.5 * rate * dt)
-    # The velocity is turned by the Earth's turn and the level's.
-    fw = 1.0 + fd
-    yw = 1.0 + yd
-    vx, vy, vz = turn_back(
-        yw * fw - ys * (px * fx + py * fy),
-        yw * fx + ys * (px * fw - pz * fy),
-        yw * fy + ys * (py * fw + pz * fx),
-        ys * (px * fy - py * fx + pz * fw),
-        wx,
-        wy,
-        wz,
-    )
+    wx, wy, wz = turn_back(1.0 + yd, ys * px, ys * py, ys * pz, wx, wy, wz)
+    fd, fx, fy = tilt(tx, ty, t2)
+    vx, vy, vz = level_with(tx, ty, t2, wx, wy, wz)
     q_ew, low_ew = tilt_place(q_ew, low_ew, fd, fx, fy)
     bw, b1, b2, b3 = quat_from_rotvec(phi[0], phi[1], phi[2])
     q_ib, low_ib = turn_body(q_ib, low_ib, bw - 1.0, b1, b2, b3)
@@ -325,6 +321,19 @@ def four(state, at):
 def put(state, at, numbers):
     for j in range(len(numbers)):
         state[at + j] = numbers[j]
+
+
+@njit(cache=True, inline="always")
+def put_state(state, q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, pull, since):
+    put(state, Q_EW, q_ew)
+    state[ALT] = alt
+    put(state, V, v)
+    put(state, Q_WB, q_wb)
+    put(state, Q_IB, q_ib)
+    put(state, LOW_EW, low_ew)
+    put(state, LOW_IB, low_ib)
+    put(state, SPIN, spin)
+    state[PRIME], state[PULL], state[SINCE] = w, pull, since
 
 
 @njit(cache=True, inline="always")
@@ -396,13 +405,5 @@ def wander_advance(state, increments, reference, earth, options, history):
         history[i, ALT] = alt
         history[i, 5], history[i, 6], history[i, 7] = v
         history[i, 8], history[i, 9], history[i, 10], history[i, 11] = q_wb
-    put(state, Q_EW, q_ew)
-    state[ALT] = alt
-    put(state, V, v)
-    put(state, Q_WB, q_wb)
-    put(state, Q_IB, q_ib)
-    put(state, LOW_EW, low_ew)
-    put(state, LOW_IB, low_ib)
-    put(state, SPIN, spin)
-    state[PRIME], state[PULL], state[SINCE] = w, pull, since
+    put_state(state, q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, pull, since)
     return made, why

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -12,6 +13,8 @@ from numpy.typing import ArrayLike
 from strapdown import rotation
 from strapdown._kernels import wander as kernel
 from strapdown._kernels import wander_level as level
+from strapdown._kernels.level import LEVEL
+from strapdown._kernels.wander_sample import wander_update
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Array, Mechanization
@@ -26,7 +29,7 @@ class WanderAzimuth(Mechanization):
     level axes in the Earth's, and the velocity. Level axes are xi, eta, zeta with zeta up; xi is
     turned anticlockwise from east by the wander angle A, which is zero at the start and then is
     whatever keeps the rate of the axes about zeta, relative to the Earth, at zero:
-    ``V_E = V_xi cos A - V_eta sin A``, ``V_N = V_xi sin A + V_eta cos A`` (the paper prints a minus).
+    ``V_E = V_xi cos A - V_eta sin A``, ``V_N = V_xi sin A + V_eta cos A`` (in print a minus).
     Gravity is normal gravity, which is the paper's gravitation and centrifugal term together.
 
     The error of a run is of the fourth order of the step (`_kernels.wander`), at a pole as
@@ -101,9 +104,13 @@ class WanderAzimuth(Mechanization):
         made, why = kernel.wander_advance(state, increments, heights, earth, options, history)
         return made, why
 
+    def sample_kernel(self) -> Callable[..., int]:
+        """Return the compiled function that takes one sample."""
+        return wander_update
+
     def levels(self, history: Array) -> Array:
         """Return what a filter needs to know of each row, as `Mechanization.levels`."""
-        out = np.empty((len(history), level.LEVEL))
+        out = np.empty((len(history), LEVEL))
         level.wander_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
 
@@ -119,9 +126,7 @@ class WanderAzimuth(Mechanization):
         place = np.empty((1, 10))
         level.wander_places(state[None, : kernel.ROW], place)
         lat, lon, alt = place[0, :3].tolist()
-        return NavState(
-            time=time, lat=lat, lon=lon, alt=alt, v_n=place[0, 3:6], q_nb=place[0, 6:]
-        )
+        return NavState(time=time, lat=lat, lon=lon, alt=alt, v_n=place[0, 3:6], q_nb=place[0, 6:])
 
     def fill_trajectory(self, history: Array, out: Array) -> None:
         """Fill rows of a Trajectory table from rows of a history."""
