@@ -243,7 +243,9 @@ def wander_step(
     level = lean * alt * s2
     more_x = level * nx - inward * px
     more_y = level * ny - inward * py
-    more_z = -(pz * steep * north + rise * (loss + rise * loss2))
+    # Down gravity goes with the square of the sine, which a tilt changes to its second order too.
+    tilted = pz * north + TWO_THIRDS * (north * north - s2 * (nx * nx + ny * ny))
+    more_z = -(steep * tilted + rise * (loss + rise * loss2))
     gx += more_x
     gy += more_y
     gz += more_z
