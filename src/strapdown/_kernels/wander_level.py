@@ -20,6 +20,8 @@ from strapdown._kernels.rotation import (
 )
 from strapdown._kernels.wander import (
     ALT,
+    LOW_EW,
+    LOW_IB,
     PRIME,
     Q_EW,
     Q_IB,
@@ -202,5 +204,7 @@ def wander_correct(state, error, earth):
     bw, bx, by, bz = quat_multiply(fw, -fx, -fy, 0.0, bw, bx, by, bz)
     put(state, Q_WB, quat_normalise(bw, bx, by, bz))
     put(state, Q_IB, _inertial(state, state[SPIN], state[SPIN + 1]))
+    put(state, LOW_EW, (0.0, 0.0, 0.0, 0.0))
+    put(state, LOW_IB, (0.0, 0.0, 0.0, 0.0))
     sine = earth_axis(state[0], state[1], state[2], state[3])[2]
     state[PRIME] = 1.0 / math.sqrt(1.0 - e2 * sine * sine)
