@@ -128,7 +128,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     gravity, rate = site.gravity, site.earth_rate
     known = moments(sums.stamps, fallen_gravity(sums.stamps, gravity, rate), DEGREES)
     measured_b = moments(sums.stamps, sums.fallen, DEGREES)
-    weights = 2.0 / (2.0 * np.arange(DEGREES) + 1.0)
+    weights: Array = np.asarray(2.0 / (2.0 * np.arange(DEGREES) + 1.0), dtype=np.float64)
     weights[:2] = 0.0
     C_nb = _wahba(measured_b, known, weights)
     measured = measured_b @ C_nb.T
