@@ -116,7 +116,9 @@ class GnssCourse(CoarseAlignment):
         # The last course gives an attitude, and that tells how the others turn into the last.
         C_last = _attitude(force_b, force_n, fixes.course[-1] + yaw)
         turned = rotation.dcm_from_quaternion(fixes.turned)
-        back = C_last @ np.swapaxes(turned[-1:], 1, 2) @ turned
+        ago = (fixes.time[-1] - fixes.time)[:, None]
+        level = rotation.dcm_from_rotation_vector(_level_rate(fixes, site) * ago)
+        back = level @ C_last @ turned[-1].T @ turned
         heading = np.arctan2(back[:, 1, 0], back[:, 0, 0])
         off = _wrap(fixes.course + yaw - heading)
         drift = _gyro_sd(sensors) * (fixes.time[-1] - fixes.time)
