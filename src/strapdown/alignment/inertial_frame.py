@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.body_turn import turn_findings
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.inertial_fit import InertialFit, fit_inertially
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
-from strapdown.alignment.north import CONTRADICTION, latitude_findings, north_findings
+from strapdown.alignment.north import (
+    CONTRADICTION,
+    LARGEST_SD,
+    latitude_findings,
+    north_findings,
+    unit_remedy,
+)
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.record_checks import check_gravity, check_record
 from strapdown.alignment.residual_noise import ResidualNoise, residual_noise
@@ -22,6 +29,7 @@ from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
 
@@ -82,13 +90,15 @@ class InertialFrame(CoarseAlignment):
         findings += check_gravity(_mean_force(sums), source)
         fit = fit_inertially(sums, site)
         noise = residual_noise(sums, fit, sensors)
-        whole = _covariance(sums, fit, noise, sensors, None)
+        own = _own_covariance(sums, fit, sensors)
+        findings += north_findings(site, float(np.sqrt(own[2, 2])), sensors, source)
+        whole = own + noise.covariance(sums, fit.response.push, fit.response.place)
         sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
-        _refuse_travel(noise, fit, sd, sums.length, source)
+        _refuse_travel(noise, sd, imu, site)
         if noise.significant:
             findings.append(_left_over(noise, sd[2], sums.length, source))
-        findings += north_findings(site, float(sd[2]), sensors, source)
         findings += still_by_gnss(gnss, imu, site, float(sd[2]))
+        findings += turn_findings(sums, fit.C_nb, site, sensors, source)
         findings += _gravity_findings(fit, float(sd[4]), source)
         measured = site.lat_deg + float(np.degrees(fit.latitude_change))
         findings += latitude_findings(site, measured, float(np.degrees(sd[3])), source)
@@ -96,7 +106,10 @@ class InertialFrame(CoarseAlignment):
         if self.at == "end":
             level = rotation.dcm_from_rotation_vector(-site.earth_rate * sums.length)
             C_nb = level @ fit.C_nb @ rotation.dcm_from_quaternion(sums.turned[-1])
-            covariance = _covariance(sums, fit, noise, sensors, level)
+            covariance = _own_covariance(sums, fit, sensors, level)
+            covariance += noise.covariance(
+                sums, level @ fit.response.push[:, :3], level @ fit.response.place[:, :3]
+            )
         return Alignment(
             self.name,
             sums.start + (sums.length if self.at == "end" else 0.0),
@@ -110,54 +123,49 @@ def _mean_force(sums: InertialSums) -> Array:
     return np.asarray(sums.node_velocity.sum(axis=0) / sums.length)
 
 
-def _covariance(
-    sums: InertialSums,
-    fit: InertialFit,
-    noise: ResidualNoise,
-    sensors: ImuUncertainty,
-    level: Array | None,
+def _own_covariance(
+    sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty, level: Array | None = None
 ) -> Array:
-    """Of attitude at the start, latitude and gravity (5, 5); or, with `level`, of that at the end.
+    """What the sensors alone make: of attitude at the start, latitude and gravity (5, 5).
 
-    `level` turns the local level at the start into that at the end.
+    With `level`, which turns the local level at the start into that at the end, of the attitude
+    at the end (3, 3).
     """
-    turn, push, place = fit.response.turn, fit.response.push, fit.response.place
+    turn, push = fit.response.turn, fit.response.push
     if level is not None:
         # The gyros carry the attitude to the end, with every error of theirs.
         turn = level @ (turn[:, :3] + fit.C_nb)
-        push, place = level @ push[:, :3], level @ place[:, :3]
-    total = sensor_covariance(sums, turn, push, sensors)
-    total += sensor_noise(sums, turn, push, sensors)
-    total += noise.covariance(sums, push, place)
-    return 0.5 * (total + total.T)
+        push = level @ push[:, :3]
+    return sensor_covariance(sums, turn, push, sensors) + sensor_noise(sums, turn, push, sensors)
 
 
-def _refuse_travel(
-    noise: ResidualNoise, fit: InertialFit, sd: Array, length: float, source: str | None
-) -> None:
+def _refuse_travel(noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site) -> None:
     """Refuse a record whose leftovers drown north."""
-    if not (noise.significant and sd[2] > 1.0):
+    if not (noise.significant and sd[2] > LARGEST_SD):
         return
+    rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
+    length = float(imu.index[-1] - imu.index[0])
     raise DataError(
         f"the body did not stay at its place, or the gyros do not tell its turns: within "
         f"{length:.4g} s the second integral of the specific force departs from gravity's by "
         f"{noise.sway:.3g} m (root mean square), {noise.ratio:.3g} times what the noise of the "
         f"sensors explains, and the heading is not known to better than "
         f"{np.degrees(sd[2]):.3g} deg",
-        file=source,
+        file=imu.attrs.get("source"),
         quantity="accel",
-        remedy="align while the vehicle stands (it may rock), or with gnss_course while it "
-        "drives; check units and axes of the gyros",
+        remedy=unit_remedy(rate, site)
+        or "align while the vehicle stands (it may rock), or with gnss_course while it drives; "
+        "check units and axes of the gyros",
     )
 
 
 def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | None) -> Finding:
-    returns = noise.excess[0] > 0.0 and noise.excess[2] + noise.excess[3] == 0.0
     return Finding(
-        f"slow motion or noise that the sensors do not explain: {noise.ratio:.3g} times their "
-        f"noise, {noise.sway:.2g} m (root mean square) over {length:.4g} s; it is in the stated "
-        f"uncertainty of the heading, {np.degrees(sd):.2g} deg"
-        + (": the body sways about its place" if returns else ""),
+        f"slow motion, or noise, that the sensors do not explain: {noise.ratio:.3g} times their "
+        f"noise; over {length:.4g} s the second integral of the specific force departs from "
+        f"gravity's by {noise.sway:.2g} m (root mean square). The body moved, or turned with "
+        "biased accelerometers; it is in the stated uncertainty of the heading, "
+        f"{np.degrees(sd):.2g} deg",
         file=source,
         quantity="accel",
         remedy="align for longer, while the vehicle does not drive; where it stood, state noisier "

@@ -140,9 +140,10 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
     if not gaps:
         return ()
     worst = max(gaps, key=lambda gap: gap.length)
+    count = f"{len(gaps)} gaps" if len(gaps) > 1 else "a gap"
     return (
         Finding(
-            f"{len(gaps)} gaps, the longest of {worst.length:.3g} s at {worst.start:.6g} s where "
+            f"{count}, the longest of {worst.length:.3g} s at {worst.start:.6g} s where "
             f"steps are of {worst.usual:.3g} s: rate and force are taken for straight lines "
             "across them, and what the body did in them is not known",
             file=source,

@@ -68,10 +68,13 @@ def level_at_rest(
         means.force, means.length, sensors.accel.axis("noise_density"), sensors.accel_drift
     )
     swing = np.zeros((3, 3))
-    if loud > 1.0:
-        force = force + of_mean(means.force)
+    turning = unexplained(
+        means.rate, means.length, sensors.gyro.axis("noise_density"), sensors.gyro_drift
+    )
+    if loud > 1.0 or turning > 1.0:
+        force = force + (of_mean(means.force) if loud > 1.0 else 0.0)
         swing = excursion(imu, sensors.gyro.axis("noise_density"))
-        findings.append(_disturbed(means.length, loud, swing, source))
+        findings.append(_disturbed(means.length, loud, turning, swing, source))
     by_force, by_heading = error_of_force_and_heading(-site.gravity, pitch, heading_deg, source)
     # A stated heading is that of the last sample: a swing about the vertical is not in it.
     by_swing = by_force @ rotation.cross_matrix(site.gravity) @ C_nb
@@ -81,11 +84,14 @@ def level_at_rest(
     return Alignment(method, float(imu.index[-1]), q_nb, covariance, findings=tuple(findings))
 
 
-def _disturbed(length: float, loud: float, swing: Array, source: str | None) -> Finding:
+def _disturbed(
+    length: float, loud: float, turning: float, swing: Array, source: str | None
+) -> Finding:
     return Finding(
         f"the body does not stand still: the mean specific forces of {BLOCKS} blocks of "
         f"{length / BLOCKS:.3g} s scatter {loud:.3g} times as much as the noise of the "
-        f"accelerometers, and it swings by {np.degrees(np.sqrt(np.trace(swing))):.2g} deg (root "
+        f"accelerometers, the mean rates {turning:.3g} times as much as that of the gyros, and it "
+        f"swings by {np.degrees(np.sqrt(np.trace(swing))):.2g} deg (root "
         "mean square) about its mean attitude: this is in the stated uncertainty",
         file=source,
         quantity="accel",

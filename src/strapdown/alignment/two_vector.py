@@ -26,6 +26,7 @@ from strapdown.alignment.north import (
     LARGEST_SD,
     latitude_findings,
     north_findings,
+    unit_remedy,
 )
 from strapdown.alignment.record_checks import check_gravity, check_record
 from strapdown.alignment.site import Site
@@ -104,7 +105,7 @@ class TwoVector(CoarseAlignment):
             swing = C_nb @ excursion(imu, sensors.gyro.axis("noise_density")) @ C_nb.T
         if loud_force > 1.0:
             force = force + of_mean(means.force @ C_nb.T)
-        _check_rate(means, site, rate, sensors, source)
+        findings += _check_rate(means, site, rate, sensors, source)
         by_force, by_rate = sensitivities(site)
         covariance = by_force @ force @ by_force.T + by_rate @ rate @ by_rate.T + swing
         heading_sd = float(np.sqrt(covariance[2, 2]))
@@ -163,27 +164,25 @@ def sensitivities(site: Site) -> tuple[Array, Array]:
 
 def _check_rate(
     means: BlockMeans, site: Site, covariance: Array, sensors: ImuUncertainty, source: str | None
-) -> None:
-    """Refuse a mean rate that is a turn, or in another unit."""
+) -> tuple[Finding, ...]:
+    """Compare the length of the mean rate with the Earth's; refuse a turn, or another unit."""
     rate, earth = means.whole_rate, float(np.sqrt(site.earth_rate @ site.earth_rate))
     size, sd = float(np.sqrt(rate @ rate)), float(np.sqrt(np.trace(covariance)))
-    if not size > 2.0 * earth + CONTRADICTION * sd:
-        return
-    if abs(size / earth / np.degrees(1.0) - 1.0) < 0.1:
-        remedy = "the gyros seem to be in deg/s: state the unit when the log is read"
-    else:
-        bias = max(sensors.gyro.axis("bias")) * DEG_PER_H
-        remedy = (
-            "the body turned, or the bias of the gyros is larger than stated "
-            f"({bias:.3g} deg/h): align while it stands, or state the right sensor"
-        )
-    raise DataError(
+    if not abs(size - earth) > CONTRADICTION * sd:
+        return ()
+    bias = max(sensors.gyro.axis("bias")) * DEG_PER_H
+    told = Finding(
         f"the mean rate over {means.length:.4g} s is {size * DEG_PER_H:.4g} deg/h (standard "
         f"deviation {sd * DEG_PER_H:.2g}), and the Earth's is {earth * DEG_PER_H:.4g}",
         file=source,
         quantity="gyro",
-        remedy=remedy,
+        remedy=unit_remedy(rate, site)
+        or "the vehicle turned or travelled, or the bias of the gyros is larger than stated "
+        f"({bias:.3g} deg/h): align while it stands, or state the right sensor",
     )
+    if size > 2.0 * earth + CONTRADICTION * sd:
+        raise DataError(told.what, file=told.file, quantity=told.quantity, remedy=told.remedy)
+    return (told,)
 
 
 def _refuse_motion(disturbed: Finding, heading_sd: float, source: str | None) -> None:
