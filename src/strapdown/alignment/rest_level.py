@@ -50,6 +50,11 @@ def level_at_rest(
         At the last sample. Where the force scatters more than by noise, that scatter and the
         angles by which the body swings are in the covariance, and a finding says so.
 
+    Notes
+    -----
+    `levelling.level` takes gravity for vertical; above the ellipsoid its north component is
+    ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is not taken off.
+
     Raises
     ------
     DataError
