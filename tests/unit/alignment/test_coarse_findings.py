@@ -96,7 +96,7 @@ def test_gravity_instead_of_specific_force(method, stood):
 @each_north
 def test_rates_in_degrees(method, stood):
     imu, _, sensors = stood
-    with pytest.raises(DataError, match="(?s)log.csv.*seem to be in deg/s"):
+    with pytest.raises(DataError, match=r"(?s)log.csv.*seem to be in deg/s"):
         method.align(scaled(imu, GYRO, 57.29578), SITE, sensors)
 
 
@@ -139,7 +139,7 @@ def test_gyros_too_poor_for_north(method):
 @pytest.mark.parametrize("lat", [90.0, -90.0, 89.99])
 def test_at_a_pole(method, lat):
     imu, _, sensors = unit(still(300.0, origin=Origin(lat, 0.0, 0.0)), 20.0, 3)
-    with pytest.raises(DataError, match="(?s)cannot find north.*not found near it"):
+    with pytest.raises(DataError, match=r"(?s)cannot find north.*not found near it"):
         method.align(imu, Site(lat, 0.0), sensors)
 
 
@@ -188,10 +188,10 @@ def moved(speed=((0.0,), (0.0,)), turn=((0.0,), (0.0,)), seed=3):
 )
 def test_a_vehicle_that_drives(speed):
     _, imu, truth, sensors = moved(speed=speed)
-    found = InertialFrame().align(imu, SITE, sensors)
-    assert "departs from gravity's by 3" in words(found)
-    assert found.sd_deg[2] > 20.0
-    assert chi_square(found, truth[-1]) < 16.0
+    with pytest.raises(
+        DataError, match=r"(?s)log.csv, accel: the body did not stay.*gnss_course while it drives"
+    ):
+        InertialFrame().align(imu, SITE, sensors)
     for method in (TwoVector(), KnownHeading(60.0, 0.1)):
         found = method.align(imu, SITE, sensors)
         assert "does not stand still" in words(found)
@@ -212,7 +212,7 @@ def test_a_steady_drive_needs_fixes_to_be_seen():
     motion, imu, truth, sensors = moved(speed=((0.0,), (10.0,)))
     fixes = simulate_gnss(motion, GnssReceiver(rate=1.0, velocity_noise=0.05), source="gnss.csv")
     for method in NORTH:
-        with pytest.raises(DataError, match="gnss.csv, row 1, VN, VE: the vehicle moves at 10"):
+        with pytest.raises(DataError, match=r"gnss.csv, row 1, VN, VE: the vehicle moves at 10"):
             method.align(imu, SITE, sensors, fixes)
         # Without them the Earth seems to turn otherwise: 10 m/s are 0.32 deg/h.
         found = method.align(imu, SITE, sensors)
@@ -264,5 +264,5 @@ def test_options_out_of_range():
 
 def test_a_body_that_points_to_the_zenith_has_no_heading():
     imu, _, sensors = unit(still(60.0, 0.0, 90.0, 0.0), 20.0, 3)
-    with pytest.raises(DataError, match="log.csv, pitch: the body points to the zenith"):
+    with pytest.raises(DataError, match=r"log.csv, pitch: the body points to the zenith"):
         KnownHeading(60.0, 0.1).align(imu, SITE, sensors)
