@@ -16,6 +16,7 @@ from strapdown.alignment.site import Site
 from strapdown.alignment.tilt_and_heading import error_of_force_and_heading
 from strapdown.exceptions import Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -61,7 +62,7 @@ def level_at_rest(
         As `record_checks.check_record` and `check_gravity`; the body points to the zenith or
         the nadir.
     """
-    source = imu.attrs.get("source")
+    source = source_of(imu)
     findings = [*check_record(imu)]
     means = block_means(imu, BLOCKS)
     findings += check_gravity(means.whole_force, source)
