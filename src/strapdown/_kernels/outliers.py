@@ -19,6 +19,8 @@ STRIDE = 3
 REPLACED, KEPT = 1, 2
 # Part of the residual that the straight lines from either side must confirm.
 CONFIRMED = 0.5
+# Part of it by which the two lines to a single sample may differ: at a step they do by twice it.
+APART = 0.75
 # Of the converter's step: rounding alone makes up to 1.6 of it.
 STEPS = 2.0
 # At an end of the record, where one window must do, its median scatters more.
@@ -107,9 +109,11 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, le
     last = x[j] - predicted(x, i, m, weights[m - 1, m - 1])
     if abs(first) <= least or abs(last) <= least:
         return False
-    if not same_side(x[i] - 2.0 * x[i - 1] + x[i - 2], first):
+    before = x[i] - 2.0 * x[i - 1] + x[i - 2]
+    behind = x[j] - 2.0 * x[j + 1] + x[j + 2]
+    if not (same_side(before, first) and same_side(behind, last)):
         return False
-    if not same_side(x[j] - 2.0 * x[j + 1] + x[j + 2], last):
+    if m == 1 and abs(before - behind) > APART * abs(first):
         return False
     a, b = abs(first) / factor, abs(last) / factor
     if not stands_out(left, 2 * m - 2, i, low, high, guard, window, a):

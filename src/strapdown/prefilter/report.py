@@ -19,7 +19,7 @@ Indices = NDArray[np.int64]
 __all__ = ["Changed", "PrefilterReport", "report_of"]
 
 # Flagged samples with fewer between them belong to one event.
-APART = 8
+APART = 32
 # Kept samples of a step, of which both sides stand out.
 OF_A_STEP = 4
 # A share of outliers above this is no rare fault.
