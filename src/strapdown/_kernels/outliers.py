@@ -83,6 +83,21 @@ def stands_out(left, row, i, low, high, guard, window, value):
     return not behind or median_below(left, row, c, d, value)
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def in_window(left, row, i, high, guard, window, factor):
+    """Whether a residual may stand out of the window behind it; for sure not, if not."""
+    if i + guard + window > high:
+        return True
+    value = abs(left[row, i]) / factor
+    most = (window + STRIDE - 1) // STRIDE // 2
+    for k in range(i + guard, i + guard + window, STRIDE):
+        if abs(left[row, k]) >= value:
+            most -= 1
+            if most < 0:
+                return False
+    return True
+
+
 @njit(cache=True, error_model="numpy")
 def half_range(x, i, m):
     """Half the range of the samples around a run, without it."""
@@ -172,7 +187,19 @@ def replace_outliers(
             continue
         least = STEPS * abs(state[0])
         found = 0
+        line = work[i] - 2.0 * work[i - 1] + work[i - 2]
+        # Most samples are settled without a call: by the residuals that are there already.
+        as_it_came = low < i < high - 1 and i >= state[1] + state[2] + NODES
         for m in range(min(runs, n - NODES - i), 0, -1):
+            if as_it_came:
+                j = i + m - 1
+                behind = work[j] - 2.0 * work[j + 1] + work[j + 2]
+                if not (
+                    same_side(line, left[2 * m - 2, i])
+                    and same_side(behind, left[2 * m - 1, i])
+                    and in_window(left, 2 * m - 2, i, high, guard, window, factor)
+                ):
+                    continue
             if is_run(work, left, i, m, low, high, weights, allowed, guard, window, factor, least):
                 found = m
                 break
@@ -207,6 +234,13 @@ def replace_outliers(
                     flags[j] = 0
             state[1], state[2] = i, found
             i += found
+            continue
+        if as_it_came and (
+            abs(left[0, i]) < abs(left[0, i - 1])
+            or abs(left[0, i]) < abs(left[0, i + 1])
+            or not in_window(left, 0, i, high, guard, window, factor)
+        ):
+            i += 1
             continue
         if is_odd(work, left, i, low, high, weights, allowed, guard, window, factor, least):
             flags[i] = KEPT

@@ -36,8 +36,8 @@ class Screened:
     values, raw : ndarray, (k, c)
         With outliers replaced, and as they came.
     flags : ndarray of int8, (k, c)
-        `REPLACED`, `KEPT` where a sample stands out but both sides do not agree that it should
-        not, as at a step, or zero.
+        `REPLACED`; `KEPT` where a sample stands out, more than those beside it, but the two sides
+        do not agree that it should not, as at a step; or zero.
     """
 
     first: int

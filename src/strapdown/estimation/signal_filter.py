@@ -180,7 +180,7 @@ class SignalFilter:
         new, P = np.empty((count, 2)), np.empty((count, 3))
         weight, expected = np.empty((count, size)), np.empty((count, size))
         for k in range(count):
-            form, x, told = self.form.epoch(form, Phi, Q, x, samples[k], H, R, self.rule)
+            form, x, told = self.form.epoch(form, Phi, Q, Phi @ x, samples[k], H, R, self.rule)
             new[k], weight[k], expected[k] = x, told.weight, samples[k] - told.nu
             full = self.form.matrix(form)
             P[k] = full[0, 0], full[0, 1], full[1, 1]
