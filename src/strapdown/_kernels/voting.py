@@ -15,7 +15,7 @@ from numba import njit
 # Rows of `facts`.
 NOISE2, BIAS2, DRIFT2, TIME, SCALE2, ACROSS2, OTHER2, STEP2 = range(8)
 # Places in `counts`.
-SAMPLES, LEARNED, TOLD, PAIR = range(4)
+SAMPLES, LEARNED = range(2)
 # Kinds of events.
 EXCLUDED, READMITTED, DISAGREE, TOO_FEW = range(4)
 SINGULAR = 1e-9
@@ -192,13 +192,14 @@ def vote(
     out,
     calm,
     alarms,
+    told,
     fused,
     used,
 ):
-    """Go over samples z, (n, m); `mean` to `alarms` are the state, and change.
+    """Go over samples z, (n, m); `mean` to `told` are the state, and change.
 
-    Returns events ``(row, kind, axis or group, next axis, size, chi-square, limit, since)``. A group
-    that failed as a whole is ``-2 - group``.
+    Returns events ``(row, kind, axis or group, next axis, size, chi-square, limit, since)``. A
+    group that failed as a whole is ``-2 - group``.
     """
     n, m = z.shape
     windows = alpha.size
@@ -251,8 +252,9 @@ def vote(
                 alarms[s] = 0
             usual += 1 if alarms[s] == 0 else 0
         # What was told is told again only after it has been away for as long as one is kept out.
-        if usual == windows and counts[TOLD] > 0:
-            counts[TOLD] -= 1
+        if usual == windows:
+            for i in range(m):
+                told[i] = max(told[i] - 1, 0)
 
         for s in range(windows):
             if alarms[s] < persist[s]:
@@ -263,16 +265,15 @@ def vote(
                 count += 1 if out[i] == 0 else 0
                 y[i] = mean[s, i] - offset[i]
             which, first, following, size = isolate(axes, w, y, groups, limits, separation, x)
-            since = float(k + 1 - alarms[s])
+            row, since = float(k), float(k + 1 - alarms[s])
             limit = limits[count - 3]
             if which != -1:
                 for i in range(m):
                     if i == which or groups[i] == -2 - which:
                         out[i] = 1
                         calm[i] = 0
-                events.append(
-                    (float(k), float(EXCLUDED), float(which), float(following), size, chi[s], limit, since)
-                )  # fmt: skip
+                name = float(which)
+                events.append((row, float(EXCLUDED), name, -1.0, size, chi[s], limit, since))
                 for t in range(windows):
                     alarms[t] = 0
                 if counts[LEARNED] < learn:
@@ -283,14 +284,25 @@ def vote(
                 break
             if alarms[s] < 2 * persist[s]:
                 continue
-            pair = min(first, following) * m + max(first, following)
-            told = counts[TOLD] > 0 and counts[PAIR] == pair
-            counts[TOLD] = hold
-            if not told:
-                counts[PAIR] = pair
-                events.append(
-                    (float(k), float(DISAGREE), float(first), float(following), size, chi[s], limit, since)
-                )  # fmt: skip
+            # Beside what was told already: is there more?
+            for i in range(m):
+                if told[i] > 0:
+                    told[i] = hold
+                    if w[i] > 0.0:
+                        w[i] = 0.0
+                        count -= 1
+            if count <= 3:
+                continue
+            left = fit(axes, w, y, x)
+            if not left > limits[count - 3]:
+                continue
+            _, first, following, size = isolate(axes, w, y, groups, limits, separation, x)
+            if first < 0:
+                first, following = 0, -1
+            told[first] = hold
+            limit = limits[count - 3]
+            pair = float(first), float(following)
+            events.append((row, float(DISAGREE), pair[0], pair[1], size, left, limit, since))
 
         for i in range(m):
             if out[i] == 0 or not known[i]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -209,7 +209,7 @@ class AxisVoting:
     directions: ArrayLike
     errors: AxisErrors
     rate: float
-    rule: VotingRule = VotingRule()
+    rule: VotingRule = field(default_factory=VotingRule)
     groups: Sequence[int] | None = None
     apart: float = 0.0
 
@@ -260,11 +260,12 @@ class AxisVoting:
             np.zeros(m),
             np.zeros(m),
             np.zeros(3),
-            np.zeros(4, dtype=ints),
+            np.zeros(2, dtype=ints),
             np.zeros(m, dtype=ints),
             np.zeros(m, dtype=ints),
             np.zeros(m, dtype=ints),
             np.zeros(s, dtype=ints),
+            np.zeros(m, dtype=ints),
         )
         return VotingState(arrays, 0)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -22,7 +23,7 @@ from strapdown.sensors.health_log import WORDS
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.sensors.unit_checks import SAME_STAMP
-from strapdown.tables import ACCEL, GYRO, imu_table
+from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
 Array = NDArray[np.float64]
@@ -160,7 +161,7 @@ class UnitVoting:
 
     units: Sequence[MountedUnit]
     rate: float
-    rule: VotingRule = VotingRule()
+    rule: VotingRule = field(default_factory=VotingRule)
     gyro: AxisVoting = field(init=False)
     accel: AxisVoting = field(init=False)
 
@@ -220,13 +221,17 @@ class UnitVoting:
         gyro_state, rates = self.gyro.advance(state.gyro, gyro, force)
         accel_state, forces = self.accel.advance(state.accel, accel, rates.values)
         names = [u.name for u in self.units]
-        imu = imu_table(
-            time,
-            rates.values,
-            forces.values,
-            sampling=sampling,
-            source=f"the vote of {', '.join(names)}",
+        # Not `imu_table`: a segment may be one sample, and the values are finite.
+        imu = pd.DataFrame(
+            np.hstack([rates.values, forces.values]),
+            index=pd.Index(time, name="time"),
+            columns=[*GYRO, *ACCEL],
         )
+        imu.attrs = {
+            "sampling": sampling,
+            "source": f"the vote of {', '.join(names)}",
+            "axes": "forward-right-down",
+        }
         columns = (
             [f"{n}.{c}" for n in names for c in GYRO],
             [f"{n}.{c}" for n in names for c in ACCEL],
@@ -370,7 +375,7 @@ def _noise(voting: AxisVoting, used: Mask) -> Array:
 
 def _fused(voting: AxisVoting) -> TriadUncertainty:
     e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
-    parts = {}
+    parts: dict[str, Any] = {}
     for name in ("noise_density", "bias", "scale", "misalignment", "g_sensitivity"):
         variance = np.asarray(getattr(e, name)) ** 2
         x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, variance))).tolist()
