@@ -31,6 +31,7 @@ from strapdown.systems.alexiev.sampling import (
     final_error,
     scenario_motion,
 )
+from strapdown.systems.progress import Progress, silent
 from strapdown.systems.reproduction import (
     CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
@@ -44,7 +45,6 @@ from strapdown.systems.reproduction import (
 )
 from strapdown.tables import QUATERNION
 
-Progress = Callable[[str, float], None]
 Part = tuple[list[Statement], list[Table], list[Figure]]
 
 __all__ = ["PAPER", "reproduce_alexiev"]
@@ -81,11 +81,7 @@ ORDER = (
 )
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
-def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
+def reproduce_alexiev(progress: Progress = silent) -> Reproduction:
     """Re-make Figs. 2, 4, 5 and 6 of Alexiev (2021) and judge its statements.
 
     Parameters

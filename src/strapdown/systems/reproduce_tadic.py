@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from strapdown.systems.progress import Progress, silent
 from strapdown.systems.reproduction import (
     CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
@@ -30,7 +31,6 @@ from strapdown.systems.tadic import (
 )
 from strapdown.systems.tadic.experiment import RUNS, Experiments, run_experiment
 
-Progress = Callable[[str, float], None]
 Part = tuple[list[Statement], list[Table], list[Figure]]
 
 __all__ = ["PAPER", "reproduce_tadic"]
@@ -79,11 +79,7 @@ TABLES = (
 )
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
-def reproduce_tadic(progress: Progress = _silent) -> Reproduction:
+def reproduce_tadic(progress: Progress = silent) -> Reproduction:
     """Re-make the crash test of Tadic and Vukajlovic (2016) and judge its statements.
 
     Parameters
