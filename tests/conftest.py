@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from hashlib import sha256
 from importlib import import_module
@@ -30,13 +30,12 @@ def recordings():
     return find
 
 
-@pytest.fixture(scope="module")
-def sketched():
-    """Charts are written as the digest of what is to be drawn, for tests that look at no picture.
+@contextmanager
+def _sketching():
+    """Charts are written as the digest of what is to be drawn, and not drawn.
 
     Drawing is most of the time of a report. A chart with another number is another sketch, so that
-    what is sealed and made again is compared as ever. Not for a module whose tests make what the
-    whole session reads.
+    what is sealed and made again is compared as ever.
     """
     from strapdown.report.plotly_chart import figure
 
@@ -52,6 +51,20 @@ def sketched():
     with pytest.MonkeyPatch.context() as patch:
         for name in ("svg_chart", "attitude", "reproduction", "trajectory_simulation"):
             patch.setattr(import_module(f"strapdown.report.{name}"), "draw", sketch)
+        yield
+
+
+@pytest.fixture
+def sketched():
+    """No chart is drawn in a test that looks at no picture."""
+    with _sketching():
+        yield
+
+
+@pytest.fixture(scope="module")
+def sketched_module():
+    """As `sketched`, for a module whose own fixtures write reports; none of the session may."""
+    with _sketching():
         yield
 
 

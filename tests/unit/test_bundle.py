@@ -11,7 +11,7 @@ from strapdown import bench_attitude, simulate, verify, write_attitude
 from strapdown.bundle import MANIFEST, sha256, write_bundle
 from strapdown.exceptions import ConfigError, DataError
 
-pytestmark = pytest.mark.usefixtures("sketched")
+pytestmark = pytest.mark.usefixtures("sketched_module")
 
 
 @pytest.fixture(scope="module")
@@ -23,7 +23,7 @@ def log(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def sealed(log, tmp_path_factory, sketched):
+def sealed(log, tmp_path_factory, sketched_module):
     bench = bench_attitude(
         log, reference=["end same as 4.5", str(log.with_name("truth.csv"))], gyro_bias=str(log)
     )
