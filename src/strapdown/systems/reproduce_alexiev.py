@@ -37,15 +37,12 @@ from strapdown.systems.reproduction import (
     DOES_NOT_HOLD,
     HOLDS,
     HOLDS_WHEN,
-    Figure,
+    Part,
     Reproduction,
-    Statement,
-    Table,
     amount,
+    put_together,
 )
 from strapdown.tables import QUATERNION
-
-Part = tuple[list[Statement], list[Table], list[Figure]]
 
 __all__ = ["PAPER", "reproduce_alexiev"]
 
@@ -105,15 +102,9 @@ def reproduce_alexiev(progress: Progress = silent) -> Reproduction:
         ("growth of errors", _growth),
         ("effort", _effort),
     )
-    statements: list[Statement] = []
-    tables: list[Table] = []
-    figures: list[Figure] = []
-    for k, (stage, make) in enumerate(parts):
-        progress(stage, k / (len(parts) + 2))
-        judged, listed, drawn = make()
-        statements += judged
-        tables += listed
-        figures += drawn
+    statements, tables, figures = put_together(
+        parts, lambda stage, share: progress(stage, 0.8 * share)
+    )
     statements.sort(key=lambda s: ORDER.index(s.key))
     made = Reproduction(
         "alexiev", PAPER, "", tuple(statements), tuple(tables), tuple(figures), CONVENTIONS

@@ -11,10 +11,9 @@ from strapdown.systems.reproduction import (
     DOES_NOT_HOLD,
     HOLDS,
     HOLDS_WHEN,
-    Figure,
+    Part,
     Reproduction,
-    Statement,
-    Table,
+    put_together,
 )
 from strapdown.systems.tadic import (
     better_sensors,
@@ -30,8 +29,6 @@ from strapdown.systems.tadic import (
     sensors,
 )
 from strapdown.systems.tadic.experiment import RUNS, Experiments, run_experiment
-
-Part = tuple[list[Statement], list[Table], list[Figure]]
 
 __all__ = ["PAPER", "reproduce_tadic"]
 
@@ -111,15 +108,9 @@ def reproduce_tadic(progress: Progress = silent) -> Reproduction:
         ("Fig. 9", lambda: _displacement(made)),
         ("better sensors", _better),
     )
-    statements: list[Statement] = []
-    tables: list[Table] = []
-    figures: list[Figure] = []
-    for k, (stage, make) in enumerate(parts):
-        progress(stage, 0.5 + 0.4 * k / len(parts))
-        judged, listed, drawn = make()
-        statements += judged
-        tables += listed
-        figures += drawn
+    statements, tables, figures = put_together(
+        parts, lambda stage, share: progress(stage, 0.5 + 0.4 * share)
+    )
     statements.sort(key=lambda s: ORDER.index(s.key))
     tables.sort(key=lambda t: TABLES.index(t.slug))
     whole = Reproduction(
