@@ -27,6 +27,7 @@ __all__ = [
     "FineSpec",
     "LogTable",
     "OutputTable",
+    "PrefilterSpec",
     "ReferenceTable",
     "SensorsTable",
     "SimulationTable",
@@ -114,6 +115,12 @@ class CoarseSpec(ChoiceSpec):
     duration_s: Positive | None = None
 
 
+class PrefilterSpec(ChoiceSpec):
+    """What the samples pass before they are aligned."""
+
+    kind: str = "none"
+
+
 class FineSpec(ChoiceSpec):
     """The fine alignment: after the coarse one where that has an end of its own, else over all."""
 
@@ -151,6 +158,7 @@ class AlignmentSpec(TableSpec):
     axes: AxesTable = AxesTable()
     site: SiteTable
     sensors: SensorsTable = SensorsTable()
+    prefilter: PrefilterSpec = PrefilterSpec()
     coarse: CoarseSpec = CoarseSpec()
     fine: FineSpec = FineSpec()
     reference: ReferenceTable | None = None

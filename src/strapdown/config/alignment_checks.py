@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from strapdown.config.alignment import AlignmentSpec
@@ -91,13 +92,13 @@ class _Checks:
         for name in ("matrix", "gyro_matrix", "accel_matrix"):
             matrix = getattr(axes, name)
             if matrix is not None:
-                self.told(("axes", name), lambda m=matrix, n=name: check_axes_matrix(m, n))
+                self.told(("axes", name), partial(check_axes_matrix, matrix, name))
 
     def log(self, spec: AlignmentSpec) -> None:
         for kind in ("gyro", "accel", "time"):
             unit = getattr(spec.log, f"{kind}_unit", None)
             if unit is not None:
-                self.told(("log", f"{kind}_unit"), lambda u=unit, k=kind: parse_unit(u, k))
+                self.told(("log", f"{kind}_unit"), partial(parse_unit, unit, kind))
 
     def sensors(self, spec: AlignmentSpec) -> None:
         from strapdown.sensors.catalogue import load_sensor
@@ -129,10 +130,14 @@ class _Checks:
 
     def times(self, spec: AlignmentSpec) -> None:
         log = spec.log
-        if log is not None and log.from_s is not None and log.to_s is not None:
-            if not log.from_s < log.to_s:
-                why = f"it ends before it begins, at {log.from_s:g} s"
-                raise self.refuse(("log", "to_s"), why, "give a later instant")
+        if (
+            log is not None
+            and log.from_s is not None
+            and log.to_s is not None
+            and not log.from_s < log.to_s
+        ):
+            why = f"it ends before it begins, at {log.from_s:g} s"
+            raise self.refuse(("log", "to_s"), why, "give a later instant")
         if spec.simulation is not None:
             longest = spec.simulation.duration_s
             if spec.simulation.rate_hz * longest > MOST_SAMPLES:
@@ -154,9 +159,8 @@ class _Checks:
 
     def stages(self, spec: AlignmentSpec) -> None:
         given = {"ellipsoid": spec.site.ellipsoid}
-        for name in ("coarse", "fine"):
-            choice = getattr(spec, name)
-            self.told((name,), lambda c=choice, n=name: make_choice(c, SLOTS[n], given))
+        for name in ("prefilter", "coarse", "fine"):
+            self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given))
 
 
 #: An hour at 4 kHz.

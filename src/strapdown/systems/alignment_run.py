@@ -20,6 +20,7 @@ from strapdown.config.choice import make_choice
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
+from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.results import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -47,6 +48,7 @@ class AlignmentResult:
     source : AlignmentSource
     imu : DataFrame
         Imu table as it was aligned, after the pre-filter.
+    prefilter : PrefilterReport or None
     site : Site
     sensors : ImuUncertainty
     coarse : Alignment
@@ -64,6 +66,7 @@ class AlignmentResult:
     spec: AlignmentSpec
     source: AlignmentSource
     imu: pd.DataFrame
+    prefilter: PrefilterReport | None
     site: Site
     sensors: ImuUncertainty
     coarse: Alignment
@@ -118,7 +121,12 @@ def run_alignment(
     given = {"ellipsoid": spec.site.ellipsoid}
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
-    imu = source.imu
+    imu, report = source.imu, None
+    prefilter: Prefilter | None = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+    if prefilter is not None:
+        progress("pre-filter", 0.08)
+        filtered = prefilter.apply(imu)
+        imu, report = filtered.imu, filtered.report
     progress("coarse alignment", 0.15)
     part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
     coarse = coarse_way.align(part, site, sensors)
@@ -143,11 +151,18 @@ def run_alignment(
         coarse_way, imu, site, sensors, attitude, fine, source.truth, spec.reference
     )
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
-    findings = [*source.findings, *coarse.findings, *(() if fine is None else fine.findings)]
+    of_filter = () if report is None else report.findings
+    findings = [
+        *source.findings,
+        *of_filter,
+        *coarse.findings,
+        *(() if fine is None else fine.findings),
+    ]
     return AlignmentResult(
         spec=spec,
         source=source,
         imu=imu,
+        prefilter=report,
         site=site,
         sensors=sensors,
         coarse=coarse,
@@ -182,7 +197,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
             quantity="time",
             remedy="align for longer",
         )
-    out = imu[kept]
+    out: pd.DataFrame = imu.loc[kept]
     out.attrs = dict(imu.attrs)
     return out
 

@@ -1,0 +1,249 @@
+"""What an alignment found, in sentences; terminal and page say the same."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown.alignment.alignment import Alignment
+from strapdown.constants import TWO_SIDED_95
+from strapdown.report.crash_values import GAP, about, plain
+from strapdown.report.document import KeyFigure
+from strapdown.rotation import within_half_turn
+from strapdown.systems.alignment_readiness import reference_offset
+from strapdown.systems.alignment_run import AlignmentResult
+from strapdown.tables import EULER, QUATERNION
+from strapdown.tables.checks import values_of
+
+__all__ = [
+    "Trust",
+    "angle_bound",
+    "answer_error",
+    "headline",
+    "key_figures",
+    "limits",
+    "trust",
+]
+
+DEG_H = math.degrees(3600.0)
+UG = 1e6 / 9.80665
+ORDER = (2, 1, 0)  # heading first: it is the one that is hard
+WORDS = {
+    "trusted": "It can be trusted",
+    "reserve": "It can be used with reserve",
+    "distrusted": "It should not be trusted",
+}
+
+
+@dataclass(frozen=True)
+class Trust:
+    """Whether the answer can be trusted, and why.
+
+    Attributes
+    ----------
+    verdict : {'trusted', 'reserve', 'distrusted'}
+    reasons : tuple of (bool, str)
+        What speaks for it, and what against.
+    """
+
+    verdict: str
+    reasons: tuple[tuple[bool, str], ...]
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words, with what speaks against it."""
+        against = [why for good, why in self.reasons if not good]
+        said = WORDS[self.verdict]
+        return f"{said}: {'; '.join(against)}." if against else f"{said}."
+
+
+def angle_bound(alignment: Alignment, which: int) -> str:
+    """An angle with its bound: ``90.60° ± 0.12°``."""
+    value = float(alignment.roll_pitch_heading[which])
+    half = TWO_SIDED_95 * float(alignment.sd_deg[which])
+    if which == 2:
+        value %= 360.0
+    return about(value, half, "°")
+
+
+def headline(result: AlignmentResult) -> str:
+    """Return the answer in one sentence."""
+    end = result.end
+    angles = ", ".join(f"{EULER[k]} {angle_bound(end, k)}" for k in ORDER)
+    return f"{angles[0].upper()}{angles[1:]} at {end.time:.6g} s (bounds of 95 %)."
+
+
+def key_figures(result: AlignmentResult) -> tuple[KeyFigure, ...]:
+    """Return the numbers of the top of the page."""
+    out = []
+    for k in ORDER:
+        half = TWO_SIDED_95 * float(result.end.sd_deg[k])
+        out.append(
+            KeyFigure(
+                EULER[k].capitalize(),
+                angle_bound(result.end, k),
+                f"95{GAP}% bound; standard deviation {plain(half / TWO_SIDED_95, _places(half))}°",
+                f"at the end; at the start {angle_bound(result.start, k)}",
+            )
+        )
+    return tuple(out)
+
+
+def _places(half: float) -> int:
+    return min(5, max(1, 2 - math.floor(math.log10(half)))) if half > 0 else 2
+
+
+def answer_error(result: AlignmentResult) -> tuple[str, np.ndarray, float] | None:
+    """What the answer is off from the truth or from a reference, deg, with the reference's sd.
+
+    Returns
+    -------
+    tuple or None
+        ``truth`` or the reference's name; roll, pitch, heading; standard deviation in deg.
+    """
+    if result.source.truth is not None:
+        known = result.source.truth
+        row = int(np.argmin(np.abs(known.index.to_numpy() - result.end.time)))
+        off = result.end.roll_pitch_heading - values_of(known, EULER)[row]
+        return "the truth", np.asarray(within_half_turn(off)), 0.0
+    stated = result.spec.reference
+    if stated is None:
+        return None
+    off = reference_offset(result.attitude, stated)
+    return stated.source or "the reference", off, stated.sd_deg
+
+
+def trust(result: AlignmentResult) -> Trust:
+    """Judge the answer by what its own record says against it."""
+    reasons: list[tuple[bool, str]] = []
+    known = answer_error(result)
+    sd = result.end.sd_deg
+    if known is not None:
+        name, off, own = known
+        bound = TWO_SIDED_95 * np.hypot(sd, own)
+        for k in ORDER:
+            if math.isfinite(off[k]):
+                good = bool(abs(off[k]) <= 1.5 * bound[k])
+                within = "within" if abs(off[k]) <= bound[k] else "outside"
+                reasons.append(
+                    (
+                        good,
+                        f"the {EULER[k]} is {_small(off[k])}° from {name}, {within} its bound of "
+                        f"{_small(bound[k])}°",
+                    )
+                )
+    reasons += _agreement(result)
+    reasons += _surprises(result)
+    unsteady = [f for f in result.coarse.findings if "does not stand still" in f.what]
+    if unsteady:
+        reasons.append((False, "the body moves more than the method allows for"))
+    against = [why for good, why in reasons if not good]
+    verdict = "trusted" if not against else "reserve"
+    if len(against) > 1 or (against and known is not None and not reasons[0][0]):
+        verdict = "distrusted"
+    return Trust(verdict, tuple(reasons))
+
+
+def _agreement(result: AlignmentResult) -> list[tuple[bool, str]]:
+    """Coarse and fine alignment beside each other, at the end of the coarse one."""
+    if result.fine is None:
+        return []
+    time = result.attitude.index.to_numpy()
+    row = int(np.argmin(np.abs(time - result.coarse.time)))
+    here = values_of(result.attitude, EULER)[row]
+    off = within_half_turn(result.coarse.roll_pitch_heading - here)
+    bound = TWO_SIDED_95 * np.hypot(result.coarse.sd_deg, result.end.sd_deg)
+    out = []
+    for k in ORDER:
+        good = bool(abs(off[k]) <= bound[k])
+        word = "agree" if good else "do not agree"
+        out.append(
+            (
+                good,
+                f"coarse and fine alignment {word} in {EULER[k]}: they differ by "
+                f"{_small(off[k])}°, and may by {_small(bound[k])}°",
+            )
+        )
+    return out
+
+
+def _surprises(result: AlignmentResult) -> list[tuple[bool, str]]:
+    """Whether the innovations of the fine alignment are as large as they were expected."""
+    if result.fine is None:
+        return []
+    out = []
+    for name, table in result.fine.innovations.items():
+        labels = [c.removeprefix("nu ") for c in table.columns if c.startswith("nu ")]
+        ratios = [float(np.sqrt(np.mean(table[f"nu {x}"] ** 2 / table[f"s {x}"]))) for x in labels]
+        worst = max(ratios, default=0.0)
+        good = worst < 2.0
+        said = "as large as expected" if good else "larger than expected"
+        out.append(
+            (
+                good,
+                f"the {name} at rest is {said}: {worst:.2g} of its standard deviation "
+                "(root mean square, worst axis)",
+            )
+        )
+    return out
+
+
+def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
+    """Return what limits the answer, and what would help."""
+    out: list[tuple[str, str]] = []
+    site, sensors = result.site, result.sensors
+    c_nb = _mean_attitude(result)
+    across = abs(float(site.earth_rate[0]))
+    east = float(np.sqrt(np.sum((c_nb[1] * sensors.gyro.axis("bias")) ** 2)))
+    part = math.degrees(east / across) if across > 0 else math.inf
+    heading = float(result.end.sd_deg[2])
+    told = (
+        f"a gyro bias of {plain(east * DEG_H, 4)} deg/h about east, one standard deviation, is "
+        f"{_small(part)}° of heading at this latitude; all of the heading's standard deviation is "
+        f"{_small(heading)}°"
+    )
+    if part > 0.7 * heading:
+        why = "longer alignment at the same attitude does not help; better or calibrated gyros do"
+        out.append(("The bias of the gyros limits the heading", f"{told}: {why}."))
+    else:
+        why = "a longer or quieter alignment helps"
+        out.append(("Noise and motion limit the heading", f"{told}: {why}."))
+    g = float(np.linalg.norm(site.gravity))
+    level = c_nb[:2] * sensors.accel.axis("bias")
+    tilt = float(np.sqrt(np.sum(level**2, axis=1)).max())
+    out.append(
+        (
+            "The bias of the accelerometers limits roll and pitch",
+            f"{tilt * UG:.3g} µg, one standard deviation, are {_small(math.degrees(tilt / g))}° "
+            "of tilt; at one attitude no alignment can tell them apart.",
+        )
+    )
+    out += [(f.quantity or "Finding", _sentence(str(f.what))) for f in _told(result)]
+    return tuple(out)
+
+
+def _told(result: AlignmentResult) -> list:
+    fine = () if result.fine is None else result.fine.findings
+    return [*result.coarse.findings, *fine]
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."
+
+
+def _mean_attitude(result: AlignmentResult) -> np.ndarray:
+    from strapdown import rotation
+
+    middle = values_of(result.attitude, QUATERNION)[len(result.attitude) // 2]
+    return rotation.dcm_from_quaternion(middle)
+
+
+def _small(value: float) -> str:
+    """Two digits of a small number."""
+    size = abs(value)
+    if not math.isfinite(size):
+        return "–"
+    places = 2 if size == 0 else min(5, max(1, 1 - math.floor(math.log10(size))))
+    return plain(value, places)
