@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ from pydantic import ValidationError
 
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.alignment_file import alignment_spec
-from strapdown.exceptions import ConfigError, DataError, StrapdownError
+from strapdown.exceptions import ConfigError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.formats.columns import parse_column_option
 

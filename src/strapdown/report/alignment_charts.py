@@ -16,14 +16,12 @@ from strapdown.report.chart import (
     GREY,
     ORANGE,
     SKY,
-    VERMILLION,
     Chart,
     Fill,
     Level,
     Line,
     Panel,
     curve,
-    thin,
 )
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import ACCEL, EULER, GYRO
@@ -37,8 +35,8 @@ DEG_H = math.degrees(3600.0)
 UG = 1e6 / 9.80665
 _TIME = "time, s"
 _NAMES = ("x, forward", "y, right", "z, down")
-#: Smaller differences than these, in degrees, are no figures of an alignment.
-LEAST = 1e-5
+#: Differences below this part of the smallest bound are drawn as that.
+LEAST = 0.02
 _OFF = {
     "truth": "error",
     "reference": "off the reference",
@@ -48,7 +46,7 @@ _OFF_WORDS = {
     "truth": "Dots and the thin line: the error against the truth of the simulation.",
     "reference": "Dots and the thin line: the difference from the reference that is stated.",
     "answer": "Dots and the thin line: how far each is from the answer of the whole record, which "
-    "is no truth; the last ones are near it by themselves.",
+    "is no truth, and which they come to by themselves.",
 }
 
 
@@ -59,6 +57,9 @@ def readiness_chart(result: AlignmentResult) -> Chart:
     panels = []
     for title, angles in (("Heading", ("heading",)), ("Roll and pitch", ("roll", "pitch"))):
         lines: list[Line] = []
+        sds = [f"{a}_sd" for a in angles]
+        bounds = [t[sds].to_numpy() for t in (found.coarse, found.fine) if not t.empty]
+        least = LEAST * TWO_SIDED_95 * min(float(b.min()) for b in bounds) if bounds else 0.0
         for name, table, colour, dash in (
             ("coarse", found.coarse, ORANGE, "dash"),
             ("fine", found.fine, BLUE, "solid"),
@@ -67,9 +68,12 @@ def readiness_chart(result: AlignmentResult) -> Chart:
                 continue
             time = table.index.to_numpy(dtype=np.float64)
             kept = time > 0.0
-            sd = table[[f"{a}_sd" for a in angles]].to_numpy().max(axis=1)
+            sd = table[sds].to_numpy().max(axis=1)
             size = np.abs(table[[f"{a}_off" for a in angles]].to_numpy()).max(axis=1)
-            size = np.maximum(size, LEAST)
+            size = np.maximum(size, least)
+            if found.against == "answer" and name == "fine":
+                # It ends in the answer itself.
+                size[time > 0.9 * time[-1]] = np.nan
             lines.append(
                 Line(f"{name}: 95 % bound", time[kept], TWO_SIDED_95 * sd[kept], colour, dash, 2.4)
             )
@@ -80,7 +84,7 @@ def readiness_chart(result: AlignmentResult) -> Chart:
                     time[kept],
                     size[kept],
                     colour if dots else SKY,
-                    width=1.0,
+                    width=1.1,
                     points=dots,
                     dots=dots,
                     symbol="circle",
@@ -108,8 +112,7 @@ def signal_chart(result: AlignmentResult) -> Chart:
             if result.prefilter is not None:
                 lines.append(_signal("pre-filtered", result.imu, column, factor, SKY, 1.0))
             lines.append(_means(result.imu, column, factor))
-            axis = _NAMES[k] if label.startswith("rate") else _NAMES[k]
-            panels.append(Panel(label, tuple(lines), title=axis))
+            panels.append(Panel(label, tuple(lines), title=_NAMES[k]))
     told = "The thin curves are single samples, the black ones means over a second"
     if result.prefilter is not None:
         told += f", after the pre-filter '{result.prefilter.name}'"
@@ -157,7 +160,8 @@ def attitude_chart(result: AlignmentResult) -> Chart:
                 known = np.degrees(np.unwrap(np.radians(known)))
             lines.append(curve("truth", truth.index.to_numpy(), known, BLACK, "dot", buckets=800))
         half = TWO_SIDED_95 * float(result.end.sd_deg[k])
-        x, y = thin(time, values, 400)
+        step = max(1, len(time) // 400)
+        x, y = time[::step], values[::step]
         band = Fill("95 % bound", x, y - half, y + half, BLUE)
         panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,)))
     return Chart(
@@ -219,9 +223,7 @@ def innovation_chart(result: AlignmentResult) -> Chart | None:
         lines = []
         for k, label in enumerate(labels):
             ratio = values_of(table, [f"nu {label}"])[:, 0] / np.sqrt(table[f"s {label}"])
-            lines.append(
-                curve(f"{name}, {label.split(',')[0]}", time, ratio, AXIS_COLOURS[k % 3], width=0.9)
-            )
+            lines.append(curve("xyz"[k % 3], time, ratio, AXIS_COLOURS[k % 3], width=0.9))
         levels = (Level(TWO_SIDED_95, ""), Level(-TWO_SIDED_95, "95 %"))
         panels.append(Panel("in sd", tuple(lines), title=name.capitalize(), levels=levels))
     return Chart(
@@ -232,7 +234,3 @@ def innovation_chart(result: AlignmentResult) -> Chart | None:
         _TIME,
         tuple(panels),
     )
-
-
-#: Colour of what is against the answer.
-AGAINST = VERMILLION

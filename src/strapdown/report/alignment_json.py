@@ -134,8 +134,8 @@ def _thinned(table: pd.DataFrame) -> pd.DataFrame:
 
 def _rows(table: pd.DataFrame) -> list[dict[str, float | None]]:
     return [
-        {"time_s": float(time)} | {f"{k}_deg": _number(v) for k, v in row.items()}  # type: ignore[misc]
-        for time, row in table.iterrows()
+        {"time_s": time} | {f"{k}_deg": _number(v) for k, v in row.items()}
+        for time, row in zip(table.index.tolist(), table.to_dict("records"), strict=True)
     ]
 
 

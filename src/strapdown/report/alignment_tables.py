@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.report.alignment_words import DEG_H, ORDER, UG, angle_bound, answer_error
+from strapdown.report.alignment_words import (
+    DEG_H,
+    ORDER,
+    UG,
+    angle_bound,
+    answer_error,
+    bias_sd,
+)
 from strapdown.report.crash_values import about, plain
 from strapdown.report.document import TableBlock
 from strapdown.systems.alignment_run import AlignmentResult
@@ -49,19 +56,22 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
         return None
     end = result.fine.alignment
     rows = []
-    for name, bias, sd, before, factor, unit in (
-        ("gyro", end.gyro_bias, end.gyro_bias_sd, result.sensors.gyro, DEG_H, "deg/h"),
-        ("accelerometer", end.accel_bias, end.accel_bias_sd, result.sensors.accel, UG, "µg"),
+    of = result.sensors
+    gyro, accel = bias_sd(of.gyro, of.gyro_drift), bias_sd(of.accel, of.accel_drift)
+    for name, bias, sd, prior, factor, unit in (
+        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_H, "deg/h"),
+        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, UG, "µg"),
     ):
         assert bias is not None and sd is not None
-        prior = np.array(before.axis("bias"))
         for k, axis in enumerate(("x, forward", "y, right", "z, down")):
             known = 1.0 - float(sd[k] / prior[k]) if prior[k] > 0 else 0.0
             rows.append(
                 (
                     f"{name} {axis}",
                     about(factor * float(bias[k]), TWO_SIDED_95 * factor * float(sd[k]), unit),
-                    f"±\u00a0{plain(TWO_SIDED_95 * factor * float(prior[k]), 3)}\u00a0{unit}",
+                    _half(TWO_SIDED_95 * factor * float(prior[k]), unit),
+                    .removeprefix("0")
+                    .lstrip(".0"),
                     _found(known),
                 )
             )
@@ -69,8 +79,14 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
         ("sensor", "estimate", "before", "found by this rest"),
         tuple(rows),
         text=(0, 3),
-        caption="Bounds of 95 %. What a rest cannot find is told under what would help.",
+        caption="Bounds of 95 %. What this rest does not find, another attitude would.",
     )
+
+
+def _half(half: float, unit: str) -> str:
+    """A bound alone: ``± 0.02 deg/h``."""
+    text = about(0.0, half, unit)
+    return text[text.index("±") :]
 
 
 def _found(share: float) -> str:

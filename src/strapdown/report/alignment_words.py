@@ -6,12 +6,17 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.constants import TWO_SIDED_95
+from strapdown.exceptions import Finding
 from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import KeyFigure
 from strapdown.rotation import within_half_turn
+from strapdown.sensors.imu_uncertainty import BiasDrift
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.systems.alignment_readiness import reference_offset
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import EULER, QUATERNION
@@ -21,11 +26,14 @@ __all__ = [
     "Trust",
     "angle_bound",
     "answer_error",
+    "bias_sd",
     "headline",
     "key_figures",
     "limits",
     "trust",
 ]
+
+Array = NDArray[np.float64]
 
 DEG_H = math.degrees(3600.0)
 UG = 1e6 / 9.80665
@@ -46,17 +54,22 @@ class Trust:
     verdict : {'trusted', 'reserve', 'distrusted'}
     reasons : tuple of (bool, str)
         What speaks for it, and what against.
+    short : str
+        What speaks for it, in a few words.
     """
 
     verdict: str
     reasons: tuple[tuple[bool, str], ...]
+    short: str = ""
 
     @property
     def sentence(self) -> str:
         """The verdict in words, with what speaks against it."""
         against = [why for good, why in self.reasons if not good]
         said = WORDS[self.verdict]
-        return f"{said}: {'; '.join(against)}." if against else f"{said}."
+        if against:
+            return f"{said}: {'; '.join(against)}."
+        return f"{said}: {self.short}." if self.short else f"{said}."
 
 
 def angle_bound(alignment: Alignment, which: int) -> str:
@@ -95,7 +108,7 @@ def _places(half: float) -> int:
     return min(5, max(1, 2 - math.floor(math.log10(half)))) if half > 0 else 2
 
 
-def answer_error(result: AlignmentResult) -> tuple[str, np.ndarray, float] | None:
+def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
     """What the answer is off from the truth or from a reference, deg, with the reference's sd.
 
     Returns
@@ -143,7 +156,19 @@ def trust(result: AlignmentResult) -> Trust:
     verdict = "trusted" if not against else "reserve"
     if len(against) > 1 or (against and known is not None and not reasons[0][0]):
         verdict = "distrusted"
-    return Trust(verdict, tuple(reasons))
+    return Trust(verdict, tuple(reasons), _short(result, known is not None))
+
+
+def _short(result: AlignmentResult, known: bool) -> str:
+    parts = []
+    if known:
+        parts.append("it is as near to what is known from elsewhere as its bounds say")
+    if result.fine is not None:
+        parts.append("coarse and fine alignment agree")
+        parts.append("at rest the sensors showed what was expected of them")
+    else:
+        parts.append("nothing in the record speaks against it; no fine alignment confirms it")
+    return ", and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
 
 
 def _agreement(result: AlignmentResult) -> list[tuple[bool, str]]:
@@ -196,11 +221,11 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     site, sensors = result.site, result.sensors
     c_nb = _mean_attitude(result)
     across = abs(float(site.earth_rate[0]))
-    east = float(np.sqrt(np.sum((c_nb[1] * sensors.gyro.axis("bias")) ** 2)))
+    east = float(np.linalg.norm(c_nb[1] * bias_sd(sensors.gyro, sensors.gyro_drift)))
     part = math.degrees(east / across) if across > 0 else math.inf
     heading = float(result.end.sd_deg[2])
     told = (
-        f"a gyro bias of {plain(east * DEG_H, 4)} deg/h about east, one standard deviation, is "
+        f"a gyro bias of {_small(east * DEG_H)} deg/h about east, one standard deviation, is "
         f"{_small(part)}° of heading at this latitude; all of the heading's standard deviation is "
         f"{_small(heading)}°"
     )
@@ -211,8 +236,8 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
         why = "a longer or quieter alignment helps"
         out.append(("Noise and motion limit the heading", f"{told}: {why}."))
     g = float(np.linalg.norm(site.gravity))
-    level = c_nb[:2] * sensors.accel.axis("bias")
-    tilt = float(np.sqrt(np.sum(level**2, axis=1)).max())
+    level = c_nb[:2] * bias_sd(sensors.accel, sensors.accel_drift)
+    tilt = float(np.linalg.norm(level, axis=1).max())
     out.append(
         (
             "The bias of the accelerometers limits roll and pitch",
@@ -224,7 +249,12 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     return tuple(out)
 
 
-def _told(result: AlignmentResult) -> list:
+def bias_sd(triad: TriadUncertainty, drift: BiasDrift) -> Array:
+    """Standard deviation of the bias of each axis at an instant: what stays, and what drifts."""
+    return np.hypot(triad.axis("bias"), drift.triad)
+
+
+def _told(result: AlignmentResult) -> list[Finding]:
     fine = () if result.fine is None else result.fine.findings
     return [*result.coarse.findings, *fine]
 
@@ -233,9 +263,7 @@ def _sentence(text: str) -> str:
     return text if text.endswith(".") else f"{text}."
 
 
-def _mean_attitude(result: AlignmentResult) -> np.ndarray:
-    from strapdown import rotation
-
+def _mean_attitude(result: AlignmentResult) -> Array:
     middle = values_of(result.attitude, QUATERNION)[len(result.attitude) // 2]
     return rotation.dcm_from_quaternion(middle)
 
