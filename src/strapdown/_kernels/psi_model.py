@@ -38,7 +38,8 @@ def gravity_gradient(f, row, column, level, up, earth):
 
     Over the level surface gravity turns with the normal and grows towards the poles; with height
     its length changes as Bruns' formula has it, ``-g (sum of the curvatures) - 2 W²``, and its
-    direction by as much as the length does over the surface, as the field has no curl.
+    direction by as much as the length does over the surface, as the field has no curl. Returns
+    gravity.
     """
     kx, ky, kz = level[AXIS], level[AXIS + 1], level[AXIS + 2]
     sine = kz * up
@@ -68,6 +69,7 @@ def gravity_gradient(f, row, column, level, up, earth):
     f[row, column + 2] = f[row + 2, column] = steep * kx
     f[row + 1, column + 2] = f[row + 2, column + 1] = steep * ky
     f[row + 2, column + 2] = g * (2.0 * across + along * cosine2) + 2.0 * earth[RATE] ** 2
+    return g
 
 
 @njit(cache=True, error_model="numpy")
@@ -102,13 +104,19 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
     f[:, :] = 0.0
     minus_cross(f, 0, 0, wx, wy, wz)
     f[0, 3] = f[1, 4] = f[2, 5] = 1.0
-    gravity_gradient(f, 3, 0, level, up, earth)
+    g = gravity_gradient(f, 3, 0, level, up, earth)
     minus_cross(f, 3, 3, 2.0 * ex + wx, 2.0 * ey + wy, 2.0 * ez + wz)
     minus_cross(f, 3, 6, specific[0], specific[1], specific[2])
     minus_cross(f, 6, 6, ex + wx, ey + wy, ez + wz)
     couple(f, 3, matrix, accel, rate, force)
     couple(f, 6, matrix, gyro, rate, force)
     if held:
+        # What holds the height turns with the normal as gravity does: together they are as large
+        # as the vertical force that is felt.
+        bearing = up * specific[2] / g
+        for i in range(3, 5):
+            for j in range(2):
+                f[i, j] *= bearing
         f[2, :] = 0.0
         f[5, :] = 0.0
 

@@ -90,27 +90,28 @@ def shift(kx, ky, s, w, prime, slope, across, curvature, alt, e2, rx, ry, rz):
     """Tilt of the normal, as the tangent of its angle along xi and eta, and rise, by a straight way.
 
     A point of normal n and height h is ``(N + h) n - e² N s p``, p the Earth's axis and s = p . n.
-    So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s: one equation
-    for d, solved by one step of Newton from its first order. What is left out is of
-    ``e⁴ (r/R)³``.
+    So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s, of which the
+    first three orders in r are taken: what is left out is of ``e² (r/R)⁴`` and ``e⁴ (r/R)³``.
     """
+    far = prime + alt
     first = slope * curvature * (kx * rx + ky * ry)
-    change = first
-    tx, ty, t2, more, sine = 0.0, 0.0, 0.0, 0.0, 0.0
-    for again in range(2):
-        pull = e2 * change
-        more = rz + pull * s
-        u = more * across
-        inverse = across * (1.0 - u * (1.0 - u * (1.0 - u)))
-        tx = (rx + pull * kx) * inverse
-        ty = (ry + pull * ky) * inverse
-        t2 = tx * tx + ty * ty
-        if again == 0:
-            lost = t2 * (0.5 - 0.375 * t2)
-            sine = (1.0 - lost) * (kx * tx + ky * ty) - s * lost
-            found = slope * sine * (1.0 + 1.5 * e2 * s * w * w * sine)
-            change += (found - first) * (prime + alt) * curvature
-    rise = rz + (prime + alt + more) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
+    pull = e2 * first
+    u = (rz + pull * s) * across
+    tx, ty = (rx + pull * kx) * across, (ry + pull * ky) * across
+    t2 = tx * tx + ty * ty
+    sine = kx * tx + ky * ty
+    lost = 0.5 * t2
+    # The second and the third order of the change of s, but for what d's own have on it: that is
+    # the factor (N + h) / (M + h).
+    more = u * (u * sine + s * t2 - sine) - lost * (s + sine)
+    bend = 1.5 * e2 * s * w * w * (sine + more) * (sine + more)
+    pull = e2 * (first + slope * far * curvature * (more + bend))
+    u = (rz + pull * s) * across
+    inverse = across * ((1.0 - u) * (1.0 + u * u))
+    tx, ty = (rx + pull * kx) * inverse, (ry + pull * ky) * inverse
+    t2 = tx * tx + ty * ty
+    sine += more
+    rise = rz + (far + rz + pull * s) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
     return tx, ty, t2, rise
 
 
@@ -159,7 +160,7 @@ def body_to_level(q_ew, c, s, q_ib):
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def wander_step(
     q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, dt, phi, dv, dr, a, e2, gamma, k, rate, f, m
 ):
@@ -169,13 +170,12 @@ def wander_step(
     # One Newton step from its value a step before, as in `ned`.
     w = w * (1.5 - 0.5 * (1.0 - e2 * s2) * w * w)
     prime, slope, across, curvature = curving(w, alt, a, e2)
-    along = e2 * slope * across * curvature
     c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(
         q_wb[0], q_wb[1], q_wb[2], q_wb[3]
     )
     ux, uy, uz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv[0], dv[1], dv[2])
     sx, sy, sz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr[0], dr[1], dr[2])
-    lean, down, steep, loss, bend = gravity_parts(
+    lean, down, steep, loss, loss2 = gravity_parts(
         s2, alt, w, curvature, a, e2, gamma, k, f, m
     )
     vx, vy, vz = v
@@ -183,36 +183,54 @@ def wander_step(
     outward = -lean * alt * pz
     gx, gy, gz = outward * px, outward * py, -down
 
-    # Mean displacement over the step, by Hermite's cubic through its two ends.
+    # Mean displacement over the step, by Hermite's cubic through its two ends; as the force turns
+    # with the plumb line, which it meets, so must gravity.
     half = 0.5 * dt
     twelfth = TWELFTH * dt
     sixth = SIXTH * dt * dt
     lift = ox * vy - oy * vx
-    mx = half * vx + 0.5 * sx - twelfth * ux + sixth * (gx - (oy * vz - oz * vy))
-    my = half * vy + 0.5 * sy - twelfth * uy + sixth * (gy - (oz * vx - ox * vz))
+    swing = 0.25 * dt * gz
+    veer_x, veer_y = oy * vz - oz * vy, oz * vx - ox * vz
+    mx = half * vx + 0.5 * sx - twelfth * ux
+    my = half * vy + 0.5 * sy - twelfth * uy
+    mx += sixth * (gx - veer_x + swing * (oy + across * vx))
+    my += sixth * (gy - veer_y - swing * (ox - across * vy))
     mz = half * vz + 0.5 * sz - twelfth * uz + sixth * (gz - lift)
 
-    # Change of the normal to the mean place, and gravity there; as in `ned`, but that the level
-    # does not turn about the vertical.
-    toward = along * (px * mx + py * my)
-    nx = across * mx + toward * px
-    ny = across * my + toward * py
+    # Mean change of the normal, and gravity at the mean place. On the way over the Earth the body
+    # is turned back by its rate. What is of the second order grows with the square of time, whose
+    # mean is 4/3 of the square of the mean: so much of what climbing and the change of the
+    # curvature do, as in `shift`.
+    ex, ey = mx - sixth * veer_x, my - sixth * veer_y
+    sine = curvature * (px * ex + py * ey)
+    pull = e2 * slope * sine
+    u = (mz + pull * pz) * across
+    qx, qy = (ex + pull * px) * across, (ey + pull * py) * across
+    more = -(u * sine + 0.5 * pz * (qx * qx + qy * qy))
+    bend = 1.5 * e2 * pz * w * w * sine * sine
+    pull = 2.0 * TWO_THIRDS * e2 * slope * (prime + alt) * curvature * across * (more + bend)
+    u *= 2.0 * TWO_THIRDS
+    nx, ny = qx - u * qx + pull * px, qy - u * qy + pull * py
     north = px * nx + py * ny
     rise = TWO_THIRDS * (mx * nx + my * ny) + mz - sixth * lift
     inward = lean * (alt * north + rise * pz)
     level = lean * alt * s2
     more_x = level * nx - inward * px
     more_y = level * ny - inward * py
-    more_z = -(pz * steep * north + rise * (loss + rise * bend))
+    more_z = -(pz * steep * north + rise * (loss + rise * loss2))
     gx += more_x
     gy += more_y
     gz += more_z
-    zx = half * ox - ny
-    zy = half * oy + nx
+    # The level's change is in axes that the Earth has turned: twice as much of the product of the
+    # two as in the square of their sum.
     zz = half * oz
+    zx = half * ox - (ny + TWO_THIRDS * zz * nx)
+    zy = half * oy + (nx - TWO_THIRDS * zz * ny)
+    # Of turn and change, too, the product grows with the square of time.
+    grown = gz + THIRD * more_z
     second = TWO_THIRDS * gz
-    turn_x = zy * gz - zz * gy + second * zx * zz
-    turn_y = zz * gx - zx * gz + second * zy * zz
+    turn_x = zy * grown - zz * gy + second * zx * zz
+    turn_y = zz * gx - zx * grown + second * zy * zz
     turn_z = zx * gy - zy * gx - second * (zx * zx + zy * zy)
     dt2 = dt * dt
     rx = dt * (vx - (oy * mz - oz * my)) + sx + dt2 * (0.5 * gx - SIXTH * more_x + THIRD * turn_x)
@@ -316,9 +334,8 @@ def wander_advance(state, increments, reference, earth, options, history):
     why = DONE
     made = steps
     for i in range(steps):
-        before = alt
         dt = increments[i, 0]
-        q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, t2 = wander_step(
+        e1, e2_low, alt1, v1, b1, i1, i_low, spin1, w1, t2 = wander_step(
             q_ew,
             low_ew,
             alt,
@@ -344,24 +361,29 @@ def wander_advance(state, increments, reference, earth, options, history):
             height = math.nan
             if reference.shape[0] > 0:
                 height = reference[i]
-            alt, vd, pull, since = guide_height(
-                alt, -v[2], pull, since, before, height, dt, mode, tau, spring
+            alt1, vd, pull1, since1 = guide_height(
+                alt1, -v1[2], pull, since, alt, height, dt, mode, tau, spring
             )
-            v = (v[0], v[1], -vd)
-        why = wander_verdict(alt, v, q_wb, q_ew, t2, speed, lowest, highest)
+            v1 = (v1[0], v1[1], -vd)
+        why = wander_verdict(alt1, v1, b1, e1, t2, speed, lowest, highest)
         if why != DONE:
             made = i
             break
+        if mode != FREE:
+            pull, since = pull1, since1
+        q_ew, low_ew, alt, v, q_wb, q_ib, low_ib = e1, e2_low, alt1, v1, b1, i1, i_low
+        spin, w = spin1, w1
         history[i, 0], history[i, 1], history[i, 2], history[i, 3] = q_ew
         history[i, ALT] = alt
         history[i, 5], history[i, 6], history[i, 7] = v
         history[i, 8], history[i, 9], history[i, 10], history[i, 11] = q_wb
-        put(state, Q_IB, q_ib)
-        put(state, LOW_EW, low_ew)
-        put(state, LOW_IB, low_ib)
-        put(state, SPIN, spin)
-        state[PRIME], state[PULL], state[SINCE] = w, pull, since
-    if made > 0:
-        for j in range(ROW):
-            state[j] = history[made - 1, j]
+    put(state, Q_EW, q_ew)
+    state[ALT] = alt
+    put(state, V, v)
+    put(state, Q_WB, q_wb)
+    put(state, Q_IB, q_ib)
+    put(state, LOW_EW, low_ew)
+    put(state, LOW_IB, low_ib)
+    put(state, SPIN, spin)
+    state[PRIME], state[PULL], state[SINCE] = w, pull, since
     return made, why

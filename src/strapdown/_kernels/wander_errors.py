@@ -13,9 +13,9 @@ the Earth and of the computed body relative to inertial space:
     eps'   = -(W + w_ew) x eps + C dw_ib
 
 The level axes have the Earth's axis p (unit vector) where the true ones have p - dp,
-``dp = p x theta``; so dW is the Earth's rate along it, dg the slope of gravity along the sine of the
-latitude, which is the third component of p, and dw has a part from dV and one from dp. States:
-theta (3), dV (3), eps (3), then k states of the sensors. There is no state of the height.
+``dp = p x theta``; so dW is the Earth's rate along it, dg the slopes of gravity along p, whose third
+component is the sine of the latitude, and dw has a part from dV and one from dp. States: theta (3),
+dV (3), eps (3), then k states of the sensors. There is no state of the height.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import math
 
 from numba import njit
 
-from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
+from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_parts, radii
 from strapdown._kernels.level import ALT, AXIS, LEVEL, OMEGA_EL, V_L, curvatures
 from strapdown._kernels.psi_model import (
     compose_transition,
@@ -51,17 +51,20 @@ def curvature_slopes(sine, alt, a, e2, across, along):
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def gravity_slope(sine, alt, earth):
-    """Derivative of the length of normal gravity by the sine of the latitude, m/s²."""
+@njit(cache=True, error_model="numpy")
+def add_gravity_slopes(level, earth, by_p):
+    """Add the derivatives of gravity, components in w, by the Earth's axis.
+
+    On the ellipsoid it is along -zeta; above, it has a part along the horizontal part of the axis.
+    """
+    sine, alt = level[AXIS + 2], level[ALT]
     w = 1.0 / math.sqrt(1.0 - earth[E2] * sine * sine)
-    # Slopes by latitude have a factor cosine, which is taken as 1 here.
-    _, _, _, _, slope, _, _ = gravity_around(
-        sine,
-        1.0,
+    meridian, _ = radii(sine, earth[A], earth[E2])
+    slope, _, steep, _, _ = gravity_parts(
+        sine * sine,
         alt,
         w,
-        0.0,
+        1.0 / (meridian + alt),
         earth[A],
         earth[E2],
         earth[GAMMA],
@@ -69,7 +72,11 @@ def gravity_slope(sine, alt, earth):
         earth[F],
         earth[M],
     )
-    return slope
+    by_p[0, 0] -= slope * alt * sine
+    by_p[1, 1] -= slope * alt * sine
+    by_p[0, 2] -= slope * alt * level[AXIS]
+    by_p[1, 2] -= slope * alt * level[AXIS + 1]
+    by_p[2, 2] -= sine * steep
 
 
 @njit(cache=True, error_model="numpy")
@@ -136,7 +143,7 @@ def wander_dynamics(
         turn[0, j] = vy * c - vz * b
         turn[1, j] = vz * a - vx * c
         turn[2, j] = vx * b - vy * a
-    turn[2, 2] -= gravity_slope(pz, level[ALT], earth)
+    add_gravity_slopes(level, earth, turn)
     minus_cross(f, DV, THETA, -specific[0], -specific[1], -specific[2])
     plus_product(f, DV, THETA, turn, px, py, pz, 1.0)
     minus_cross(f, DV, EPS, specific[0], specific[1], specific[2])

@@ -9,7 +9,7 @@ from numba import njit
 
 from strapdown._kernels.earth import E2, A
 from strapdown._kernels.level import ALT as LEVEL_ALT
-from strapdown._kernels.level import AXIS, LEVEL, OMEGA_EL, Q_LB, V_L, curvatures
+from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L, curvatures
 from strapdown._kernels.ned import turn_back
 from strapdown._kernels.rotation import (
     DEGREES,
@@ -103,10 +103,11 @@ def wander_places(history, out):
                 history[i, V],
                 history[i, V + 1],
                 history[i, V + 2],
-                history[i, Q_WB],
-                history[i, Q_WB + 1],
-                history[i, Q_WB + 2],
-                history[i, Q_WB + 3],
+                # Half a turn and half a turn is a turn, of which the quaternion is -1.
+                -history[i, Q_WB],
+                -history[i, Q_WB + 1],
+                -history[i, Q_WB + 2],
+                -history[i, Q_WB + 3],
             ),
         )
 

@@ -15,17 +15,16 @@ from strapdown.alignment.fine_findings import fine_findings
 from strapdown.alignment.fine_result import Epochs, FineResult
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
+    OBSERVATIONS,
     Standing,
     home_of,
     measured_standing,
-    position_observation,
-    rate_observation,
-    velocity_observation,
+    observations,
 )
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
-from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
+from strapdown.estimation.error_model import PHYSICAL, ErrorModel
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.resting_sensors import resting_states
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
@@ -91,10 +90,10 @@ class FineAlignment:
 
     mechanization: Mechanization = field(default_factory=NorthEastDown)
     model: type[ErrorModel] = RotationVectorModel
-    form: CovarianceForm = field(default_factory=COVARIANCES["joseph"])
+    form: CovarianceForm = field(default_factory=COVARIANCES["ud"])
     rule: UpdateRule | None = None
     interval: float = 1.0
-    observe: tuple[str, ...] = ("rate", "position", "velocity")
+    observe: tuple[str, ...] = OBSERVATIONS
     standing: Standing | None = None
 
     def __post_init__(self) -> None:
@@ -197,6 +196,7 @@ class FineAlignment:
             history=epochs.history(),
             innovations=epochs.innovations(),
             standing=standing,
+            interval=self.interval,
             filter=filter_,
             state=state,
             source=imu.attrs.get("source"),
@@ -244,9 +244,6 @@ class FineAlignment:
         return replace(last, time=back.end.time, q_nb=back.end.q_nb)
 
 
-OBSERVATIONS = ("rate", "position", "velocity")
-
-
 def settled(
     filter_: ErrorFilter,
     state: FilterState,
@@ -282,11 +279,9 @@ def settled(
     at = 0
     for end in ends.tolist():
         state, segment = filter_.predict(state, time[at:end], rows[at:end])
-        seen: dict[str, tuple[Observation, Innovations]] = {}
-        for name in observe:
-            observation = _observation(name, filter_, state, segment, home, standing)
-            state, innovations = filter_.observe(state, observation)
-            seen[name] = (observation, innovations)
+        made = observations(filter_, state, segment, home, standing, observe)
+        state, innovations = filter_.observe(state, made)
+        seen = {one.name: (one, of) for one, of in zip(made, innovations, strict=True)}
         yield state, seen
         at = end
 
@@ -314,18 +309,3 @@ def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standi
         P[at:end, at:end] = np.diag(block.sd**2)
         at = end
     return P
-
-
-def _observation(
-    name: str,
-    filter_: ErrorFilter,
-    state: FilterState,
-    segment: Segment,
-    home: NavState,
-    standing: Standing,
-) -> Observation:
-    if name == "rate":
-        return rate_observation(filter_, segment, standing)
-    if name == "position":
-        return position_observation(filter_, state, home, standing)
-    return velocity_observation(filter_, state, standing)

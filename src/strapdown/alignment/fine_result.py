@@ -45,6 +45,8 @@ class FineResult:
         ``nu x, m/s``.
     standing : Standing
         How still the body stood.
+    interval : float, s
+        From epoch to epoch.
     filter : ErrorFilter
     state : FilterState
         At the last epoch: navigation goes on from here.
@@ -57,6 +59,7 @@ class FineResult:
     history: pd.DataFrame
     innovations: Mapping[str, pd.DataFrame]
     standing: Standing
+    interval: float
     filter: ErrorFilter = field(repr=False)
     state: FilterState = field(repr=False)
     findings: tuple[Finding, ...] = ()

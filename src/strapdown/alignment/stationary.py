@@ -6,6 +6,7 @@ Chernodarov (2009), Eqs. (16)-(18): the rate of the Earth, the place, no velocit
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,8 @@ from strapdown.nav_state import NavState
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
+#: What a rest tells: the Earth's rate, the place, no velocity.
+OBSERVATIONS = ("rate", "position", "velocity")
 # Fewer say little of how much they vary.
 LEAST_STRETCHES = 8
 
@@ -46,6 +49,43 @@ class Standing:
     position: Array
     velocity: Array
     turn: Array
+
+
+def observations(
+    filter_: ErrorFilter,
+    state: FilterState,
+    segment: Segment,
+    home: NavState,
+    standing: Standing,
+    names: Sequence[str],
+) -> list[Observation]:
+    """Make the observations of an epoch.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    state : FilterState
+        At the end of the segment.
+    segment : Segment
+    home : NavState
+        The place of alignment.
+    standing : Standing
+    names : sequence of str
+        Of `OBSERVATIONS`.
+
+    Returns
+    -------
+    list of Observation
+    """
+    made = []
+    for name in names:
+        if name == "rate":
+            made.append(rate_observation(filter_, segment, standing))
+        elif name == "position":
+            made.append(position_observation(filter_, state, home, standing))
+        else:
+            made.append(velocity_observation(filter_, state, standing))
+    return made
 
 
 def position_observation(

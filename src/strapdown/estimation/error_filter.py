@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -49,6 +50,10 @@ class FilterState:
 @dataclass(frozen=True)
 class ErrorFilter:
     """Closed loop: what is estimated is taken off the mechanization and off the sensors at once.
+
+    Errors are computed less true, and so those of the sensors are what their readings are still
+    too large by after the estimates have been taken off: true error less estimate. In the
+    covariance, the signs between attitude and biases are those of these errors.
 
     It holds no state: `begin` makes one, `predict` and `observe` give a new one.
 
@@ -165,29 +170,30 @@ class ErrorFilter:
         )
 
     def observe(
-        self, state: FilterState, observation: Observation
-    ) -> tuple[FilterState, Innovations]:
-        """Take an observation, and take off what it tells of the errors.
+        self, state: FilterState, observations: Sequence[Observation]
+    ) -> tuple[FilterState, list[Innovations]]:
+        """Take the observations of an epoch, and take off what they tell of the errors.
 
         Parameters
         ----------
         state : FilterState
-        observation : Observation
-            Of this state.
+        observations : sequence of Observation
+            Of this state, independent of each other.
 
         Returns
         -------
         state : FilterState
-        innovations : Innovations
+        innovations : list of Innovations
+            Of each observation.
         """
         used = self.mechanization
         to_physical = self.model.to_physical(used, state.time, state.row)
-        covariance, x, innovations = self.form.update(
+        covariance, x, seen = self.form.update(
             state.covariance,
             np.zeros(to_physical.shape[1]),
-            observation.z,
-            np.ascontiguousarray(observation.H @ to_physical),
-            observation.R,
+            np.concatenate([one.z for one in observations]),
+            np.concatenate([one.H for one in observations]) @ to_physical,
+            np.concatenate([one.R for one in observations]),
             self.rule,
         )
         physical = to_physical @ x
@@ -206,7 +212,7 @@ class ErrorFilter:
                 sensors=state.sensors + physical[PHYSICAL:],
                 covariance=covariance,
             ),
-            innovations,
+            _split(seen, [one.z.size for one in observations]),
         )
 
     def physical_covariance(self, state: FilterState) -> Array:
@@ -218,3 +224,9 @@ class ErrorFilter:
 def symmetric(P: Array) -> Array:
     """Return the symmetric part of a square matrix."""
     return 0.5 * (P + P.T)
+
+
+def _split(seen: Innovations, sizes: Sequence[int]) -> list[Innovations]:
+    cuts = np.cumsum(sizes)[:-1]
+    parts = (np.split(values, cuts) for values in (seen.nu, seen.s, seen.weight))
+    return [Innovations(*one) for one in zip(*parts, strict=True)]

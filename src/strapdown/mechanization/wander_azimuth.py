@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from strapdown import rotation
 from strapdown._kernels import wander as kernel
 from strapdown._kernels import wander_level as level
+from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Array, Mechanization
@@ -103,9 +104,15 @@ class WanderAzimuth(Mechanization):
 
     def levels(self, history: Array) -> Array:
         """Return what a filter needs to know of each row, as `Mechanization.levels`."""
-        out = np.empty((len(history), level.LEVEL))
+        out = np.empty((len(history), LEVEL))
         level.wander_levels(history, find_ellipsoid(self.ellipsoid).parameters(), out)
         return out
+
+    def level_from_ned(self, row: Array) -> Array:
+        """Return the matrix from north-east-down to xi, eta, zeta, (3, 3)."""
+        angle = self.wander_angle(row[None, :])[0]
+        s, c = math.sin(angle), math.cos(angle)
+        return np.array([[s, c, 0.0], [c, -s, 0.0], [0.0, 0.0, -1.0]])
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
         """Take an error off a state, as `Mechanization.correct`."""
@@ -119,9 +126,7 @@ class WanderAzimuth(Mechanization):
         place = np.empty((1, 10))
         level.wander_places(state[None, : kernel.ROW], place)
         lat, lon, alt = place[0, :3].tolist()
-        return NavState(
-            time=time, lat=lat, lon=lon, alt=alt, v_n=place[0, 3:6], q_nb=place[0, 6:]
-        )
+        return NavState(time=time, lat=lat, lon=lon, alt=alt, v_n=place[0, 3:6], q_nb=place[0, 6:])
 
     def fill_trajectory(self, history: Array, out: Array) -> None:
         """Fill rows of a Trajectory table from rows of a history."""

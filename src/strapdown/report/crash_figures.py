@@ -18,7 +18,6 @@ from strapdown.report.crash_conventions import MountingPoint, conventions_pictur
 from strapdown.report.crash_delta_v import StatedDeltaV, delta_v_chart
 from strapdown.report.crash_dial import Direction, pdof_dial
 from strapdown.report.crash_direction import pdof_by_shift_chart, pdof_by_window_chart
-from strapdown.report.crash_moments import main_event
 from strapdown.report.crash_motion import (
     attitude_chart,
     place_chart,
@@ -30,8 +29,10 @@ from strapdown.report.crash_plan import path_plan
 from strapdown.report.crash_risk import risk_chart
 from strapdown.report.crash_signals import UnitSignals, unit_signals
 from strapdown.report.crash_units import accelerations_chart, differences_chart
+from strapdown.report.crash_values import axis_names
 from strapdown.report.document import Animation, Picture
 from strapdown.systems.case_references import ReferenceAnswer
+from strapdown.systems.case_severity import main_event
 from strapdown.systems.crash_case import CaseResult
 from strapdown.tables import NED
 
@@ -139,7 +140,7 @@ def crash_figures(result: CaseResult) -> CrashFigures:
     found, spec = result.reconstruction, result.spec
     main, events = found.main, found.main.events.events
     path, which = main.path, main_event(main)
-    names = _axis_names(result)
+    names = axis_names(result)[:2]
     outline, point = vehicle_outline(spec.vehicle), found.point
     gravity = spec.options.gravity_m_per_s2
     paths = [r for r in result.references if r.path is not None and r.unit == main.name]
@@ -241,14 +242,6 @@ def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataF
     own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
     at = errors.index.to_numpy(dtype=np.float64)
     return pd.DataFrame(own(at) - errors[NED].to_numpy(), index=errors.index, columns=NED)
-
-
-def _axis_names(result: CaseResult) -> tuple[str, str]:
-    """North and east where a heading was stated or found; else forward and right at the entry."""
-    heading = result.reconstruction.main.path.entry.heading_deg
-    if result.spec.entry.kind == "gnss" or heading:
-        return "north", "east"
-    return "forward", "right"
 
 
 def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:

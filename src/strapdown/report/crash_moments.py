@@ -23,7 +23,6 @@ __all__ = [
     "crash_span",
     "event_marks",
     "interval_words",
-    "main_event",
     "marks_apart",
     "path_moments",
     "signed",
@@ -59,12 +58,6 @@ def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
 def assumed_axes(unit: UnitReconstruction) -> tuple[str, ...]:
     """What of forward, right, down, roll, pitch, heading no sensor of a unit has measured."""
     return unit.at_point.assumed_axes
-
-
-def main_event(unit: UnitReconstruction) -> int | None:
-    """Number of the event with the largest change of velocity, from 0; None without any."""
-    sizes = [changes.event.resultant for changes in unit.body]
-    return int(np.argmax(sizes)) if sizes else None
 
 
 def crash_span(events: Sequence[CrashEvent], begin: float, end: float) -> tuple[float, float]:

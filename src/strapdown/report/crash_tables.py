@@ -10,7 +10,15 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.pdof_interval import AngleInterval
 from strapdown.crash.velocity_change import VelocityChange
-from strapdown.report.crash_values import KMH, about, axis_names, instant, plain, recorder
+from strapdown.report.crash_values import (
+    KMH,
+    about,
+    axis_names,
+    instant,
+    over_ground,
+    plain,
+    recorder,
+)
 from strapdown.report.document import TableBlock
 from strapdown.rotation import within_half_turn
 from strapdown.systems.case_severity import main_event
@@ -19,11 +27,10 @@ from strapdown.tables import NED
 
 __all__ = ["answers_table", "budget_table", "direction_table", "path_table"]
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
-AXES_WORDS = {
-    "north": "Axes: over ground.",
-    "forward": "Axes: forward and right as the vehicle stood at the entry; the heading counts from "
-    "there.",
-}
+OVER_GROUND = "Axes: over ground."
+FROM_THE_ENTRY = (
+    "Axes: forward and right as the vehicle stood at the entry; the heading counts from there."
+)
 
 
 def answers_table(result: CaseResult) -> TableBlock:
@@ -74,7 +81,7 @@ def answers_table(result: CaseResult) -> TableBlock:
 def direction_table(result: CaseResult) -> TableBlock:
     """Directions of force by window, along the axes of the vehicle and of the path."""
     rows: list[tuple[str, ...]] = []
-    ground = axis_names(result)[0] == "north"
+    ground = over_ground(result)
     for unit in result.reconstruction.answers:
         for k, (body, ned) in enumerate(zip(unit.body, unit.ned, strict=True)):
             for window in ("event", "peak"):
@@ -138,7 +145,7 @@ def path_table(result: CaseResult) -> TableBlock:
     rows = []
     for unit in result.reconstruction.answers:
         table, sd = unit.path.table.iloc[-1].copy(), unit.path.sd.iloc[-1]
-        if axis_names(result)[0] == "forward":
+        if not over_ground(result):
             # As the charts: from where it pointed, and not round the compass.
             table["heading"] = float(within_half_turn(table["heading"]))
         rows.append(
@@ -157,7 +164,7 @@ def path_table(result: CaseResult) -> TableBlock:
         tuple(rows),
         text=(0,),
         caption="Place of the reference point from that at the entry, and attitude; bounds hold "
-        "95 %. " + AXES_WORDS[axis_names(result)[0]],
+        "95 %. " + (OVER_GROUND if over_ground(result) else FROM_THE_ENTRY),
     )
 
 

@@ -17,6 +17,7 @@ __all__ = [
     "axis_names",
     "instant",
     "moment",
+    "over_ground",
     "plain",
     "recorder",
     "side_words",
@@ -132,12 +133,15 @@ def side_words(forward: float, right: float) -> str:
     return f"{ahead} and {aside}"
 
 
-def axis_names(result: CaseResult) -> tuple[str, str, str]:
-    """Return the names of the axes of the path: over ground where a heading is known."""
+def over_ground(result: CaseResult) -> bool:
+    """Whether a heading is known, so that the path is told over ground."""
     entry = result.spec.entry
-    if entry.kind == "gnss" or entry.heading_deg:
-        return ("north", "east", "down")
-    return ("forward", "right", "down")
+    return entry.kind == "gnss" or bool(entry.heading_deg)
+
+
+def axis_names(result: CaseResult) -> tuple[str, str, str]:
+    """Return the names of the axes of the path."""
+    return ("north", "east", "down") if over_ground(result) else ("forward", "right", "down")
 
 
 def spaced(text: str) -> str:

@@ -18,6 +18,7 @@ from strapdown.report.crash_values import (
     axis_names,
     instant,
     moment,
+    over_ground,
     plain,
     side_words,
     speed,
@@ -223,9 +224,7 @@ def _probability(value: float) -> str:
 
 
 def _axes(result: CaseResult) -> str:
-    if axis_names(result)[0] == "north":
-        return "over ground"
-    return "in the axes of the vehicle at the entry"
+    return "over ground" if over_ground(result) else "in the axes of the vehicle at the entry"
 
 
 def _end(unit: UnitReconstruction) -> tuple[list[float], list[float]]:

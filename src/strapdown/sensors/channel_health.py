@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.equal_runs import equal_runs
 
 __all__ = ["ChannelHealth", "Fault", "check_channel", "check_peers"]
 
@@ -240,21 +241,15 @@ def _arrays(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array
     return t, v
 
 
-def _runs(v: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Beginnings and lengths of runs of equal values."""
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(v) != 0.0]))
-    return starts.astype(np.int64), np.diff(np.append(starts, v.size)).astype(np.int64)
-
-
 def _usual_run(rest: Array) -> int:
     """Longest run of equal values at rest, which the steps of the converter make."""
-    longest = int(_runs(rest)[1].max())
+    longest = int(equal_runs(rest)[1].max())
     # A channel that never moves at rest, as one that is dead, tells no usual run.
     return 1 if longest == rest.size else longest
 
 
 def _stuck(t: Array, v: Array, usual: int, name: str) -> list[Fault]:
-    starts, lengths = _runs(v)
+    starts, lengths = equal_runs(v)
     step = float(t[-1] - t[0]) / (t.size - 1)
     limit = max(STUCK_LEAST, math.ceil(STUCK_TIME / step), STUCK_FACTOR * usual)
     k = int(np.argmax(lengths))
@@ -277,7 +272,7 @@ def _saturation(
             what = f"it reaches {size:.5g} of a range of {full_scale:.5g}, first at {at:.4f} s"
             remedy = "what it misses is not in its integral: take a higher range there"
             return [_fault("saturation", at, size, limit, name, what, remedy)]
-    starts, lengths = _runs(v)
+    starts, lengths = equal_runs(v)
     for extreme in (float(v.max()), float(v.min())):
         top = (v[starts] == extreme) & (lengths >= max(FLAT_TOP, 2 * usual))
         if top.any() and abs(extreme - float(np.median(v))) > JUMP_FACTOR * noise:

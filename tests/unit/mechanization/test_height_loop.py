@@ -40,7 +40,7 @@ def test_references_now_and_then_draw_the_height_as_those_of_every_step_do(name,
     run = run_mechanization(loop, start, log, heights=references(len(log), every))
     at = run.time[every::every] / tau
     exact = jump * np.exp(-at) * (1.0 - 2.0 * at + 0.5 * at * at)
-    found = run.history[every::every, 2] - ALT
+    found = run.history[every::every, loop.alt_at] - ALT
     # Closing the loop once in a time T delays it by up to T: 3 T/tau of the jump, and 1.5 as it is
     # linear between. The Earth's turn and the Tadic kernel's first order: a millimetre.
     assert np.abs(found - exact).max() < jump * 3.0 * every * step / tau + 0.01
@@ -56,8 +56,8 @@ def test_a_loop_faster_than_its_references_is_stable(name, step, every, tau):
     loop = MECHANIZATIONS[name](height="damped", height_time_constant=tau)
     start = NavState.from_degrees(LAT, 10.0, ALT + 20.0, v_n=(0.0, 0.0, 0.5))
     run = run_mechanization(loop, start, log, heights=references(len(log), every))
-    assert np.abs(run.history[:, 2] - ALT).max() < 120.0
-    assert np.abs(run.history[-500:, 2] - ALT).max() < 0.1
+    assert np.abs(run.history[:, loop.alt_at] - ALT).max() < 120.0
+    assert np.abs(run.history[-500:, loop.alt_at] - ALT).max() < 0.1
 
 
 def test_a_constant_error_of_the_accelerometer_is_found_and_held_between_references():

@@ -1,0 +1,274 @@
+"""What the tests of a log's channels share: its channels, its blocks, and where it rests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+__all__ = ["Blocks", "ChannelFault", "HealthLog", "health_log", "intervals_of"]
+
+# Long enough for a standard deviation and a mean, short enough to say when.
+BLOCK = 1.0  # s
+LEAST_BLOCK = 32  # samples
+# A body is at rest where so many of the other channels say so.
+LEAST_WITNESSES = 3
+WORDS = {
+    "gyro_x": "the gyro about x (forward)",
+    "gyro_y": "the gyro about y (right)",
+    "gyro_z": "the gyro about z (down)",
+    "accel_x": "the accelerometer along x (forward)",
+    "accel_y": "the accelerometer along y (right)",
+    "accel_z": "the accelerometer along z (down)",
+}
+
+
+@dataclass(frozen=True)
+class ChannelFault:
+    """Something that a sound channel does not do.
+
+    Attributes
+    ----------
+    channel : str
+        ``gyro_x`` to ``accel_z``, or ``gyro``, ``accel`` where the triad as a whole is meant.
+    kind : str
+        A key of `imu_health.TESTS`, or ``dead``, ``burst``.
+    begin, end : float, s
+        Stamps of its first and last sample.
+    first, last : int
+        The same as positions in the table, from 0, both within it.
+    size, limit : float
+        What was measured, and what it may be.
+    finding : Finding
+    """
+
+    channel: str
+    kind: str
+    begin: float
+    end: float
+    first: int
+    last: int
+    size: float
+    limit: float
+    finding: Finding
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """Statistics of blocks of equal numbers of samples, (blocks, channels).
+
+    Attributes
+    ----------
+    samples : int
+        Of a block.
+    mean, sd : ndarray
+    noise : ndarray
+        Standard deviation of a sample from second differences: of what is white; slow motion
+        is not in it.
+    white : ndarray
+        The same by second differences over that by first, squared: one for white noise, less
+        for what is slower than a quarter of the rate.
+    valid : ndarray of bool
+        No sample is missing or known to be wrong.
+    """
+
+    samples: int
+    mean: Array
+    sd: Array
+    noise: Array
+    white: Array
+    valid: Mask
+
+
+@dataclass(frozen=True, eq=False)
+class HealthLog:
+    """A log that is tested.
+
+    Attributes
+    ----------
+    source : str or None
+    time : ndarray, (n,), s
+    names : tuple of str
+        Of the channels, c of them.
+    values : ndarray, (c, n)
+        As recorded, NaN where nothing is.
+    wrong : ndarray of bool, (c, n)
+        Samples that an earlier test took out.
+    sensors : ImuUncertainty or None
+    gravity : tuple of float, m/s²
+        Least and greatest that it can be.
+    false_alarm : float
+        Per channel, test and record.
+    """
+
+    source: str | None
+    time: Array
+    names: tuple[str, ...]
+    values: Array
+    wrong: Mask
+    sensors: ImuUncertainty | None
+    gravity: tuple[float, float]
+    false_alarm: float
+    blocks: Blocks = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blocks", _blocks(self))
+
+    @property
+    def rate(self) -> float:
+        """Mean number of samples a second."""
+        return float((self.time.size - 1) / (self.time[-1] - self.time[0]))
+
+    def triad(self, channel: int) -> list[int]:
+        """Channels of the same triad, itself among them."""
+        kind = self.names[channel].split("_")[0]
+        return [k for k, name in enumerate(self.names) if name.startswith(kind)]
+
+    def stated(self, channel: int) -> tuple[TriadUncertainty, int] | None:
+        """What is stated of a channel: its triad and the axis in it."""
+        if self.sensors is None:
+            return None
+        name = self.names[channel]
+        triad = self.sensors.gyro if name in GYRO else self.sensors.accel
+        return triad, "xyz".index(name[-1])
+
+    def quiet(self) -> Mask:
+        """Blocks in which each channel is as still as it is in the quietest, (blocks, channels).
+
+        Where a channel is not valid it has no say, and counts as quiet.
+        """
+        b = self.blocks
+        out = np.ones(b.sd.shape, dtype=bool)
+        for k, name in enumerate(self.names):
+            own = b.valid[:, k]
+            if not own.any():
+                continue
+            most = MAX_GYRO_SD if name in GYRO else MAX_ACCEL_SD
+            least = float(np.quantile(b.sd[own, k], QUIET_QUANTILE))
+            # Counts that hardly ever change have quiet blocks without any.
+            step = float(np.median(b.sd[own, k])) if least <= ROUNDING else 0.0
+            limit = min(max(QUIET_FACTOR * least, QUIET_FACTOR * step, ROUNDING), most)
+            out[own, k] = b.sd[own, k] <= limit
+        return out
+
+    def rests(self, channel: int | None = None) -> Mask:
+        """Blocks at rest by the word of all channels, or of all but one, (blocks,)."""
+        others = [k for k in range(len(self.names)) if k != channel]
+        quiet, valid = self.quiet()[:, others], self.blocks.valid[:, others]
+        return np.asarray(quiet.all(axis=1) & (valid.sum(axis=1) >= LEAST_WITNESSES))
+
+    def fault(
+        self,
+        channel: int | str,
+        kind: str,
+        span: tuple[int, int],
+        size: float,
+        limit: float,
+        what: str,
+        remedy: str,
+    ) -> ChannelFault:
+        """Make a fault of samples ``span[0]`` to ``span[1]``, both included."""
+        name = channel if isinstance(channel, str) else self.names[channel]
+        a, b = span
+        finding = Finding(what, self.source, a + 1, name, remedy)
+        begin, end = float(self.time[a]), float(self.time[b])
+        return ChannelFault(name, kind, begin, end, a, b, size, limit, finding)
+
+    def span_of(self, first: int, last: int) -> tuple[int, int]:
+        """First and last sample of blocks `first` to `last`, both included."""
+        return first * self.blocks.samples, (last + 1) * self.blocks.samples - 1
+
+
+def health_log(
+    imu: pd.DataFrame,
+    sensors: ImuUncertainty | None,
+    gravity: tuple[float, float],
+    false_alarm: float,
+) -> HealthLog:
+    """Take a table, whose values need not be finite, for testing.
+
+    Raises
+    ------
+    DataError
+        A column is missing, time does not advance, or there are too few samples.
+    """
+    source = source_of(imu)
+    check_columns(imu, GYRO, source)
+    names = [*GYRO, *(ACCEL if ACCEL[0] in imu.columns else [])]
+    check_columns(imu, names, source)
+    time = index_of(imu)
+    if time.size < 2 * LEAST_BLOCK:
+        raise DataError(
+            f"{time.size} samples are too few to tell a channel's habits",
+            file=source,
+            quantity="time",
+            remedy=f"give a record of {2 * LEAST_BLOCK} samples or more",
+        )
+    check_time(time, source)
+    values = np.ascontiguousarray(values_of(imu, names).T)
+    wrong = ~np.isfinite(values)
+    return HealthLog(source, time, tuple(names), values, wrong, sensors, gravity, false_alarm)
+
+
+def intervals_of(flags: Mask, join: int = 0) -> list[tuple[int, int]]:
+    """First and last place of each run of true, those with at most `join` false between as one."""
+    edges = np.diff(np.r_[False, flags, False].astype(np.int8))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    if not starts.size:
+        return []
+    apart = starts[1:] - ends[:-1] - 1 > join
+    return list(
+        zip(
+            starts[np.r_[True, apart]].tolist(),
+            ends[np.r_[apart, True]].tolist(),
+            strict=True,
+        )
+    )
+
+
+def _blocks(log: HealthLog) -> Blocks:
+    n = log.time.size
+    size = min(max(LEAST_BLOCK, round(BLOCK * log.rate)), n // 2)
+    count = n // size
+    shape = (count, len(log.names))
+    mean, sd, noise, white = (np.zeros(shape) for _ in range(4))
+    valid = np.ones(shape, dtype=bool)
+    for k in range(len(log.names)):
+        cut = log.values[k, : count * size].reshape(count, size)
+        bad = log.wrong[k, : count * size].reshape(count, size).any(axis=1)
+        valid[:, k] = ~bad
+        mean[:, k] = np.where(bad, 0.0, cut.mean(axis=1))
+        cut = cut - mean[:, k, None]
+        first = np.diff(cut, axis=1)
+        ones = (first**2).mean(axis=1) / 2.0
+        twos = (np.diff(first, axis=1) ** 2).mean(axis=1) / 6.0
+        sd[:, k] = np.sqrt((cut**2).mean(axis=1))
+        noise[:, k] = np.sqrt(twos)
+        white[:, k] = np.divide(twos, ones, out=np.zeros_like(ones), where=ones > 0.0)
+    for array in (sd, noise, white):
+        array[~valid] = 0.0
+    return Blocks(size, mean, sd, noise, white, valid)
+
+
+def name_in_words(names: Sequence[str]) -> str:
+    """Channels, as a person calls them."""
+    return " and ".join(WORDS.get(n, n) for n in names)
+
+
+def usual(values: Array) -> float:
+    """Median, nan of nothing."""
+    return float(np.median(values)) if values.size else math.nan

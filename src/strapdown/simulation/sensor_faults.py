@@ -1,0 +1,245 @@
+"""Failures of single channels, put into an Imu table: what a broken sensor does to a log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.sensors.error_draws import child
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import is_number
+
+__all__ = [
+    "Burst",
+    "Dead",
+    "DropOut",
+    "Jump",
+    "Noisy",
+    "Saturated",
+    "SensorFault",
+    "Stuck",
+    "inject_faults",
+]
+
+Array = NDArray[np.float64]
+
+CHANNELS = (*GYRO, *ACCEL)
+# Place in the tree of seeds, beside those of the triads and of a unit's draws.
+FAULT_SEED = 3
+
+
+@dataclass(frozen=True)
+class SensorFault:
+    """A failure of one channel over an interval; its kinds are the classes of this module.
+
+    Attributes
+    ----------
+    channel : str
+        ``gyro_x`` to ``accel_z``.
+    begin, end : float, s
+        Samples from the one, included, to the other, excluded.
+
+    Raises
+    ------
+    ConfigError
+        There is no such channel, or the interval is none.
+    """
+
+    channel: str
+    begin: float = -math.inf
+    end: float = math.inf
+
+    def __post_init__(self) -> None:
+        if self.channel not in CHANNELS:
+            raise ConfigError(
+                f"'{self.channel}' is no channel",
+                quantity="channel",
+                remedy=nearest(str(self.channel), CHANNELS),
+            )
+        if not self.begin < self.end:
+            raise ConfigError(
+                f"a fault from {self.begin:g} to {self.end:g} s lasts no time",
+                quantity="begin, end",
+                remedy="give the begin before the end",
+            )
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """What the broken channel gives in place of these samples of the interval, (k,)."""
+        raise NotImplementedError
+
+    def _checked(self, name: str, least: float = 0.0) -> None:
+        value = getattr(self, name)
+        if not is_number(value) or not least <= value < math.inf:
+            raise ConfigError(
+                f"{value!r} will not do", quantity=name, remedy=f"give {least:g} or more, finite"
+            )
+
+
+@dataclass(frozen=True)
+class Stuck(SensorFault):
+    """It repeats the reading that it had when it failed."""
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        return np.full_like(values, values[0])
+
+
+@dataclass(frozen=True)
+class Dead(SensorFault):
+    """It gives exactly zero."""
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        return np.zeros_like(values)
+
+
+@dataclass(frozen=True)
+class DropOut(SensorFault):
+    """It gives nothing: its values are NaN."""
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        return np.full_like(values, math.nan)
+
+
+@dataclass(frozen=True)
+class Jump(SensorFault):
+    """Its zero moves.
+
+    Attributes
+    ----------
+    size : float, rad/s or m/s²
+    """
+
+    size: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._checked("size", -math.inf)
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        return values + self.size
+
+
+@dataclass(frozen=True)
+class Noisy(SensorFault):
+    """White noise is added.
+
+    Attributes
+    ----------
+    sd : float, rad/s or m/s²
+        Of a sample.
+    """
+
+    sd: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._checked("sd")
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        return values + self.sd * generator.standard_normal(values.size)
+
+
+@dataclass(frozen=True)
+class Saturated(SensorFault):
+    """Its range has become smaller: an amplifier, or the wrong setting.
+
+    Attributes
+    ----------
+    limit : float, rad/s or m/s²
+        The output is held within ± this.
+    """
+
+    limit: float = math.inf
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not is_number(self.limit) or not self.limit > 0.0:
+            raise ConfigError(
+                f"{self.limit!r} is no range", quantity="limit", remedy="give more than zero"
+            )
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        return np.clip(values, -self.limit, self.limit)
+
+
+@dataclass(frozen=True)
+class Burst(SensorFault):
+    """Some of its samples are far off, to either side.
+
+    Attributes
+    ----------
+    size : float, rad/s or m/s²
+        How far.
+    share : float
+        Of the samples, each by chance.
+    """
+
+    size: float = 0.0
+    share: float = 0.2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._checked("size")
+        if not is_number(self.share) or not 0.0 < self.share <= 1.0:
+            raise ConfigError(
+                f"{self.share!r} is no share", quantity="share", remedy="give zero to one"
+            )
+
+    def broken(self, values: Array, generator: np.random.Generator) -> Array:
+        """As `SensorFault.broken`."""
+        struck = generator.random(values.size) < self.share
+        sign = np.where(generator.random(values.size) < 0.5, -1.0, 1.0)
+        return values + self.size * sign * struck
+
+
+def inject_faults(
+    imu: pd.DataFrame, faults: Sequence[SensorFault], *, seed: int = 0
+) -> pd.DataFrame:
+    """Break channels of an Imu table.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table; it is left as it is.
+    faults : sequence of SensorFault
+        In order: a later one acts on what an earlier one left.
+    seed : int
+        Of what is random; each fault has a stream of its own.
+
+    Returns
+    -------
+    DataFrame
+        With NaN where a `DropOut` was asked for, which `check_imu` refuses.
+
+    Raises
+    ------
+    ConfigError
+        The table lacks the channel, or has no sample within the interval.
+    """
+    out = imu.copy()
+    out.attrs = dict(imu.attrs)
+    time = out.index.to_numpy(dtype=np.float64)
+    for k, fault in enumerate(faults):
+        within = (time >= fault.begin) & (time < fault.end)
+        if fault.channel not in out.columns or not within.any():
+            raise ConfigError(
+                f"the table has no {fault.channel} between {fault.begin:g} and {fault.end:g} s",
+                quantity=type(fault).__name__,
+                remedy="name a channel and an interval that it has",
+            )
+        values = out[fault.channel].to_numpy(dtype=np.float64).copy()
+        generator = np.random.Generator(np.random.PCG64(child(seed, FAULT_SEED, k)))
+        values[within] = fault.broken(values[within], generator)
+        out[fault.channel] = values
+    return out
