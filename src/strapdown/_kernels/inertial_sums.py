@@ -75,6 +75,9 @@ def legendre_moments(u, values, out):
     n, width = values.shape
     degrees = out.shape[0]
     out[:, :] = 0.0
+    ahead, behind = np.empty(degrees), np.empty(degrees)
+    for d in range(degrees):
+        ahead[d], behind[d] = (2.0 * d + 1.0) / (d + 1.0), d / (d + 1.0)
     for i in range(n):
         before = u[i] - u[i - 1] if i > 0 else 0.0
         after = u[i + 1] - u[i] if i < n - 1 else 0.0
@@ -84,8 +87,7 @@ def legendre_moments(u, values, out):
             part = weight * p
             for j in range(width):
                 out[d, j] += part * values[i, j]
-            newer = ((2 * d + 1) * u[i] * p - d * older) / (d + 1)
-            older, p = p, newer
+            older, p = p, ahead[d] * u[i] * p - behind[d] * older
     for d in range(degrees):
         for j in range(width):
             out[d, j] *= 0.5 * (2 * d + 1)

@@ -15,7 +15,7 @@ from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
 
-__all__ = ["BlockMeans", "block_means", "excursion", "unexplained"]
+__all__ = ["BlockMeans", "block_means", "excursion", "of_mean", "unexplained"]
 
 #: A scatter that noise gives less often than this is not noise.
 CHANCE = 1e-6
@@ -112,6 +112,25 @@ def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -
     ratio = float(np.max(measured / np.maximum(expected, floor + 1e-300)))
     limit = float(chi2.isf(CHANCE / 3.0, m - 1)) / (m - 1)
     return math.sqrt(ratio) if ratio > limit else 1.0
+
+
+def of_mean(means: Array) -> Array:
+    """Covariance of a mean from the scatter of its parts.
+
+    Parameters
+    ----------
+    means : ndarray, (m, k)
+        Of equal parts.
+
+    Returns
+    -------
+    ndarray, (k, k)
+        As if the parts were independent: too large for what swings to and fro, whose parts
+        take back from one another.
+    """
+    off = means - means.mean(axis=0)
+    count = len(means)
+    return np.asarray(off.T @ off / (count * (count - 1)))
 
 
 def excursion(imu: pd.DataFrame, density: Triad) -> Array:

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import InertialFrame
+from strapdown.alignment.known_heading import KnownHeading
+from strapdown.alignment.levelling_alone import Levelling
 from strapdown.alignment.two_vector import TwoVector
 
 __all__ = ["COARSE_ALIGNMENTS"]
 
-#: One line each: a new method is a new file and a line here.
+#: A new method is a new file and a line here.
 COARSE_ALIGNMENTS: dict[str, type[CoarseAlignment]] = {
-    cls.name: cls for cls in (TwoVector, InertialFrame)
+    "levelling": Levelling,
+    "known_heading": KnownHeading,
+    "two_vector": TwoVector,
+    "inertial_frame": InertialFrame,
+    "gnss_course": GnssCourse,
 }

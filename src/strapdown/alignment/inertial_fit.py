@@ -88,14 +88,22 @@ class InertialFit:
         return self.measured - self.known
 
 
-def fallen_gravity(stamps: Array, gravity: Array, rate: Array) -> Array:
-    """W: second integral of minus gravity on an Earth that turns; (n, 3), m."""
-    size = float(np.sqrt(rate @ rate))
+def turning_gravity(stamps: Array, rate: float) -> Array:
+    """Second integrals of 1, sin(w t)/w and (1 - cos(w t))/w²; (n, 3).
+
+    Minus gravity of an Earth that turns by the vector w is
+    ``-(g + sin(w t)/w (w x g) + (1 - cos(w t))/w² w x (w x g))``.
+    """
     t = stamps
-    once = (t - np.sin(size * t) / size) / size**2
-    twice = (0.5 * t * t - 2.0 * np.sin(0.5 * size * t) ** 2 / size**2) / size**2
+    plain = 0.5 * t * t
+    once = (t - np.sin(rate * t) / rate) / rate**2
+    twice = (plain - 2.0 * np.square(np.sin(0.5 * rate * t) / rate)) / rate**2
+    return np.column_stack([plain, once, twice])
+
+
+def fallen_gravity(basis: Array, gravity: Array, rate: Array) -> Array:
+    """W, second integral of minus gravity, from (..., 3) of `turning_gravity`; (..., 3), m."""
     across = np.cross(rate, gravity)
-    basis = np.column_stack([0.5 * t * t, once, twice])
     return np.asarray(-basis @ np.vstack([gravity, across, np.cross(rate, across)]))
 
 
@@ -126,9 +134,11 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     powers of the time carry.
     """
     gravity, rate = site.gravity, site.earth_rate
-    known = moments(sums.stamps, fallen_gravity(sums.stamps, gravity, rate), DEGREES)
-    measured_b = moments(sums.stamps, sums.fallen, DEGREES)
-    weights = 2.0 / (2.0 * np.arange(DEGREES) + 1.0)
+    basis = turning_gravity(sums.stamps, float(np.sqrt(rate @ rate)))
+    both = moments(sums.stamps, np.hstack([sums.fallen, basis]), DEGREES)
+    measured_b, basis = both[:, :3], both[:, 3:]
+    known = fallen_gravity(basis, gravity, rate)
+    weights: Array = np.asarray(2.0 / (2.0 * np.arange(DEGREES) + 1.0), dtype=np.float64)
     weights[:2] = 0.0
     C_nb = _wahba(measured_b, known, weights)
     measured = measured_b @ C_nb.T
@@ -136,8 +146,7 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     lat = np.degrees(_STEP)
     ahead, behind = (_rate_at(site, site.lat_deg + side * lat) for side in (1.0, -1.0))
     by_latitude = (
-        moments(sums.stamps, fallen_gravity(sums.stamps, gravity, ahead), DEGREES)
-        - moments(sums.stamps, fallen_gravity(sums.stamps, gravity, behind), DEGREES)
+        fallen_gravity(basis, gravity, ahead) - fallen_gravity(basis, gravity, behind)
     ) / (2.0 * _STEP)
     cross = np.array([rotation.cross_matrix(x) for x in known])
     design = np.concatenate([-cross, by_latitude[:, :, None], known[:, :, None]], axis=2)

@@ -11,25 +11,62 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.body_turn import turn_findings
 from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.inertial_fit import fit_inertially
-from strapdown.alignment.inertial_sums import sum_inertially
+from strapdown.alignment.inertial_fit import InertialFit, fit_inertially
+from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
+from strapdown.alignment.north import (
+    CONTRADICTION,
+    LARGEST_SD,
+    latitude_findings,
+    north_findings,
+    unit_remedy,
+)
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
+from strapdown.alignment.record_checks import check_gravity, check_record
+from strapdown.alignment.residual_noise import ResidualNoise, residual_noise
 from strapdown.alignment.site import Site
+from strapdown.alignment.still import still_by_gnss
+from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
+
+__all__ = ["EPOCHS", "InertialFrame"]
+
+EPOCHS = ("end", "start")
 
 
 @dataclass(frozen=True)
 class InertialFrame(CoarseAlignment):
-    """Gravity turns with the Earth, and is seen to, from axes that the gyros hold still."""
+    """Gravity turns with the Earth, and is seen to, from axes that the gyros hold still.
+
+    Attributes
+    ----------
+    at : {'end', 'start'}
+        The sample at which the attitude is wanted.
+
+    Raises
+    ------
+    ConfigError
+        The epoch is unknown.
+    """
 
     name: ClassVar[str] = "inertial_frame"
-    summary: ClassVar[str] = "Wahba's problem on the second integral of the specific force"
-    source: ClassVar[str] = "Markley 1988; Gu, El-Sheimy, Hassan and Syed 2008"
+    summary: ClassVar[str] = (
+        "gravity's turn with the Earth, in axes that the gyros hold still: for a body that rocks "
+        "about its place"
+    )
+    source: ClassVar[str] = "Wahba 1965; Markley 1988; fit to the second integral: derived here"
 
     at: str = "end"
+
+    def __post_init__(self) -> None:
+        if self.at not in EPOCHS:
+            raise ConfigError(
+                f"'{self.at}' is no epoch", quantity="at", remedy=nearest(str(self.at), EPOCHS)
+            )
 
     def align(
         self,
@@ -38,18 +75,115 @@ class InertialFrame(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
     ) -> Alignment:
-        """As `CoarseAlignment.align`."""
+        """As `CoarseAlignment.align`; at the first sample with ``at="start"``.
+
+        Raises
+        ------
+        DataError
+            The record has no accelerometer, a dead channel, a value that is not finite or too
+            few samples; its force is not gravity; the body travelled; or the heading is not
+            known to 1 rad.
+        """
+        source = imu.attrs.get("source")
+        findings = [*check_record(imu)]
         sums = sum_inertially(imu)
+        findings += check_gravity(_mean_force(sums), source)
         fit = fit_inertially(sums, site)
-        turn, push = fit.response.turn[:, :3], fit.response.push[:, :3]
-        C_nb, time = fit.C_nb, sums.start
+        noise = residual_noise(sums, fit, sensors)
+        own = _own_covariance(sums, fit, sensors)
+        findings += north_findings(site, float(np.sqrt(own[2, 2])), sensors, source)
+        whole = own + noise.covariance(sums, fit.response.push, fit.response.place)
+        sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
+        _refuse_travel(noise, sd, imu, site)
+        if noise.significant:
+            findings.append(_left_over(noise, sd[2], sums.length, source))
+        findings += still_by_gnss(gnss, imu, site, float(sd[2]))
+        findings += turn_findings(sums, fit.C_nb, site, sensors, source)
+        findings += _gravity_findings(fit, float(sd[4]), source)
+        measured = site.lat_deg + float(np.degrees(fit.latitude_change))
+        findings += latitude_findings(site, measured, float(np.degrees(sd[3])), source)
+        C_nb, covariance = fit.C_nb, whole[:3, :3]
         if self.at == "end":
             level = rotation.dcm_from_rotation_vector(-site.earth_rate * sums.length)
-            # The level turns by the Earth's rate, the body by its own.
-            turn = level @ (turn + fit.C_nb)
-            push = level @ push
             C_nb = level @ fit.C_nb @ rotation.dcm_from_quaternion(sums.turned[-1])
-            time += sums.length
-        covariance = sensor_covariance(sums, turn, push, sensors)
-        covariance += sensor_noise(sums, turn, push, sensors)
-        return Alignment(self.name, time, rotation.quaternion_from_dcm(C_nb), covariance)
+            covariance = _own_covariance(sums, fit, sensors, level)
+            covariance += noise.covariance(
+                sums, level @ fit.response.push[:, :3], level @ fit.response.place[:, :3]
+            )
+        return Alignment(
+            self.name,
+            sums.start + (sums.length if self.at == "end" else 0.0),
+            rotation.quaternion_from_dcm(C_nb),
+            covariance,
+            findings=tuple(findings),
+        )
+
+
+def _mean_force(sums: InertialSums) -> Array:
+    return np.asarray(sums.node_velocity.sum(axis=0) / sums.length)
+
+
+def _own_covariance(
+    sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty, level: Array | None = None
+) -> Array:
+    """What the sensors alone make: of attitude at the start, latitude and gravity (5, 5).
+
+    With `level`, which turns the local level at the start into that at the end, of the attitude
+    at the end (3, 3).
+    """
+    turn, push = fit.response.turn, fit.response.push
+    if level is not None:
+        # The gyros carry the attitude to the end, with every error of theirs.
+        turn = level @ (turn[:, :3] + fit.C_nb)
+        push = level @ push[:, :3]
+    return sensor_covariance(sums, turn, push, sensors) + sensor_noise(sums, turn, push, sensors)
+
+
+def _refuse_travel(noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site) -> None:
+    """Refuse a record whose leftovers drown north."""
+    if not (noise.significant and sd[2] > LARGEST_SD):
+        return
+    rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
+    length = float(imu.index[-1] - imu.index[0])
+    raise DataError(
+        f"the body did not stay at its place, or the gyros do not tell its turns: within "
+        f"{length:.4g} s the second integral of the specific force departs from gravity's by "
+        f"{noise.sway:.3g} m (root mean square), {noise.ratio:.3g} times what the noise of the "
+        f"sensors explains, and the heading is not known to better than "
+        f"{np.degrees(sd[2]):.3g} deg",
+        file=imu.attrs.get("source"),
+        quantity="accel",
+        remedy=unit_remedy(rate, site)
+        or "align while the vehicle stands (it may rock), or with gnss_course while it drives; "
+        "check units and axes of the gyros",
+    )
+
+
+def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | None) -> Finding:
+    return Finding(
+        f"slow motion, or noise, that the sensors do not explain: {noise.ratio:.3g} times their "
+        f"noise; over {length:.4g} s the second integral of the specific force departs from "
+        f"gravity's by {noise.sway:.2g} m (root mean square). The body moved, or turned with "
+        "biased accelerometers; it is in the stated uncertainty of the heading, "
+        f"{np.degrees(sd):.2g} deg",
+        file=source,
+        quantity="accel",
+        remedy="align for longer, while the vehicle does not drive; where it stood, state noisier "
+        "sensors",
+    )
+
+
+def _gravity_findings(fit: InertialFit, sd: float, source: str | None) -> tuple[Finding, ...]:
+    off = fit.gravity_change
+    if not abs(off) > CONTRADICTION * sd:
+        return ()
+    return (
+        Finding(
+            f"gravity is measured {1e6 * off:+.4g} ppm off that of the site, "
+            f"{abs(off) / max(sd, 1e-300):.1f} standard deviations of the accelerometers",
+            file=source,
+            quantity="accel",
+            remedy="check the height and the latitude of the site, the scale of the "
+            "accelerometers and their stated bias, and that the vehicle did not drive",
+        ),
+    )

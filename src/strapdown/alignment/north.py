@@ -11,7 +11,15 @@ from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]
 
-__all__ = ["HIGH_LATITUDE", "LARGEST_SD", "latitude_findings", "north_findings"]
+__all__ = [
+    "CONTRADICTION",
+    "DEG_PER_H",
+    "HIGH_LATITUDE",
+    "LARGEST_SD",
+    "latitude_findings",
+    "north_findings",
+    "unit_remedy",
+]
 
 #: A heading that is less well known than this, in rad, is no heading: a uniform one has 1.81.
 LARGEST_SD = 1.0
@@ -80,6 +88,24 @@ def north_findings(
             remedy="use better gyros, or state the heading (known_heading)",
         ),
     )
+
+
+def unit_remedy(rate: Array, site: Site) -> str:
+    """Remedy for a mean rate of a body at rest that is 57 times the Earth's; else empty.
+
+    Parameters
+    ----------
+    rate : ndarray, (3,), rad/s
+    site : Site
+
+    Returns
+    -------
+    str
+    """
+    size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
+    if abs(size / earth / np.degrees(1.0) - 1.0) < 0.1:
+        return "the gyros seem to be in deg/s: state the unit when the log is read"
+    return ""
 
 
 def latitude_findings(

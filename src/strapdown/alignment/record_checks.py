@@ -6,13 +6,16 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError, Finding
 from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
 
 Array = NDArray[np.float64]
 
-__all__ = ["LEAST_SAMPLES", "check_record"]
+__all__ = ["LEAST_SAMPLES", "check_gravity", "check_record"]
 
+# As levelling has it: what no bias, scale or rocking makes of gravity.
+NEAR_GRAVITY = 0.2
 #: Fewer tell no scatter.
 LEAST_SAMPLES = 20
 WHAT_IT_READS = {"gyro": "the rate of the Earth", "accel": "gravity"}
@@ -58,6 +61,58 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     return _gaps(imu.index.to_numpy(dtype=np.float64), source)
 
 
+def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
+    """Check that a mean specific force is that of gravity.
+
+    Parameters
+    ----------
+    force : ndarray, (3,), m/s²
+    source : str, optional
+        Of the record, for messages.
+
+    Returns
+    -------
+    tuple of Finding
+        Where the body stands on its head.
+
+    Raises
+    ------
+    DataError
+        Its length is not within 20 % of 9.8 m/s².
+    """
+    size = float(np.sqrt(force @ force))
+    if not abs(size / STANDARD_GRAVITY - 1.0) <= NEAR_GRAVITY:
+        if abs(size - 1.0) <= NEAR_GRAVITY:
+            remedy = "it seems to be in g: state the unit when the log is read"
+        elif abs(size / (1e3 * STANDARD_GRAVITY) - 1.0) <= NEAR_GRAVITY or (
+            abs(size / 1e3 - 1.0) <= NEAR_GRAVITY
+        ):
+            remedy = "it seems to be in mg or mm/s²: state the unit when the log is read"
+        else:
+            remedy = (
+                "state the unit when the log is read, use a record whose acceleration still has "
+                "gravity in it, and align while the vehicle does not accelerate"
+            )
+        raise DataError(
+            f"the mean specific force is {size:.4g} m/s² long, and gravity is 9.8",
+            file=source,
+            quantity="accel",
+            remedy=remedy,
+        )
+    if not force[2] > 0.5 * size:
+        return ()
+    return (
+        Finding(
+            f"the mean specific force on the down axis is {force[2]:+.4g} m/s²: the body stands "
+            "on its head, or the accelerometers tell gravity instead of specific force",
+            file=source,
+            quantity="accel_z",
+            remedy="if it stands upright, mend the signs or the axes when the log is read: at "
+            "rest and level the down axis reads -9.8",
+        ),
+    )
+
+
 def _check_alive(values: Array, source: str | None) -> None:
     """Refuse a channel that stands still while its neighbours do not."""
     # An ideal sensor at rest is constant on all channels to rounding, and nothing is said of it.
@@ -85,9 +140,10 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
     if not gaps:
         return ()
     worst = max(gaps, key=lambda gap: gap.length)
+    count = f"{len(gaps)} gaps" if len(gaps) > 1 else "a gap"
     return (
         Finding(
-            f"{len(gaps)} gaps, the longest of {worst.length:.3g} s at {worst.start:.6g} s where "
+            f"{count}, the longest of {worst.length:.3g} s at {worst.start:.6g} s where "
             f"steps are of {worst.usual:.3g} s: rate and force are taken for straight lines "
             "across them, and what the body did in them is not known",
             file=source,

@@ -11,13 +11,26 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.block_means import BlockMeans, block_means, excursion, unexplained
+from strapdown.alignment.block_means import (
+    BlockMeans,
+    block_means,
+    excursion,
+    of_mean,
+    unexplained,
+)
 from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.levelling import level
 from strapdown.alignment.mean_errors import force_covariance, rate_covariance
-from strapdown.alignment.north import DEG_PER_H, latitude_findings, north_findings
-from strapdown.alignment.record_checks import check_record
+from strapdown.alignment.north import (
+    CONTRADICTION,
+    DEG_PER_H,
+    LARGEST_SD,
+    latitude_findings,
+    north_findings,
+    unit_remedy,
+)
+from strapdown.alignment.record_checks import check_gravity, check_record
 from strapdown.alignment.site import Site
+from strapdown.alignment.still import still_by_gnss
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
@@ -50,7 +63,7 @@ class TwoVector(CoarseAlignment):
     def __post_init__(self) -> None:
         if isinstance(self.blocks, bool) or self.blocks not in range(2, 1001):
             raise ConfigError(
-                f"{self.blocks!r} blocks tell no scatter",
+                f"{self.blocks!r} is no number of blocks that tells a scatter",
                 quantity="blocks",
                 remedy="use 2 to 1000",
             )
@@ -62,12 +75,19 @@ class TwoVector(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
     ) -> Alignment:
-        """As `CoarseAlignment.align`."""
+        """As `CoarseAlignment.align`.
+
+        Raises
+        ------
+        DataError
+            The record has no accelerometer, a dead channel, a value that is not finite or too
+            few samples; its force is not gravity, or its rate not the Earth's; or the heading
+            is not known to 1 rad.
+        """
         findings = [*check_record(imu)]
         source = imu.attrs.get("source")
         means = block_means(imu, self.blocks)
-        level(means.whole_force)
-        _check_rate(means.whole_rate, site, sensors, source)
+        findings += check_gravity(means.whole_force, source)
         C_nb = triad_attitude(means.whole_force, means.whole_rate, site)
 
         rate = C_nb @ rate_covariance(sensors, means.length, means.whole_rate, means.whole_force)
@@ -81,16 +101,19 @@ class TwoVector(CoarseAlignment):
         )
         swing = np.zeros((3, 3))
         if loud_rate > 1.0:
-            rate = rate + _of_mean(means.rate @ C_nb.T)
+            rate = rate + of_mean(means.rate @ C_nb.T)
             swing = C_nb @ excursion(imu, sensors.gyro.axis("noise_density")) @ C_nb.T
         if loud_force > 1.0:
-            force = force + _of_mean(means.force @ C_nb.T)
+            force = force + of_mean(means.force @ C_nb.T)
+        findings += _check_rate(means, site, rate, sensors, source)
         by_force, by_rate = sensitivities(site)
         covariance = by_force @ force @ by_force.T + by_rate @ rate @ by_rate.T + swing
         heading_sd = float(np.sqrt(covariance[2, 2]))
         if loud_rate > 1.0 or loud_force > 1.0:
             findings.append(_disturbed(means, site, loud_rate, loud_force, swing, source))
+            _refuse_motion(findings[-1], heading_sd, source)
         findings += north_findings(site, heading_sd, sensors, source)
+        findings += still_by_gnss(gnss, imu, site, heading_sd)
         findings += latitude_findings(site, *_latitude(means, site, rate, force), source)
         return Alignment(
             self.name,
@@ -139,29 +162,39 @@ def sensitivities(site: Site) -> tuple[Array, Array]:
     return by_force, by_rate
 
 
-def _of_mean(means: Array) -> Array:
-    """Covariance of a mean from the scatter of its parts, as if they were independent."""
-    off = means - means.mean(axis=0)
-    count = len(means)
-    return np.asarray(off.T @ off / (count * (count - 1)))
+def _check_rate(
+    means: BlockMeans, site: Site, covariance: Array, sensors: ImuUncertainty, source: str | None
+) -> tuple[Finding, ...]:
+    """Compare the length of the mean rate with the Earth's; refuse a turn, or another unit."""
+    rate, earth = means.whole_rate, float(np.sqrt(site.earth_rate @ site.earth_rate))
+    size, sd = float(np.sqrt(rate @ rate)), float(np.sqrt(np.trace(covariance)))
+    if not abs(size - earth) > CONTRADICTION * sd:
+        return ()
+    bias = max(sensors.gyro.axis("bias")) * DEG_PER_H
+    told = Finding(
+        f"the mean rate over {means.length:.4g} s is {size * DEG_PER_H:.4g} deg/h (standard "
+        f"deviation {sd * DEG_PER_H:.2g}), and the Earth's is {earth * DEG_PER_H:.4g}",
+        file=source,
+        quantity="gyro",
+        remedy=unit_remedy(rate, site)
+        or "the vehicle turned or travelled, or the bias of the gyros is larger than stated "
+        f"({bias:.3g} deg/h): align while it stands, or state the right sensor",
+    )
+    if size > 2.0 * earth + CONTRADICTION * sd:
+        raise DataError(told.what, file=told.file, quantity=told.quantity, remedy=told.remedy)
+    return (told,)
 
 
-def _check_rate(rate: Array, site: Site, sensors: ImuUncertainty, source: str | None) -> None:
-    """Refuse a mean rate that is a turn, or in another unit."""
-    size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
-    sd = float(np.sqrt(np.square(sensors.gyro.axis("bias")).sum()))
-    if not size > 2.0 * earth + 6.0 * sd:
-        return
-    told = f"the mean rate is {size * DEG_PER_H:.4g} deg/h, and the Earth's is "
-    told += f"{earth * DEG_PER_H:.4g}"
-    if abs(size / earth / np.degrees(1.0) - 1.0) < 0.1:
-        remedy = "the gyros seem to be in deg/s: state the unit when the log is read"
-    else:
-        remedy = (
-            "the body turned, or the bias of the gyros is larger than stated "
-            f"({sd * DEG_PER_H:.3g} deg/h): align while it stands, or state the right sensor"
+def _refuse_motion(disturbed: Finding, heading_sd: float, source: str | None) -> None:
+    """Refuse where it is the motion that hides north."""
+    if heading_sd > LARGEST_SD:
+        raise DataError(
+            f"{disturbed.what}: the heading is not known to better than "
+            f"{np.degrees(heading_sd):.3g} deg",
+            file=source,
+            quantity=disturbed.quantity,
+            remedy=disturbed.remedy,
         )
-    raise DataError(told, file=source, quantity="gyro", remedy=remedy)
 
 
 def _latitude(means: BlockMeans, site: Site, rate: Array, force: Array) -> tuple[float, float]:
@@ -195,13 +228,14 @@ def _disturbed(
     middle = rotation.euler_from_dcm(triad_attitude(means.whole_force, means.whole_rate, site))[2]
     off = (headings - middle + 180.0) % 360.0 - 180.0
     angle = np.degrees(np.sqrt(np.trace(swing)))
+    first, last = (middle + off.min()) % 360.0, (middle + off.max()) % 360.0
     return Finding(
         f"the body does not stand still: the mean rates of {len(off)} blocks of "
         f"{means.length / len(off):.3g} s scatter {loud_rate:.3g} times as much as the noise of "
         f"the gyros, the mean forces {loud_force:.3g} times as much as that of the "
-        f"accelerometers; the headings of the blocks run from {middle + off.min():.4g} to "
-        f"{middle + off.max():.4g} deg. It swings by {angle:.2g} deg (root mean square) about "
-        "its mean attitude, and what is left of a swing in a mean rate passes for the Earth's",
+        f"accelerometers; the headings of the blocks run from {first:.4g} to {last:.4g} deg. It "
+        f"rocks by {angle:.2g} deg (root mean square) about its mean attitude, and what is left "
+        "of a swing in a mean rate passes for the Earth's",
         file=source,
         quantity="gyro",
         remedy="use inertial_frame, which lets the body rock; or align while nobody moves it",

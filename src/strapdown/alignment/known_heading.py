@@ -1,0 +1,77 @@
+"""Levelling with a heading that somebody knows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import pandas as pd
+
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.coarse import CoarseAlignment
+from strapdown.alignment.levelling_alone import UNKNOWN_HEADING
+from strapdown.alignment.rest_level import level_at_rest
+from strapdown.alignment.site import Site
+from strapdown.exceptions import ConfigError
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables.checks import is_number
+
+__all__ = ["KnownHeading"]
+
+
+@dataclass(frozen=True)
+class KnownHeading(CoarseAlignment):
+    """Roll and pitch from the mean specific force at rest; the heading as stated.
+
+    Attributes
+    ----------
+    heading_deg : float, deg
+        Of the body's forward axis at the last sample, from true north, clockwise.
+    sd_deg : float, deg
+        Its standard deviation, above zero.
+
+    Raises
+    ------
+    ConfigError
+        The heading is not a number, or its standard deviation not one above zero and below 104.
+    """
+
+    name: ClassVar[str] = "known_heading"
+    summary: ClassVar[str] = "roll and pitch from the mean specific force at rest; stated heading"
+    source: ClassVar[str] = "f_b = C_bn (0, 0, -g)"
+
+    heading_deg: float
+    sd_deg: float
+
+    def __post_init__(self) -> None:
+        if not (is_number(self.heading_deg) and math.isfinite(self.heading_deg)):
+            raise ConfigError(
+                f"{self.heading_deg!r} is no heading",
+                quantity="heading_deg",
+                remedy="give degrees from true north, clockwise",
+            )
+        if not (is_number(self.sd_deg) and 0.0 < self.sd_deg < math.degrees(UNKNOWN_HEADING)):
+            raise ConfigError(
+                f"{self.sd_deg!r} is no standard deviation of a heading",
+                quantity="sd_deg",
+                remedy="give degrees above zero; where the heading is not known, use levelling",
+            )
+
+    def align(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        gnss: pd.DataFrame | None = None,
+    ) -> Alignment:
+        """As `CoarseAlignment.align`.
+
+        Raises
+        ------
+        DataError
+            As `rest_level.level_at_rest`.
+        """
+        return level_at_rest(
+            self.name, imu, site, sensors, self.heading_deg, math.radians(self.sd_deg)
+        )
