@@ -53,7 +53,8 @@ def align(
         str,
         typer.Option(
             metavar="NAME",
-            help="Coarse alignment, with options after a colon: inertial_frame, two_vector, …",
+            help="Coarse alignment, with options after a colon: inertial_frame (the body may "
+            "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course.",
             rich_help_panel=_RUN,
         ),
     ] = "inertial_frame",
@@ -61,6 +62,14 @@ def align(
         bool,
         typer.Option("--coarse-only", help="No fine alignment after it.", rich_help_panel=_RUN),
     ] = False,
+    gnss: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FIXES",
+            help="Fixes of a satellite receiver, for --method gnss_course.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
     prefilter: Annotated[
         str,
         typer.Option(
@@ -153,6 +162,7 @@ def align(
         "sensor": sensor,
         "method": None if method == "inertial_frame" else method,
         "coarse_only": coarse_only or None,
+        "gnss": gnss,
         "prefilter": None if prefilter == "none" else prefilter,
         "from_s": from_s,
         "duration": duration,

@@ -9,6 +9,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from strapdown.config.alignment import AlignmentSpec
+from strapdown.config.alignment_checks import NOT_BEFORE_FINE
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.exceptions import ConfigError, StrapdownError
 from strapdown.formats import read_raw
@@ -23,6 +24,7 @@ FLAGS = {
     "site, alt_m": "--alt",
     "sensors, sensor": "--sensor",
     "axes, axes": "--axes",
+    "gnss, path": "--gnss",
     "log, sampling": "--sampling",
     "log, rate_hz": "--rate",
     "log, to_s": "--duration",
@@ -92,6 +94,8 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         "from_s": first,
         "to_s": None if duration is None else (begin or 0.0) + duration,
     }
+    coarse = _module(given["method"] or "inertial_frame")
+    alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
     table = {
         "name": log.resolve().stem,
         "log": options,
@@ -99,8 +103,9 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         "site": _site(log, given),
         "sensors": {"sensor": given["sensor"]},
         "prefilter": _module(given["prefilter"] or "none"),
-        "coarse": _module(given["method"] or "inertial_frame"),
-        "fine": {"kind": "none"} if given["coarse_only"] else {"kind": "filter"},
+        "gnss": None if given["gnss"] is None else {"path": str(given["gnss"])},
+        "coarse": coarse,
+        "fine": {"kind": "none" if alone else "filter"},
     }
     try:
         return alignment_spec(table)

@@ -28,7 +28,7 @@ def print_alignment(result: AlignmentResult) -> None:
     found = trust(result)
     style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[found.verdict]
     out.print(spaced(found.sentence), style=style)
-    for head, text in limits(result)[:2]:
+    for head, text in limits(result):
         out.print(spaced(f"  - {head}: {text}"))
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "AxesTable",
     "CoarseSpec",
     "FineSpec",
+    "GnssTable",
     "LogTable",
     "OutputTable",
     "PrefilterSpec",
@@ -50,6 +51,12 @@ class LogTable(TableSpec):
     repair: StrictBool = False
     from_s: Number | None = None
     to_s: Number | None = None
+
+
+class GnssTable(TableSpec):
+    """Fixes of a satellite receiver, for an alignment while moving."""
+
+    path: FileName
 
 
 class SimulationTable(TableSpec):
@@ -155,6 +162,7 @@ class AlignmentSpec(TableSpec):
     title: Words = ""
     log: LogTable | None = None
     simulation: SimulationTable | None = None
+    gnss: GnssTable | None = None
     axes: AxesTable = AxesTable()
     site: SiteTable
     sensors: SensorsTable = SensorsTable()

@@ -14,7 +14,7 @@ from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.columns import parse_axes, parse_unit
 from strapdown.sensors.axes_matrix import NAMED_AXES, check_axes_matrix
 
-__all__ = ["check_alignment"]
+__all__ = ["NOT_BEFORE_FINE", "check_alignment"]
 
 
 def check_alignment(spec: AlignmentSpec, written: Written | None = None) -> None:
@@ -39,6 +39,7 @@ def check_alignment(spec: AlignmentSpec, written: Written | None = None) -> None
     check.sensors(spec)
     check.times(spec)
     check.stages(spec)
+    check.chain(spec)
 
 
 class _Checks:
@@ -162,6 +163,36 @@ class _Checks:
         for name in ("prefilter", "coarse", "fine"):
             self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given))
 
+    def chain(self, spec: AlignmentSpec) -> None:
+        """What one stage leaves, and another needs."""
+        kind = spec.coarse.kind
+        if kind in NEEDS_GNSS and spec.gnss is None:
+            raise self.refuse(
+                ("coarse", "kind"),
+                "it takes the course from satellite fixes, and none are given",
+                "write [gnss] and path = … below it, or take another kind",
+            )
+        if spec.gnss is not None and kind not in NEEDS_GNSS:
+            raise self.refuse(
+                ("gnss", "path"),
+                f"the coarse alignment '{kind}' takes no fixes",
+                f'leave [gnss] out, or write kind = "{NEEDS_GNSS[0]}" in [coarse]',
+            )
+        if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
+            raise self.refuse(
+                ("coarse", "kind"),
+                f"{NOT_BEFORE_FINE[kind]}, and a fine alignment follows",
+                'write kind = "none" in [fine], or take another coarse alignment',
+            )
+
+
+#: Coarse alignments that need satellite fixes.
+NEEDS_GNSS = ("gnss_course",)
+#: Coarse alignments that a filter over a rest cannot begin from, and why.
+NOT_BEFORE_FINE = {
+    "gnss_course": "it is for a vehicle that moves",
+    "levelling": "it finds no heading",
+}
 
 #: An hour at 4 kHz.
 MOST_SAMPLES = 1.5e7

@@ -10,7 +10,13 @@ from strapdown.report.alignment_tables import (
     method_rows,
     readiness_table,
 )
-from strapdown.report.alignment_words import headline, key_figures, limits, trust
+from strapdown.report.alignment_words import (
+    headline,
+    key_figures,
+    limits,
+    manoeuvre_words,
+    trust,
+)
 from strapdown.report.chart import Chart
 from strapdown.report.document import (
     Block,
@@ -66,7 +72,7 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
     front: tuple[Block, ...] = (
         KeyFigures(key_figures(result)),
         Paragraph(found.sentence, "lead" if found.verdict == "trusted" else "warning"),
-        Items(tuple((head, text) for head, text in limits(result)[:2])),
+        Items(tuple((head, text) for head, text in limits(result))),
         ChartBlock(charts.readiness_chart(result)),
         readiness_table(result),
     )
@@ -76,6 +82,7 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
             "attitude", "Attitude over the record", (ChartBlock(charts.attitude_chart(result)),)
         ),
         *_biases(result),
+        *_more(result),
         Section("signals", "Signals", (ChartBlock(charts.signal_chart(result)),)),
         Section("findings", "Findings", _findings(result)),
         Section("method", "Method and assumptions", _method(result, name)),
@@ -105,6 +112,19 @@ def _answer(result: AlignmentResult, reasons: tuple[tuple[bool, str], ...]) -> t
         blocks += [Paragraph("What speaks for the answer, and what against it:"), Items(said)]
     blocks += [Paragraph("What limits it:"), Items(limits(result))]
     return tuple(blocks)
+
+
+def _more(result: AlignmentResult) -> tuple[Section, ...]:
+    """What a turn of the body would tell that this rest does not."""
+    rows = manoeuvre_words(result)
+    if not rows:
+        return ()
+    said = (
+        "A body that only stands cannot tell a horizontal accelerometer bias from a tilt, nor an "
+        "east gyro drift from the heading. A turn can: then the bias goes with the body, and the "
+        "tilt does not. A further rest as long as this record, after:"
+    )
+    return (Section("more", "What would make more known", (Paragraph(said), Items(rows))),)
 
 
 def _biases(result: AlignmentResult) -> tuple[Section, ...]:

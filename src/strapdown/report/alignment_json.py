@@ -72,6 +72,17 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
             "fine": _rows(_thinned(result.readiness.fine)),
             "refused": [{"time_s": t, "why": why} for t, why in result.readiness.refused],
         },
+        "what_a_turn_would_tell": [
+            {
+                "turn": one.name,
+                "rest_s": one.rest,
+                "tilt_sd_deg": [float(x) for x in one.sd_deg[:2]],
+                "heading_sd_deg": float(one.sd_deg[2]),
+                "gyro_bias_sd_rad_per_s": [float(x) for x in one.gyro_bias_sd],
+                "accel_bias_sd_m_per_s2": [float(x) for x in one.accel_bias_sd],
+            }
+            for one in result.manoeuvres
+        ],
         "method": spec.model_dump(
             mode="json", include={"prefilter", "coarse", "fine"}, serialize_as_any=True
         ),

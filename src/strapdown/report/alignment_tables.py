@@ -70,8 +70,6 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
                     f"{name} {axis}",
                     about(factor * float(bias[k]), TWO_SIDED_95 * factor * float(sd[k]), unit),
                     _half(TWO_SIDED_95 * factor * float(prior[k]), unit),
-                    .removeprefix("0")
-                    .lstrip(".0"),
                     _found(known),
                 )
             )

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.constants import TWO_SIDED_95
-from strapdown.exceptions import Finding
 from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import KeyFigure
 from strapdown.rotation import within_half_turn
@@ -30,6 +29,7 @@ __all__ = [
     "headline",
     "key_figures",
     "limits",
+    "manoeuvre_words",
     "trust",
 ]
 
@@ -245,22 +245,34 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
             "of tilt; at one attitude no alignment can tell them apart.",
         )
     )
-    out += [(f.quantity or "Finding", _sentence(str(f.what))) for f in _told(result)]
     return tuple(out)
+
+
+def manoeuvre_words(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
+    """What would make known what this rest does not tell, the best heading first."""
+    rows = []
+    stay = next((m for m in result.manoeuvres if m.name.startswith("leave")), None)
+    for one in result.manoeuvres:
+        gyro = TWO_SIDED_95 * DEG_H * float(np.max(one.gyro_bias_sd))
+        accel = TWO_SIDED_95 * UG * float(np.max(one.accel_bias_sd))
+        heading, level = (TWO_SIDED_95 * float(x) for x in (one.sd_deg[2], one.sd_deg[:2].max()))
+        note = ""
+        if stay is not None and one is not stay:
+            gain = float(stay.sd_deg[2] / one.sd_deg[2])
+            note = f"; the heading {gain:.2g} times better than without" if gain > 1.1 else ""
+        rows.append(
+            (
+                f"{one.name[0].upper()}{one.name[1:]}",
+                f"heading ±\u00a0{_small(heading)}°, level ±\u00a0{_small(level)}°, every gyro "
+                f"±\u00a0{_small(gyro)} deg/h, every accelerometer ±\u00a0{accel:.2g} µg{note}.",
+            )
+        )
+    return tuple(rows)
 
 
 def bias_sd(triad: TriadUncertainty, drift: BiasDrift) -> Array:
     """Standard deviation of the bias of each axis at an instant: what stays, and what drifts."""
     return np.hypot(triad.axis("bias"), drift.triad)
-
-
-def _told(result: AlignmentResult) -> list[Finding]:
-    fine = () if result.fine is None else result.fine.findings
-    return [*result.coarse.findings, *fine]
-
-
-def _sentence(text: str) -> str:
-    return text if text.endswith(".") else f"{text}."
 
 
 def _mean_attitude(result: AlignmentResult) -> Array:
