@@ -60,7 +60,10 @@ class _Checks:
             said = [part.strip() for part in (f.quantity or "").split(",")]
             own = [part for part in said if part and part not in path]
             where = (*path, *(own if self._known((*path, *own)) else ()))
-            raise self.refuse(where, f.what, f.remedy or "give another value") from None
+            remedy = f.remedy or "give another value"
+            if self._written is None:
+                raise ConfigError(f.what, quantity=", ".join(where), remedy=remedy) from None
+            raise self._written.refuse_as_told(where, f.what, remedy) from None
 
     def _known(self, path: tuple[str, ...]) -> bool:
         return self._written is None or self._written.has(*path)

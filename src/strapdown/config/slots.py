@@ -67,10 +67,12 @@ _PLAIN = (float, int, bool, str)
 #: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
 UNITS = {
     "attenuation": "db",
+    "gravity": "m_per_s2",
     "height_limits": "m",
     "height_time_constant": "s",
     "interval": "s",
     "largest_speed": "m_per_s",
+    "least_speed": "m_per_s",
     "rate": "hz",
 }
 

@@ -11,7 +11,7 @@ from strapdown.report.alignment_words import (
     UG,
     angle_bound,
     answer_error,
-    bias_sd,
+    prior_sd,
 )
 from strapdown.report.crash_values import about, plain
 from strapdown.report.document import TableBlock
@@ -56,8 +56,7 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
         return None
     end = result.fine.alignment
     rows = []
-    of = result.sensors
-    gyro, accel = bias_sd(of.gyro, of.gyro_drift), bias_sd(of.accel, of.accel_drift)
+    gyro, accel = prior_sd(result)
     for name, bias, sd, prior, factor, unit in (
         ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_H, "deg/h"),
         ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, UG, "µg"),

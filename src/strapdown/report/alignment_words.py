@@ -11,25 +11,24 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.constants import TWO_SIDED_95
+from strapdown.estimation.resting_sensors import resting_sd
 from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import KeyFigure
 from strapdown.rotation import within_half_turn
-from strapdown.sensors.imu_uncertainty import BiasDrift
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.systems.alignment_readiness import reference_offset
 from strapdown.systems.alignment_run import AlignmentResult
-from strapdown.tables import EULER, QUATERNION
+from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 from strapdown.tables.checks import values_of
 
 __all__ = [
     "Trust",
     "angle_bound",
     "answer_error",
-    "bias_sd",
     "headline",
     "key_figures",
     "limits",
     "manoeuvre_words",
+    "prior_sd",
     "trust",
 ]
 
@@ -38,6 +37,7 @@ Array = NDArray[np.float64]
 DEG_H = math.degrees(3600.0)
 UG = 1e6 / 9.80665
 ORDER = (2, 1, 0)  # heading first: it is the one that is hard
+MOST_SAID = 2  # of what speaks against an answer, in one sentence
 WORDS = {
     "trusted": "It can be trusted",
     "reserve": "It can be used with reserve",
@@ -68,7 +68,9 @@ class Trust:
         against = [why for good, why in self.reasons if not good]
         said = WORDS[self.verdict]
         if against:
-            return f"{said}: {'; '.join(against)}."
+            more = len(against) - MOST_SAID
+            rest = f"; and {more} more, under 'The answer'" if more > 0 else ""
+            return f"{said}: {'; '.join(against[:MOST_SAID])}{rest}."
         return f"{said}: {self.short}." if self.short else f"{said}."
 
 
@@ -149,9 +151,8 @@ def trust(result: AlignmentResult) -> Trust:
                 )
     reasons += _agreement(result)
     reasons += _surprises(result)
-    unsteady = [f for f in result.coarse.findings if "does not stand still" in f.what]
-    if unsteady:
-        reasons.append((False, "the body moves more than the method allows for"))
+    told = [*result.coarse.findings, *(() if result.fine is None else result.fine.findings)]
+    reasons += [(False, f.what.partition(": ")[0]) for f in told]
     against = [why for good, why in reasons if not good]
     verdict = "trusted" if not against else "reserve"
     if len(against) > 1 or (against and known is not None and not reasons[0][0]):
@@ -218,14 +219,16 @@ def _surprises(result: AlignmentResult) -> list[tuple[bool, str]]:
 def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     """Return what limits the answer, and what would help."""
     out: list[tuple[str, str]] = []
-    site, sensors = result.site, result.sensors
+    site = result.site
+    gyro, accel = prior_sd(result)
     c_nb = _mean_attitude(result)
     across = abs(float(site.earth_rate[0]))
-    east = float(np.linalg.norm(c_nb[1] * bias_sd(sensors.gyro, sensors.gyro_drift)))
+    east = float(np.linalg.norm(c_nb[1] * gyro))
     part = math.degrees(east / across) if across > 0 else math.inf
     heading = float(result.end.sd_deg[2])
     told = (
-        f"a gyro bias of {_small(east * DEG_H)} deg/h about east, one standard deviation, is "
+        f"{_small(east * DEG_H)} deg/h too much about east, one standard deviation of bias, scale "
+        f"and misalignment, are "
         f"{_small(part)}° of heading at this latitude; all of the heading's standard deviation is "
         f"{_small(heading)}°"
     )
@@ -236,13 +239,14 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
         why = "a longer or quieter alignment helps"
         out.append(("Noise and motion limit the heading", f"{told}: {why}."))
     g = float(np.linalg.norm(site.gravity))
-    level = c_nb[:2] * bias_sd(sensors.accel, sensors.accel_drift)
+    level = c_nb[:2] * accel
     tilt = float(np.linalg.norm(level, axis=1).max())
     out.append(
         (
             "The bias of the accelerometers limits roll and pitch",
-            f"{tilt * UG:.3g} µg, one standard deviation, are {_small(math.degrees(tilt / g))}° "
-            "of tilt; at one attitude no alignment can tell them apart.",
+            f"{tilt * UG:.3g} µg too much, one standard deviation of bias, scale and misalignment, "
+            f"are {_small(math.degrees(tilt / g))}° of tilt; at one attitude no alignment can tell "
+            "them apart.",
         )
     )
     return tuple(out)
@@ -270,9 +274,10 @@ def manoeuvre_words(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     return tuple(rows)
 
 
-def bias_sd(triad: TriadUncertainty, drift: BiasDrift) -> Array:
-    """Standard deviation of the bias of each axis at an instant: what stays, and what drifts."""
-    return np.hypot(triad.axis("bias"), drift.triad)
+def prior_sd(result: AlignmentResult) -> tuple[Array, Array]:
+    """What gyros and accelerometers may read too much here, before anything is estimated."""
+    rate, force = (values_of(result.imu, columns).mean(axis=0) for columns in (GYRO, ACCEL))
+    return resting_sd(result.sensors, rate, force)
 
 
 def _mean_attitude(result: AlignmentResult) -> Array:
