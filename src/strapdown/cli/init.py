@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 EPILOG = "Example: strapdown init crash recorder.csv"
+ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
 
 # Of what was left out.
@@ -82,3 +83,58 @@ def crash(
             page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
     page.print("\nLook at the lines that say 'assumed', too.")
     page.print(f"\nThen   strapdown crash {out}")
+
+
+@app.command("align", epilog=ALIGN_EPILOG)
+def align(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
+        ),
+    ],
+    gyro_unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.")
+    ] = None,
+    accel_unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="m/s2, g, mg, …; m/s: increments.")
+    ] = None,
+    time_unit: Annotated[str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.")] = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="As 'x,-y,-z', or forward-left-up."),
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
+        "align.toml"
+    ),
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Write the file of an alignment: what a log tells is filled in, and what it does not is asked.
+
+    Then: strapdown align align.toml
+    """
+    from strapdown.cli.console import console, print_findings
+    from strapdown.formats import ReadOptions
+    from strapdown.systems.alignment_draft import draft_alignment
+    from strapdown.systems.crash_draft.file import check_free, write_file
+
+    check_free(out, force)
+    options = ReadOptions(
+        gyro_unit=gyro_unit, accel_unit=accel_unit, time_unit=time_unit, axes=axes
+    )
+    draft = draft_alignment(log, folder=out.absolute().parent, options=options)
+    write_file(out, draft.text, force=force)
+    if quiet:
+        return
+    print_findings(draft.findings)
+    page = console()
+    page.print("Found", style="bold")
+    for line in draft.found:
+        page.print(f"  {line}")
+    page.print(f"\nWrote {out}")
+    if draft.asked:
+        page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
+        for one in draft.asked:
+            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+    page.print(f"\nThen   strapdown align {out}")

@@ -25,8 +25,10 @@ __all__ = [
     "AxesTable",
     "CoarseSpec",
     "FineSpec",
+    "GnssTable",
     "LogTable",
     "OutputTable",
+    "PrefilterSpec",
     "ReferenceTable",
     "SensorsTable",
     "SimulationTable",
@@ -49,6 +51,12 @@ class LogTable(TableSpec):
     repair: StrictBool = False
     from_s: Number | None = None
     to_s: Number | None = None
+
+
+class GnssTable(TableSpec):
+    """Fixes of a satellite receiver, for an alignment while moving."""
+
+    path: FileName
 
 
 class SimulationTable(TableSpec):
@@ -114,6 +122,12 @@ class CoarseSpec(ChoiceSpec):
     duration_s: Positive | None = None
 
 
+class PrefilterSpec(ChoiceSpec):
+    """What the samples pass before they are aligned."""
+
+    kind: str = "none"
+
+
 class FineSpec(ChoiceSpec):
     """The fine alignment: after the coarse one where that has an end of its own, else over all."""
 
@@ -148,9 +162,11 @@ class AlignmentSpec(TableSpec):
     title: Words = ""
     log: LogTable | None = None
     simulation: SimulationTable | None = None
+    gnss: GnssTable | None = None
     axes: AxesTable = AxesTable()
     site: SiteTable
     sensors: SensorsTable = SensorsTable()
+    prefilter: PrefilterSpec = PrefilterSpec()
     coarse: CoarseSpec = CoarseSpec()
     fine: FineSpec = FineSpec()
     reference: ReferenceTable | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from strapdown.config.alignment import AlignmentSpec
@@ -13,7 +14,7 @@ from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.columns import parse_axes, parse_unit
 from strapdown.sensors.axes_matrix import NAMED_AXES, check_axes_matrix
 
-__all__ = ["check_alignment"]
+__all__ = ["NOT_BEFORE_FINE", "check_alignment"]
 
 
 def check_alignment(spec: AlignmentSpec, written: Written | None = None) -> None:
@@ -38,6 +39,7 @@ def check_alignment(spec: AlignmentSpec, written: Written | None = None) -> None
     check.sensors(spec)
     check.times(spec)
     check.stages(spec)
+    check.chain(spec)
 
 
 class _Checks:
@@ -58,7 +60,10 @@ class _Checks:
             said = [part.strip() for part in (f.quantity or "").split(",")]
             own = [part for part in said if part and part not in path]
             where = (*path, *(own if self._known((*path, *own)) else ()))
-            raise self.refuse(where, f.what, f.remedy or "give another value") from None
+            remedy = f.remedy or "give another value"
+            if self._written is None:
+                raise ConfigError(f.what, quantity=", ".join(where), remedy=remedy) from None
+            raise self._written.refuse_as_told(where, f.what, remedy) from None
 
     def _known(self, path: tuple[str, ...]) -> bool:
         return self._written is None or self._written.has(*path)
@@ -91,13 +96,13 @@ class _Checks:
         for name in ("matrix", "gyro_matrix", "accel_matrix"):
             matrix = getattr(axes, name)
             if matrix is not None:
-                self.told(("axes", name), lambda m=matrix, n=name: check_axes_matrix(m, n))
+                self.told(("axes", name), partial(check_axes_matrix, matrix, name))
 
     def log(self, spec: AlignmentSpec) -> None:
         for kind in ("gyro", "accel", "time"):
             unit = getattr(spec.log, f"{kind}_unit", None)
             if unit is not None:
-                self.told(("log", f"{kind}_unit"), lambda u=unit, k=kind: parse_unit(u, k))
+                self.told(("log", f"{kind}_unit"), partial(parse_unit, unit, kind))
 
     def sensors(self, spec: AlignmentSpec) -> None:
         from strapdown.sensors.catalogue import load_sensor
@@ -129,10 +134,14 @@ class _Checks:
 
     def times(self, spec: AlignmentSpec) -> None:
         log = spec.log
-        if log is not None and log.from_s is not None and log.to_s is not None:
-            if not log.from_s < log.to_s:
-                why = f"it ends before it begins, at {log.from_s:g} s"
-                raise self.refuse(("log", "to_s"), why, "give a later instant")
+        if (
+            log is not None
+            and log.from_s is not None
+            and log.to_s is not None
+            and not log.from_s < log.to_s
+        ):
+            why = f"it ends before it begins, at {log.from_s:g} s"
+            raise self.refuse(("log", "to_s"), why, "give a later instant")
         if spec.simulation is not None:
             longest = spec.simulation.duration_s
             if spec.simulation.rate_hz * longest > MOST_SAMPLES:
@@ -154,10 +163,39 @@ class _Checks:
 
     def stages(self, spec: AlignmentSpec) -> None:
         given = {"ellipsoid": spec.site.ellipsoid}
-        for name in ("coarse", "fine"):
-            choice = getattr(spec, name)
-            self.told((name,), lambda c=choice, n=name: make_choice(c, SLOTS[n], given))
+        for name in ("prefilter", "coarse", "fine"):
+            self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given))
 
+    def chain(self, spec: AlignmentSpec) -> None:
+        """What one stage leaves, and another needs."""
+        kind = spec.coarse.kind
+        if kind in NEEDS_GNSS and spec.gnss is None:
+            raise self.refuse(
+                ("coarse", "kind"),
+                "it takes the course from satellite fixes, and none are given",
+                "write [gnss] and path = … below it, or take another kind",
+            )
+        if spec.gnss is not None and kind not in NEEDS_GNSS:
+            raise self.refuse(
+                ("gnss", "path"),
+                f"the coarse alignment '{kind}' takes no fixes",
+                f'leave [gnss] out, or write kind = "{NEEDS_GNSS[0]}" in [coarse]',
+            )
+        if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
+            raise self.refuse(
+                ("coarse", "kind"),
+                f"{NOT_BEFORE_FINE[kind]}, and a fine alignment follows",
+                'write kind = "none" in [fine], or take another coarse alignment',
+            )
+
+
+#: Coarse alignments that need satellite fixes.
+NEEDS_GNSS = ("gnss_course",)
+#: Coarse alignments that a filter over a rest cannot begin from, and why.
+NOT_BEFORE_FINE = {
+    "gnss_course": "it is for a vehicle that moves",
+    "levelling": "it finds no heading",
+}
 
 #: An hour at 4 kHz.
 MOST_SAMPLES = 1.5e7

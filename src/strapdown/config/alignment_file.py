@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import ValidationError, create_model
 
-from strapdown.config.alignment import AlignmentSpec, CoarseSpec, FineSpec
+from strapdown.config.alignment import AlignmentSpec, CoarseSpec, FineSpec, PrefilterSpec
 from strapdown.config.alignment_checks import check_alignment
 from strapdown.config.alignment_wanted import what_alignment_wants, write_of_alignment
 from strapdown.config.case_keys import canonical
@@ -26,6 +26,7 @@ __all__ = ["STAGES", "alignment_spec", "read_alignment_spec"]
 #: Stages that are modules, by table: what the table has beside the options, and the kind that
 #: stands there where none is named.
 STAGES: dict[str, tuple[type[ChoiceSpec], str]] = {
+    "prefilter": (PrefilterSpec, "none"),
     "coarse": (CoarseSpec, "inertial_frame"),
     "fine": (FineSpec, "filter"),
 }
@@ -54,10 +55,8 @@ def alignment_form(table: Mapping[str, Any], file: TomlFile | None = None) -> ty
             file=file,
             path=(name,),
         )
-        try:
-            stages[name] = (form, form())
-        except ValidationError:
-            stages[name] = (form, ...)
+        needed = any(one.is_required() for one in form.model_fields.values())
+        stages[name] = (form, ... if needed else form.model_validate({}))
     return create_model("Alignment", __base__=AlignmentSpec, **stages)
 
 

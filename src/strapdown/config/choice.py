@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Mapping
-from dataclasses import MISSING
+from dataclasses import MISSING, fields
 from typing import Any, Union, get_args, get_origin
 
 from pydantic import StrictBool, StrictInt, StrictStr, create_model
@@ -89,6 +89,9 @@ def _unknown(
 def _field(
     option: Option, given: Mapping[str, Any], file: TomlFile | None, path: KeyPath
 ) -> tuple[Any, Any]:
+    if option.group is not None:
+        form = group_form(option.group)
+        return form, form()
     if option.slot is None:
         default = ... if option.default is MISSING else option.default
         return strict(option.hint), default
@@ -102,6 +105,12 @@ def _field(
     if inner is None and kind:
         return form, form(kind=kind)
     return form, ...
+
+
+def group_form(group: type) -> type[TableSpec]:
+    """The form of a table of options that belong together."""
+    known: dict[str, Any] = {o.key: (strict(o.hint), o.default) for o in options_of(group)}
+    return create_model(group.__name__, __base__=TableSpec, **known)
 
 
 def strict(hint: Any) -> Any:
@@ -158,7 +167,9 @@ def make_choice(spec: ChoiceSpec, slot: Slot, given: Mapping[str, Any]) -> Any:
     values: dict[str, Any] = {}
     for option in options_of(entry):
         value = getattr(spec, option.key)
-        if option.slot is None:
+        if option.group is not None:
+            values[option.field] = _group(option, value)
+        elif option.slot is None:
             values[option.field] = value
         elif isinstance(value, ChoiceSpec):
             if option.takes_class:
@@ -168,12 +179,21 @@ def make_choice(spec: ChoiceSpec, slot: Slot, given: Mapping[str, Any]) -> Any:
                 values[option.field] = make_choice(value, option.slot, given)
             except ConfigError as error:
                 raise _inside(error, option.key) from None
-    own = entry.__dataclass_fields__
+    own = {one.name for one in fields(entry)}
     values |= {name: value for name, value in given.items() if name in own}
     try:
         return entry(**values)
     except ConfigError as error:
         raise _keyed(error, entry) from None
+
+
+def _group(option: Option, spec: TableSpec) -> Any:
+    assert option.group is not None
+    given = {one.field: getattr(spec, one.key) for one in options_of(option.group)}
+    try:
+        return option.group(**given)
+    except ConfigError as error:
+        raise _inside(_keyed(error, option.group), option.key) from None
 
 
 def _inside(error: ConfigError, key: str) -> ConfigError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from strapdown.alignment.coarse import CoarseAlignment
@@ -15,10 +15,11 @@ from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_model import ErrorModel
 from strapdown.estimation.influence import Influence
 from strapdown.estimation.influences import INFLUENCES
-from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
+from strapdown.estimation.update_rules import UPDATE_RULES
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.prefilter import PREFILTERS, Prefilter
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
 
@@ -47,9 +48,9 @@ class Slot:
 
 FINE_ALIGNMENTS: dict[str, type[FineAlignment]] = {"filter": FineAlignment}
 ERROR_MODELS: dict[str, type[ErrorModel]] = {"rotation_vector": RotationVectorModel}
-UPDATE_RULES: dict[str, type] = {"robust": RobustUpdate}
 
 SLOTS: dict[str, Slot] = {
+    "prefilter": Slot("prefilter", "Pre-filters", Prefilter, PREFILTERS),
     "coarse": Slot("coarse", "Coarse alignments", CoarseAlignment, COARSE_ALIGNMENTS),
     "fine": Slot("fine", "Fine alignments", FineAlignment, FINE_ALIGNMENTS),
     "mechanization": Slot("mechanization", "Mechanizations", Mechanization, MECHANIZATIONS),
@@ -62,6 +63,18 @@ SLOTS: dict[str, Slot] = {
 #: Fields that a chain fills by itself, and no person writes.
 GIVEN = ("ellipsoid", "gyro_noise", "accel_noise")
 _PLAIN = (float, int, bool, str)
+#: Units of options whose names do not have them, as the endings of keys; another module's option
+#: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
+UNITS = {
+    "attenuation": "db",
+    "gravity": "m_per_s2",
+    "height_limits": "m",
+    "height_time_constant": "s",
+    "interval": "s",
+    "largest_speed": "m_per_s",
+    "least_speed": "m_per_s",
+    "rate": "hz",
+}
 
 
 @dataclass(frozen=True)
@@ -81,6 +94,8 @@ class Option:
     slot : Slot or None
     takes_class : bool
         Whether the field takes a module's class, and no instance.
+    group : type or None
+        Of a field that takes a dataclass of further options.
     """
 
     field: str
@@ -89,6 +104,7 @@ class Option:
     default: Any
     slot: Slot | None = None
     takes_class: bool = False
+    group: type | None = None
 
 
 def options_of(module: type) -> tuple[Option, ...]:
@@ -113,8 +129,10 @@ def options_of(module: type) -> tuple[Option, ...]:
         slot = _slot_of(hint)
         if slot is not None:
             found.append(Option(one.name, slot.name, hint, _kind(one, slot), slot, _of_class(hint)))
+        elif is_dataclass(hint) and isinstance(hint, type) and _all_plain(hint):
+            found.append(Option(one.name, one.name, hint, _default(one), group=hint))
         elif _plain(hint):
-            unit = one.metadata.get("unit")
+            unit = one.metadata.get("unit") or UNITS.get(one.name)
             key = f"{one.name}_{unit}" if unit else one.name
             found.append(Option(one.name, key, hint, _default(one)))
     return tuple(found)
@@ -145,6 +163,11 @@ def _plain(hint: Any) -> bool:
             continue
         return False
     return True
+
+
+def _all_plain(group: type) -> bool:
+    hints = get_type_hints(group)
+    return all(_plain(hints[one.name]) for one in fields(group))
 
 
 def _default(one: Field[Any]) -> Any:

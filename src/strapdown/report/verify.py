@@ -34,6 +34,7 @@ from strapdown.config import (
 )
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.formats import read_raw
+from strapdown.report.alignment import rerun_alignment
 from strapdown.report.attitude import write_attitude
 from strapdown.report.changed_case import changed_case
 from strapdown.report.crash_case import rerun_crash
@@ -97,7 +98,12 @@ def _rerun_crash(configuration: dict[str, Any], out: Path, sealed: set[str]) -> 
     return rerun_crash(configuration, out)
 
 
+def _rerun_alignment(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    return rerun_alignment(configuration, out)
+
+
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
+    "align": _rerun_alignment,
     "attitude": _rerun_attitude,
     "crash": _rerun_crash,
     "reproduce": _rerun_reproduction,

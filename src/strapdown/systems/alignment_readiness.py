@@ -1,4 +1,4 @@
-"""How accurate an alignment is after how long: the same record, cut shorter."""
+"""How accurate an alignment is after how long: coarse over shorter parts, fine epoch by epoch."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment.readiness import coarse_readiness
 from strapdown.alignment.site import Site
 from strapdown.config.alignment import ReferenceTable
-from strapdown.exceptions import DataError
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import EULER
 from strapdown.tables.checks import values_of
 
-__all__ = ["Readiness", "readiness_of", "reference_offset"]
+__all__ = ["AlignmentReadiness", "alignment_readiness", "reference_offset"]
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ LEAST, TRIES = 15.0, 16
 
 
 @dataclass(frozen=True, eq=False)
-class Readiness:
+class AlignmentReadiness:
     """Alignment time against accuracy.
 
     Attributes
@@ -49,16 +49,17 @@ class Readiness:
     refused: tuple[tuple[float, str], ...]
 
 
-def readiness_of(
+def alignment_readiness(
     way: CoarseAlignment,
     imu: pd.DataFrame,
     site: Site,
     sensors: ImuUncertainty,
+    gnss: pd.DataFrame | None,
     attitude: pd.DataFrame,
     fine: FineResult | None,
     truth: pd.DataFrame | None,
     reference: ReferenceTable | None,
-) -> Readiness:
+) -> AlignmentReadiness:
     """Align over shorter parts of a record, and lay the errors beside their bounds.
 
     Parameters
@@ -68,6 +69,8 @@ def readiness_of(
         Imu table of the whole record.
     site : Site
     sensors : ImuUncertainty
+    gnss : DataFrame, optional
+        Gnss table.
     attitude : DataFrame
         Attitude table of the answer over the record.
     fine : FineResult, optional
@@ -77,32 +80,26 @@ def readiness_of(
 
     Returns
     -------
-    Readiness
+    AlignmentReadiness
     """
-    time = imu.index.to_numpy(dtype=np.float64)
+    begin = float(imu.index[0])
     against = "answer" if truth is None else "truth"
     offset = np.zeros(3)
     if truth is None and reference is not None:
         against = "reference"
         offset = reference_offset(attitude, reference)
     known = attitude if truth is None else truth
-    coarse, refused = [], []
-    for length in _lengths(float(time[-1] - time[0])):
-        part = imu[time <= time[0] + length + 1e-9]
-        part.attrs = dict(imu.attrs)
-        try:
-            found = way.align(part, site, sensors)
-        except DataError as error:
-            refused.append((length, error.finding.what))
-            continue
-        off = _off(found.roll_pitch_heading[None], np.array([found.time]), known)[0]
-        coarse.append([length, *found.sd_deg, *(off + offset)])
-    rows = np.array(coarse).reshape(-1, 7)
-    return Readiness(
+    lengths = _lengths(float(imu.index[-1]) - begin)
+    found = coarse_readiness(way, imu, site, sensors, gnss, lengths, known).table
+    refused = found["refused"].to_numpy() != ""
+    coarse = found[~refused]
+    sd = coarse[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
+    off = coarse[[f"{a}_error" for a in EULER]].to_numpy(dtype=np.float64) + offset
+    return AlignmentReadiness(
         against,
-        _table(rows[:, 0], rows[:, 1:]),
-        _fine(fine, float(time[0]), known, offset),
-        tuple(refused),
+        _table(coarse.index.to_numpy(dtype=np.float64), np.hstack([sd, off])),
+        _fine(fine, begin, known, offset),
+        tuple((float(t), str(why)) for t, why in found["refused"][refused].items()),
     )
 
 

@@ -11,25 +11,26 @@ import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.carried import carried_attitude
+from strapdown.alignment.carry import carry
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment.observability import Manoeuvre, manoeuvres_after
 from strapdown.alignment.site import Site
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.choice import make_choice
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
+from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.results import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu
-from strapdown.systems.alignment_readiness import Readiness, readiness_of
+from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import QUATERNION
-from strapdown.tables.checks import values_of
 
 __all__ = ["AlignmentResult", "run_alignment"]
 
@@ -47,6 +48,7 @@ class AlignmentResult:
     source : AlignmentSource
     imu : DataFrame
         Imu table as it was aligned, after the pre-filter.
+    prefilter : PrefilterReport or None
     site : Site
     sensors : ImuUncertainty
     coarse : Alignment
@@ -55,7 +57,9 @@ class AlignmentResult:
         The answer at the first and at the last sample.
     attitude : DataFrame
         Attitude table over the record: the answer, carried by the gyros.
-    readiness : Readiness
+    readiness : AlignmentReadiness
+    manoeuvres : tuple of Manoeuvre
+        What a turn and a further rest would make known; empty without a fine alignment.
     inputs : tuple of InputFiles
     findings : tuple of Finding
         Of reading, pre-filter, coarse and fine alignment, in this order.
@@ -64,6 +68,7 @@ class AlignmentResult:
     spec: AlignmentSpec
     source: AlignmentSource
     imu: pd.DataFrame
+    prefilter: PrefilterReport | None
     site: Site
     sensors: ImuUncertainty
     coarse: Alignment
@@ -71,7 +76,8 @@ class AlignmentResult:
     start: Alignment
     end: Alignment
     attitude: pd.DataFrame
-    readiness: Readiness
+    readiness: AlignmentReadiness
+    manoeuvres: tuple[Manoeuvre, ...]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
 
@@ -118,10 +124,15 @@ def run_alignment(
     given = {"ellipsoid": spec.site.ellipsoid}
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
-    imu = source.imu
+    imu, report = source.imu, None
+    prefilter: Prefilter | None = make_choice(spec.prefilter, SLOTS["prefilter"], given)
+    if prefilter is not None:
+        progress("pre-filter", 0.08)
+        filtered = prefilter.apply(imu)
+        imu, report = filtered.imu, filtered.report
     progress("coarse alignment", 0.15)
     part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
-    coarse = coarse_way.align(part, site, sensors)
+    coarse = coarse_way.align(part, site, sensors, source.gnss)
     fine: FineResult | None = None
     if fine_way is not None:
         rest = imu if spec.coarse.duration_s is None else _after(imu, part)
@@ -134,20 +145,39 @@ def run_alignment(
             coarse,
             lambda share: progress("fine alignment", 0.25 + 0.3 * share),
         )
-    progress("carrying the attitude over the record", 0.58)
+    progress("carrying the attitude over the record", 0.55)
     answer = coarse if fine is None else fine.alignment
     attitude = carried_attitude(answer, imu, site)
-    start, end = (_at(answer, attitude, row) for row in (0, -1))
+    first = coarse if fine is None else fine.at_start
+    start = _at(first, float(attitude.index[0]), imu, site, sensors)
+    end = _at(answer, float(attitude.index[-1]), imu, site, sensors)
     progress("trying shorter alignments", 0.6)
-    readiness = readiness_of(
-        coarse_way, imu, site, sensors, attitude, fine, source.truth, spec.reference
+    readiness = alignment_readiness(
+        coarse_way,
+        imu,
+        site,
+        sensors,
+        source.gnss,
+        attitude,
+        fine,
+        source.truth,
+        spec.reference,
     )
+    progress("looking for what a turn would tell", 0.66)
+    manoeuvres = () if fine is None else manoeuvres_after(fine, site)
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
-    findings = [*source.findings, *coarse.findings, *(() if fine is None else fine.findings)]
+    of_filter = () if report is None else report.findings
+    findings = [
+        *source.findings,
+        *of_filter,
+        *coarse.findings,
+        *(() if fine is None else fine.findings),
+    ]
     return AlignmentResult(
         spec=spec,
         source=source,
         imu=imu,
+        prefilter=report,
         site=site,
         sensors=sensors,
         coarse=coarse,
@@ -156,6 +186,7 @@ def run_alignment(
         end=end,
         attitude=attitude,
         readiness=readiness,
+        manoeuvres=manoeuvres,
         inputs=(*files, *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
@@ -182,7 +213,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
             quantity="time",
             remedy="align for longer",
         )
-    out = imu[kept]
+    out: pd.DataFrame = imu.loc[kept]
     out.attrs = dict(imu.attrs)
     return out
 
@@ -202,10 +233,11 @@ def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
     return out
 
 
-def _at(answer: Alignment, attitude: pd.DataFrame, row: int) -> Alignment:
-    return replace(
-        answer,
-        time=float(attitude.index[row]),
-        q_nb=values_of(attitude, QUATERNION)[row],
-        findings=(),
-    )
+def _at(
+    answer: Alignment, time: float, imu: pd.DataFrame, site: Site, sensors: ImuUncertainty
+) -> Alignment:
+    """The answer at an end of the record: as it is where it holds there, else carried."""
+    step = float(np.median(np.diff(imu.index.to_numpy(dtype=np.float64))))
+    if abs(answer.time - time) < 0.5 * step:
+        return replace(answer, findings=())
+    return replace(carry(imu, answer, time, site, sensors), findings=())

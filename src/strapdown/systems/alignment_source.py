@@ -14,6 +14,7 @@ from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats import read_log
+from strapdown.formats.named_columns import read_fixes
 from strapdown.formats.recording import ReadOptions, Recording, StatedStart
 from strapdown.results import InputFiles, Reading
 from strapdown.rotation import euler_from_dcm
@@ -47,6 +48,8 @@ class AlignmentSource:
         Attitude table at the same stamps, of a simulation.
     start : StatedStart or None
         What the file says of its place and attitude.
+    gnss : DataFrame or None
+        Gnss table, where one is given.
     readings : tuple of Reading
     inputs : tuple of InputFiles
     findings : tuple of Finding
@@ -57,6 +60,7 @@ class AlignmentSource:
     imu: pd.DataFrame
     truth: pd.DataFrame | None
     start: StatedStart | None
+    gnss: pd.DataFrame | None
     readings: tuple[Reading, ...]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
@@ -99,10 +103,19 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
         imu,
         None,
         recording.start,
+        None if spec.gnss is None else read_fixes(spec.gnss.path),
         recording.readings,
-        (input_files("log", spec.log.path, recording.files), *_sensor_file(spec)),
+        (
+            input_files("log", spec.log.path, recording.files),
+            *(() if spec.gnss is None else (_fixes(spec.gnss.path),)),
+            *_sensor_file(spec),
+        ),
         tuple(findings),
     )
+
+
+def _fixes(path: str) -> InputFiles:
+    return input_files("gnss", path, (Path(path),))
 
 
 def _options(log: LogTable, axes: str | None) -> ReadOptions:
@@ -221,4 +234,4 @@ def _simulated(spec: AlignmentSpec) -> AlignmentSource:
         source=spec.name,
     )
     what = f"simulated, {Path(sensor).stem}, seed {asked.seed}"
-    return AlignmentSource(spec.name, what, imu, truth, None, (), _sensor_file(spec), ())
+    return AlignmentSource(spec.name, what, imu, truth, None, None, (), _sensor_file(spec), ())

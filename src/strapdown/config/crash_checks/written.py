@@ -49,6 +49,10 @@ class Written:
         what = f"{shown(value)}: {why}" if value is not None and not _big(value) else why
         return self.file.refuse(self._at(path), what, remedy)
 
+    def refuse_as_told(self, path: KeyPath, what: str, remedy: str) -> ConfigError:
+        """An error about one value that names it in its own words."""
+        return self.file.refuse(self._at(path), what, remedy)
+
     def missing(self, path: KeyPath, why: str) -> ConfigError:
         """An error about a field that is not written, though it is needed."""
         return self.file.refuse(path, f"it is missing: {why}", what_to_write(path))

@@ -1,0 +1,197 @@
+"""``strapdown align``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+EPILOG = (
+    "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000   |   "
+    "Example: strapdown align align.toml (strapdown init align LOG writes one)"
+)
+_WHERE, _LOG, _RUN, _OUT = (
+    "Where it stands, and with what",
+    "How to read the log",
+    "What to run",
+    "What to write",
+)
+
+
+def align(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG|CONFIG.toml",
+            help="A log of gyros and accelerometers of a body that stays at its place, or the "
+            "file of an alignment.",
+        ),
+    ],
+    lat: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Latitude, north positive.", rich_help_panel=_WHERE),
+    ] = None,
+    lon: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=_WHERE),
+    ] = None,
+    alt: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=_WHERE),
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
+            ".toml file of your own.",
+            rich_help_panel=_WHERE,
+        ),
+    ] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Coarse alignment, with options after a colon: inertial_frame (the body may "
+            "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course.",
+            rich_help_panel=_RUN,
+        ),
+    ] = "inertial_frame",
+    coarse_only: Annotated[
+        bool,
+        typer.Option("--coarse-only", help="No fine alignment after it.", rich_help_panel=_RUN),
+    ] = False,
+    gnss: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FIXES",
+            help="Fixes of a satellite receiver, for --method gnss_course.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    prefilter: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="What the samples pass first, with options after a colon, as "
+            "robust_fir:rate_hz=100.",
+            rich_help_panel=_RUN,
+        ),
+    ] = "none",
+    from_s: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Use so much of the log.", rich_help_panel=_RUN),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(metavar="HZ", help="Of a log without a time column.", rich_help_panel=_LOG),
+    ] = None,
+    sampling: Annotated[
+        str | None,
+        typer.Option(metavar="KIND", help="instantaneous or mean.", rich_help_panel=_LOG),
+    ] = None,
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(metavar="Q=NAME", help="time=t,gyro_x=wx,…", rich_help_panel=_LOG),
+    ] = None,
+    gyro_unit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.", rich_help_panel=_LOG
+        ),
+    ] = None,
+    accel_unit: Annotated[
+        str | None,
+        typer.Option(metavar="UNIT", help="m/s2, g, mg, …; m/s: increments.", rich_help_panel=_LOG),
+    ] = None,
+    time_unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.", rich_help_panel=_LOG)
+    ] = None,
+    axes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
+            "forward-left-up. A matrix goes in the file of an alignment.",
+            rich_help_panel=_LOG,
+        ),
+    ] = None,
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Leave out rows that cannot be used.", rich_help_panel=_LOG),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder to make (LOG-align).", rich_help_panel=_OUT),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
+    ] = False,
+    json: Annotated[
+        bool,
+        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
+    ] = False,
+) -> None:
+    """Find roll, pitch and heading of a body that stands, from its gyros and accelerometers.
+
+    A coarse alignment finds north from the turn of the Earth, a filter refines it and estimates
+    drifts and biases; the report says how well each is known, what limits it, and after how long
+    it was known.
+    """
+    from strapdown.bundle import check_destination, write_timing
+    from strapdown.cli.align_options import flag_words, spec_of_flags
+    from strapdown.cli.align_tables import print_alignment
+    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.config.alignment_file import read_alignment_spec
+    from strapdown.report.alignment import write_alignment
+    from strapdown.systems.alignment_run import run_alignment
+
+    folder = out or Path(f"{source.resolve().stem}-align")
+    check_destination(folder, force)
+    given: dict[str, Any] = {
+        "lat": lat,
+        "lon": lon,
+        "alt": alt,
+        "sensor": sensor,
+        "method": None if method == "inertial_frame" else method,
+        "coarse_only": coarse_only or None,
+        "gnss": gnss,
+        "prefilter": None if prefilter == "none" else prefilter,
+        "from_s": from_s,
+        "duration": duration,
+        "rate": rate,
+        "sampling": sampling,
+        "columns": columns,
+        "gyro_unit": gyro_unit,
+        "accel_unit": accel_unit,
+        "time_unit": time_unit,
+        "axes": axes,
+        "repair": repair or None,
+    }
+    own = source.suffix.lower() == ".toml"
+    with progress(quiet or json) as show:
+        report = Stopwatch(show)
+        if own:
+            flag_words(source, given)
+            spec = read_alignment_spec(source)
+        else:
+            spec = spec_of_flags(source, given)
+        result = run_alignment(spec, source if own else None, report)
+        seal = write_alignment(result, folder, force=force, progress=report)
+        report.stop()
+        write_timing(seal, report.seconds)
+    if json:
+        typer.echo((seal.path / "align.json").read_text(encoding="utf-8"), nl=False)
+        return
+    if quiet:
+        return
+    print_alignment(result)
+    print_findings(result.findings)
+    print_seal(seal, "report.html")

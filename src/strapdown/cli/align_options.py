@@ -1,0 +1,190 @@
+"""Flags of ``strapdown align`` as the specification of an alignment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from strapdown.config.alignment import AlignmentSpec
+from strapdown.config.alignment_checks import NOT_BEFORE_FINE
+from strapdown.config.alignment_file import alignment_spec
+from strapdown.exceptions import ConfigError, StrapdownError
+from strapdown.formats import read_raw
+from strapdown.formats.columns import parse_column_option
+
+__all__ = ["flag_words", "spec_of_flags"]
+
+#: Flags by the place in a specification.
+FLAGS = {
+    "site, lat_deg": "--lat",
+    "site, lon_deg": "--lon",
+    "site, alt_m": "--alt",
+    "sensors, sensor": "--sensor",
+    "axes, axes": "--axes",
+    "gnss, path": "--gnss",
+    "log, sampling": "--sampling",
+    "log, rate_hz": "--rate",
+    "log, to_s": "--duration",
+    "log, gyro_unit": "--gyro-unit",
+    "log, accel_unit": "--accel-unit",
+    "log, time_unit": "--time-unit",
+}
+_STAGES = {"coarse": "--method", "prefilter": "--prefilter"}
+
+
+def flag_words(source: Path, given: Mapping[str, Any]) -> None:
+    """Refuse flags beside a file that says all of it.
+
+    Raises
+    ------
+    ConfigError
+    """
+    written = [name for name, value in given.items() if value is not None]
+    if not written:
+        return
+    flag = "--" + written[0].removesuffix("_s").replace("_", "-")
+    raise ConfigError(
+        "the file of an alignment says how it is run, and this is said beside it",
+        file=source.name,
+        quantity=flag,
+        remedy="write it in the file; --out, --force, --json and --quiet go with both",
+    )
+
+
+def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
+    """Return the specification that flags make; the place may come from the log.
+
+    Parameters
+    ----------
+    log : Path
+    given : mapping
+        By flag, None where it is not given.
+
+    Returns
+    -------
+    AlignmentSpec
+
+    Raises
+    ------
+    ConfigError
+        A value does not fit, or what is needed is not said; the message names the flag.
+    DataError
+        The log cannot be read.
+    """
+    first, duration = given["from_s"], given["duration"]
+    if duration is not None and not duration > 0.0:
+        raise ConfigError(
+            f"{duration:g} s is no duration", quantity="--duration", remedy="give seconds above 0"
+        )
+    begin = first
+    if duration is not None and first is None:
+        begin = _begin(log)
+    options = {
+        "path": str(log),
+        "columns": parse_column_option(given["columns"] or []),
+        "gyro_unit": given["gyro_unit"],
+        "accel_unit": given["accel_unit"],
+        "time_unit": given["time_unit"],
+        "sampling": given["sampling"],
+        "rate_hz": given["rate"],
+        "repair": bool(given["repair"]),
+        "from_s": first,
+        "to_s": None if duration is None else (begin or 0.0) + duration,
+    }
+    coarse = _module(given["method"] or "inertial_frame")
+    alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
+    table = {
+        "name": log.resolve().stem,
+        "log": options,
+        "axes": {"axes": given["axes"]},
+        "site": _site(log, given),
+        "sensors": {"sensor": given["sensor"]},
+        "prefilter": _module(given["prefilter"] or "none"),
+        "gnss": None if given["gnss"] is None else {"path": str(given["gnss"])},
+        "coarse": coarse,
+        "fine": {"kind": "none" if alone else "filter"},
+    }
+    try:
+        return alignment_spec(table)
+    except ValidationError as error:
+        first_one = error.errors()[0]
+        place = ", ".join(str(p) for p in first_one["loc"])
+        context = first_one.get("ctx", {})
+        what = context.get("what") or f"{first_one['input']!r} does not fit: {first_one['msg']}"
+        if context.get("key"):
+            place = f"{place}, {context['key']}"
+        raise ConfigError(
+            what, quantity=_flag(place), remedy=context.get("remedy") or "give another value"
+        ) from None
+    except ConfigError as error:
+        raise _as_flag(error) from None
+
+
+def _as_flag(error: StrapdownError) -> StrapdownError:
+    f = error.finding
+    return type(error)(
+        f.what, file=f.file, row=f.row, quantity=_flag(f.quantity or ""), remedy=f.remedy
+    )
+
+
+def _flag(place: str) -> str:
+    if place in FLAGS:
+        return FLAGS[place]
+    stage, _, rest = place.partition(", ")
+    return f"{_STAGES[stage]}, {rest}" if stage in _STAGES and rest else _STAGES.get(stage, place)
+
+
+def _begin(log: Path) -> float:
+    """The instant at which a log begins, where its stamps are seconds already; else zero."""
+    raw = read_raw(log)
+    named = [s for s, (q, unit) in raw.stated.items() if q == "time" and unit == "s"]
+    stamp = float(raw.columns[named[0]][0]) if named and len(raw.columns[named[0]]) else 0.0
+    return stamp if 0.0 < stamp < 1e6 and stamp > 1.0 else 0.0
+
+
+def _site(log: Path, given: Mapping[str, Any]) -> dict[str, float]:
+    place = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
+    if given["lat"] is None and given["lon"] is None:
+        start = read_raw(log).start
+        if start is not None:
+            said = {"lat_deg": start.lat_deg, "lon_deg": start.lon_deg, "alt_m": start.alt}
+            return {k: v if place[k] is None else place[k] for k, v in said.items()}
+    for key, flag in (("lat_deg", "--lat"), ("lon_deg", "--lon")):
+        if place[key] is None:
+            raise ConfigError(
+                "nothing says where the body stands, and the rate of the Earth that it feels "
+                "depends on it",
+                quantity=flag,
+                remedy="give --lat and --lon in degrees, to a hundredth; --alt in metres",
+            )
+    return {k: float(v) for k, v in place.items() if v is not None}
+
+
+def _module(text: str) -> dict[str, Any]:
+    """A kind with its options: ``robust_fir:rate_hz=100,passband=0.4``."""
+    kind, _, rest = text.partition(":")
+    out: dict[str, Any] = {"kind": kind.strip()}
+    for part in (p for p in rest.split(",") if p.strip()):
+        key, equals, value = (piece.strip() for piece in part.partition("="))
+        if not equals or not value:
+            raise ConfigError(
+                f"'{part}' is no option",
+                quantity=kind,
+                remedy="write name=value after the colon, several joined by commas",
+            )
+        out[key] = _value(value)
+    return out
+
+
+def _value(text: str) -> Any:
+    if text in ("true", "false"):
+        return text == "true"
+    for form in (int, float):
+        try:
+            return form(text)
+        except ValueError:
+            continue
+    return text

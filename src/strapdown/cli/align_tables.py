@@ -1,0 +1,38 @@
+"""What ``strapdown align`` prints."""
+
+from __future__ import annotations
+
+from strapdown.cli.console import console, print_table
+from strapdown.report.alignment_tables import answer_table, bias_table, readiness_table
+from strapdown.report.alignment_words import headline, limits, trust
+from strapdown.report.crash_values import spaced
+from strapdown.report.document import TableBlock
+from strapdown.systems.alignment_run import AlignmentResult
+
+__all__ = ["print_alignment"]
+
+
+def print_alignment(result: AlignmentResult) -> None:
+    """Print the answer of an alignment, and what limits it."""
+    out = console()
+    site = result.site
+    out.print(
+        f"{result.source.name}: {result.source.what}, "
+        f"{float(result.imu.index[-1] - result.imu.index[0]):.6g} s at {site.lat_deg:.5f}°, "
+        f"{site.lon_deg:.5f}°"
+    )
+    for block in (answer_table(result), readiness_table(result), bias_table(result)):
+        if block is not None:
+            _print(block)
+    out.print(spaced(headline(result)), style="bold")
+    found = trust(result)
+    style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[found.verdict]
+    out.print(spaced(found.sentence), style=style)
+    for head, text in limits(result):
+        out.print(spaced(f"  - {head}: {text}"))
+
+
+def _print(block: TableBlock) -> None:
+    rows = [[spaced(cell) for cell in row] for row in block.rows]
+    columns = [spaced(name) for name in block.columns]
+    print_table(columns, rows, text=block.text, strong=block.strong)

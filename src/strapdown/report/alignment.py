@@ -1,0 +1,137 @@
+"""An alignment as files: page, JSON, tables and figures, sealed in a bundle."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from strapdown.bundle import Seal, to_json, write_bundle
+from strapdown.config.alignment_file import alignment_spec
+from strapdown.report.alignment_document import (
+    CONVENTIONS,
+    alignment_charts,
+    alignment_document,
+)
+from strapdown.report.alignment_json import alignment_json
+from strapdown.report.crash_csv import write_table
+from strapdown.report.document_data import draw_stills
+from strapdown.report.document_html import document_page
+from strapdown.systems.alignment_run import AlignmentResult, run_alignment
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import EULER
+
+__all__ = ["rerun_alignment", "write_alignment"]
+
+Progress = Callable[[str, float], None]
+
+
+def _silent(stage: str, share: float) -> None:
+    """Report progress to nobody."""
+
+
+def rerun_alignment(configuration: dict[str, Any], out: Path) -> Seal:
+    """Run a sealed alignment again from its configuration."""
+    spec = alignment_spec(configuration["alignment"])
+    path = configuration.get("file_path")
+    name = str(configuration["name"])
+    return write_alignment(
+        run_alignment(spec, None if path is None else Path(path)), out, name=name
+    )
+
+
+@one_thread()
+def write_alignment(
+    result: AlignmentResult,
+    out: str | Path,
+    *,
+    name: str | None = None,
+    force: bool = False,
+    progress: Progress = _silent,
+) -> Seal:
+    """Write an alignment as a sealed bundle.
+
+    Parameters
+    ----------
+    result : AlignmentResult
+    out : str or Path
+        Folder to make.
+    name : str, optional
+        Of the folder, as the report names it; that of `out`, if not given.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        `out` exists and may not be replaced.
+    """
+    name = Path(out).absolute().name if name is None else name
+    document = alignment_document(result, name)
+    file = next((str(i.path) for i in result.inputs if i.role == "configuration"), None)
+    configuration = {
+        "name": name,
+        "alignment": result.spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True),
+        **({} if file is None else {"file_path": file}),
+    }
+    seals: list[Seal] = []
+    with write_bundle(
+        Path(out),
+        command="align",
+        configuration=configuration,
+        inputs=result.inputs,
+        force=force,
+        seals=seals,
+    ) as folder:
+        _write(folder / "align.json", to_json(alignment_json(result)))
+        told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
+        write_table(_attitude(result), folder / "attitude.csv", told)
+        if result.fine is not None:
+            write_table(_history(result.fine.history), folder / "fine.csv", told)
+        progress("drawing the figures", 0.75)
+        stills = draw_stills(document)
+        (folder / "figures").mkdir()
+        for chart, still in zip(alignment_charts(document), stills, strict=True):
+            _write(folder / "figures" / f"{chart.slug}.svg", still)
+        progress("writing the page", 0.9)
+        _write(folder / "report.html", document_page(document, stills=stills))
+    return seals[0]
+
+
+def _attitude(result: AlignmentResult) -> pd.DataFrame:
+    """Attitude at the rate that is asked for, each column with its unit."""
+    table = result.attitude
+    rate = result.spec.output.rate_hz
+    if rate is not None:
+        time = table.index.to_numpy(dtype=np.float64)
+        cell = np.floor((time - time[0]) * rate + 1e-6)
+        kept = np.concatenate([[True], np.diff(cell) > 0])
+        kept[-1] = True
+        table = table[kept]
+    out = table.rename(columns={a: f"{a}_deg" for a in EULER})
+    out.insert(0, "time_s", out.index.to_numpy())
+    return out.reset_index(drop=True)
+
+
+def _history(history: pd.DataFrame) -> pd.DataFrame:
+    """Estimates and standard deviations of the fine alignment, each column with its unit."""
+    units = dict.fromkeys(EULER, "deg")
+    units |= {f"gyro_bias_{a}": "rad_per_s" for a in "xyz"}
+    units |= {f"accel_bias_{a}": "m_per_s2" for a in "xyz"}
+    names = {n: f"{n}_{u}" for n, u in units.items()}
+    names |= {f"{n}_sd": f"{n}_sd_{u}" for n, u in units.items()}
+    out = history.rename(columns=names)
+    out.insert(0, "time_s", out.index.to_numpy())
+    return out.reset_index(drop=True)
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")

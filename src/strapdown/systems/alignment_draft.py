@@ -1,0 +1,220 @@
+"""The file of an alignment to begin with: what a log tells filled in, what it does not asked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapdown.config.alignment_file import MAY_BE_EMPTY, STAGES
+from strapdown.config.slots import SLOTS, Slot, options_of
+from strapdown.exceptions import Finding
+from strapdown.formats import ReadOptions, read_log
+from strapdown.formats.recording import Recording
+from strapdown.sensors.axes_matrix import NAMED_AXES
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, number, string
+
+__all__ = ["AlignmentDraft", "draft_alignment"]
+
+#: Of the catalogue those that can find north, or nearly.
+GRADES = ("navigation", "tactical")
+
+
+@dataclass(frozen=True)
+class AlignmentDraft:
+    """A file of an alignment as text.
+
+    Attributes
+    ----------
+    text : str
+    found : tuple of str
+        What the log told.
+    asked : tuple of Asked
+        What only the user knows.
+    findings : tuple of Finding
+        Of reading the log.
+    """
+
+    text: str
+    found: tuple[str, ...]
+    asked: tuple[Asked, ...]
+    findings: tuple[Finding, ...]
+
+
+def draft_alignment(
+    log: Path, *, folder: Path, options: ReadOptions | None = None
+) -> AlignmentDraft:
+    """Write the file of an alignment of a log.
+
+    Parameters
+    ----------
+    log : Path
+    folder : Path
+        Where the file will stand: the log is named from there.
+    options : ReadOptions, optional
+        What the user says about reading it.
+
+    Returns
+    -------
+    AlignmentDraft
+
+    Raises
+    ------
+    DataError, ConfigError
+        The log cannot be read; the message names file, row and remedy.
+    """
+    asked = options or ReadOptions()
+    recording = read_log(log, asked)
+    page = Page()
+    page.say(
+        f"An alignment of {recording.name}: find roll, pitch and heading of a body that stands.",
+        'Put what you know in place of each "?", then run: strapdown align on this file.',
+    )
+    found = _log(page, log, folder, recording, asked)
+    found += _site(page, recording)
+    _axes(page, asked)
+    _sensors(page)
+    for name, (_, default) in STAGES.items():
+        _stage(page, SLOTS[name], default, name in MAY_BE_EMPTY)
+    _rest(page)
+    text = "\n".join(page.lines) + "\n"
+    return AlignmentDraft(text, tuple(found), tuple(page.asked), recording.findings)
+
+
+def _log(
+    page: Page, log: Path, folder: Path, recording: Recording, options: ReadOptions
+) -> list[str]:
+    time = recording.imu.index.to_numpy(dtype=np.float64)
+    rate = 1.0 / float(np.median(np.diff(time)))
+    span = f"{len(time)} samples, {time[0]:.6g} to {time[-1]:.6g} s, {rate:.4g} Hz"
+    page.table("[log]", f"Found: {span}, {recording.imu.attrs['sampling']} values.")
+    page.key("path", string(_from(log, folder)), "from the folder of this file")
+    for key, value in (
+        ("gyro_unit", options.gyro_unit),
+        ("accel_unit", options.accel_unit),
+        ("time_unit", options.time_unit),
+        ("sampling", options.sampling),
+    ):
+        if value:
+            page.key(key, string(value))
+    if options.rate:
+        page.key("rate_hz", number(options.rate))
+    page.say("from_s = 0.0, to_s = 300.0: a part of it alone, where the body stands")
+    return [f"{recording.name}: {span}"]
+
+
+def _from(path: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:  # on another drive
+        return path.absolute().as_posix()
+
+
+def _site(page: Page, recording: Recording) -> list[str]:
+    start = recording.start
+    where = "Where the body stands: to a hundredth of a degree is enough."
+    if start is None:
+        page.table("[site]", where)
+        page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive")
+        page.key("lon_deg", ASK, "only you know: longitude, east positive")
+        page.key("alt_m", "0.0", "assumed: height over the ellipsoid")
+        found = []
+    else:
+        page.table("[site]", where, "Found: the log states it; check that it is so.")
+        page.key("lat_deg", repr(start.lat_deg), "north positive")
+        page.key("lon_deg", repr(start.lon_deg), "east positive")
+        page.key("alt_m", repr(start.alt), "over the ellipsoid")
+        found = [f"place: {start.lat_deg:.6f}°, {start.lon_deg:.6f}°, {start.alt:g} m"]
+    page.key("ellipsoid", '"wgs84"')
+    return found
+
+
+def _axes(page: Page, options: ReadOptions) -> None:
+    page.table("[axes]", "How the sensor's axes lie in the body, where the log does not say it.")
+    if options.axes:
+        page.key("axes", string(options.axes))
+    page.say(
+        'axes = "forward-left-up": where x, y, z of the sensor point; or "x,-y,-z", the axes that '
+        "point forward, right, down",
+        "matrix = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]: any rotation; rows are the body's forward, "
+        "right, down along the sensor's x, y, z. gyro_matrix and accel_matrix, where they differ",
+        f"design = … by name: {', '.join(NAMED_AXES)}",
+    )
+
+
+def _sensors(page: Page) -> None:
+    page.table(
+        "[sensors]",
+        "How good the sensors are: every bound rests on it. A gyro bias of 0.01 deg/h is 0.05° of "
+        "heading, an accelerometer bias of 50 µg 0.003° of tilt.",
+    )
+    good = [s.name for s in map(load_sensor, SENSORS) if s.grade in GRADES]
+    page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
+    page.say(
+        f"Of those that can find north, or nearly: {', '.join(good)}; all: strapdown modules",
+        "In its place, or to replace numbers of it, in tables [sensors.gyro] and [sensors.accel]: "
+        "bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
+        "noise_density_ug_per_sqrt_hz, …",
+    )
+
+
+def _stage(page: Page, slot: Slot, default: str, empty: bool) -> None:
+    page.table(f"[{slot.name}]", f"{slot.title}:", *_listed(slot, empty))
+    page.key("kind", string(default))
+    if default in slot.entries:
+        for option in options_of(slot.entries[default]):
+            value = _toml(option.default)
+            if option.slot is not None:
+                choices = ", ".join(option.slot.entries)
+                said = value if option.default is not None else '"none"'
+                page.say(f"{option.key} = {said}    of {choices}")
+            elif value is not None:
+                page.say(f"{option.key} = {value}")
+    if slot.name == "coarse":
+        page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
+
+
+def _listed(slot: Slot, empty: bool) -> list[str]:
+    """One line a kind."""
+    kinds = {kind: _summary(entry) for kind, entry in slot.entries.items()}
+    if empty:
+        kinds["none"] = "left out"
+    width = max(map(len, kinds))
+    return [f"  {kind:<{width}}  {told}" for kind, told in kinds.items()]
+
+
+def _summary(entry: type) -> str:
+    return (
+        str(getattr(entry, "summary", "")) or entry.__doc__.partition("\n")[0].rstrip(".").lower()
+    )  # type: ignore[union-attr]
+
+
+def _toml(value: Any) -> str | None:
+    """A plain value of TOML; None for what is none."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        return string(value)
+    if isinstance(value, tuple | list):
+        parts = [_toml(v) for v in value]
+        return f"[{', '.join(p for p in parts if p is not None)}]"
+    if isinstance(value, Mapping) or value is MISSING:
+        return None
+    return None
+
+
+def _rest(page: Page) -> None:
+    page.table("[output]", "What is written beside the report.")
+    page.key("rate_hz", "10.0", "of attitude.csv")
+    page.blank()
+    page.say(
+        '[reference]: heading_deg, pitch_deg, roll_deg, sd_deg, at = "end" or "start", source: '
+        "an attitude that is known from elsewhere, to hold the answer beside",
+    )
