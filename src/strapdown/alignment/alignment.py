@@ -32,6 +32,8 @@ class Alignment:
     gyro_bias, accel_bias : ndarray, (3,), rad/s and m/s², optional
         Where the method tells them, body axes: reading less truth.
     gyro_bias_sd, accel_bias_sd : ndarray, (3,), optional
+    measured_latitude_deg, measured_latitude_sd_deg : float, deg, optional
+        Where the method tells it without the site's: from gravity and the Earth's rate.
     findings : tuple of Finding
         Assumptions that do not hold, and what the sensors cannot tell.
     """
@@ -44,6 +46,8 @@ class Alignment:
     accel_bias: Array | None = None
     gyro_bias_sd: Array | None = None
     accel_bias_sd: Array | None = None
+    measured_latitude_deg: float | None = None
+    measured_latitude_sd_deg: float | None = None
     findings: tuple[Finding, ...] = field(default=())
 
     @property
