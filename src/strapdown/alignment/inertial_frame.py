@@ -94,7 +94,7 @@ class InertialFrame(CoarseAlignment):
         findings += north_findings(site, float(np.sqrt(own[2, 2])), sensors, source)
         whole = own + noise.covariance(sums, fit.response.push, fit.response.place)
         sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
-        _refuse_travel(noise, sd, imu, site)
+        _refuse_travel(noise, sd, imu, site, findings)
         if noise.significant:
             findings.append(_left_over(noise, sd[2], sums.length, source))
         findings += still_by_gnss(gnss, imu, site, float(sd[2]))
@@ -142,12 +142,24 @@ def _own_covariance(
     return sensor_covariance(sums, turn, push, sensors) + sensor_noise(sums, turn, push, sensors)
 
 
-def _refuse_travel(noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site) -> None:
+def _refuse_travel(
+    noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site, findings: list[Finding]
+) -> None:
     """Refuse a record whose leftovers drown north."""
     if not (noise.significant and sd[2] > LARGEST_SD):
         return
     rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
     length = float(imu.index[-1] - imu.index[0])
+    # A burst of outliers or a gap explains it better than a drive.
+    known = [f for f in findings if f.row is not None]
+    if known:
+        raise DataError(
+            f"{known[0].what}; the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
+            file=known[0].file,
+            row=known[0].row,
+            quantity=known[0].quantity,
+            remedy=known[0].remedy,
+        )
     raise DataError(
         f"the body did not stay at its place, or the gyros do not tell its turns: within "
         f"{length:.4g} s the second integral of the specific force departs from gravity's by "

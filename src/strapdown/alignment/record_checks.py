@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.north import CONTRADICTION
+from strapdown.alignment.outliers import outlier_findings
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError, Finding
 from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
@@ -34,7 +35,7 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     Returns
     -------
     tuple of Finding
-        Gaps.
+        Outliers, gaps.
 
     Raises
     ------
@@ -61,7 +62,8 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
         )
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
     _check_alive(values, source)
-    return _gaps(imu.index.to_numpy(dtype=np.float64), source)
+    outliers = outlier_findings(values, [*GYRO, *ACCEL], source)
+    return (*outliers, *_gaps(imu.index.to_numpy(dtype=np.float64), source))
 
 
 def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
