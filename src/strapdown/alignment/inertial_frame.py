@@ -16,14 +16,13 @@ from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.inertial_fit import InertialFit, fit_inertially
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
 from strapdown.alignment.north import (
-    CONTRADICTION,
     LARGEST_SD,
     latitude_findings,
     north_findings,
     unit_remedy,
 )
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
-from strapdown.alignment.record_checks import check_gravity, check_record
+from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.residual_noise import ResidualNoise, residual_noise
 from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
@@ -95,14 +94,15 @@ class InertialFrame(CoarseAlignment):
         findings += north_findings(site, float(np.sqrt(own[2, 2])), sensors, source)
         whole = own + noise.covariance(sums, fit.response.push, fit.response.place)
         sd = np.sqrt(np.maximum(np.diagonal(whole), 0.0))
-        _refuse_travel(noise, sd, imu, site)
+        _refuse_travel(noise, sd, imu, site, findings)
         if noise.significant:
             findings.append(_left_over(noise, sd[2], sums.length, source))
         findings += still_by_gnss(gnss, imu, site, float(sd[2]))
         findings += turn_findings(sums, fit.C_nb, site, sensors, source)
-        findings += _gravity_findings(fit, float(sd[4]), source)
+        findings += gravity_findings(fit.gravity_change, float(sd[4]), source)
         measured = site.lat_deg + float(np.degrees(fit.latitude_change))
-        findings += latitude_findings(site, measured, float(np.degrees(sd[3])), source)
+        measured_sd = float(np.degrees(sd[3]))
+        findings += latitude_findings(site, measured, measured_sd, source)
         C_nb, covariance = fit.C_nb, whole[:3, :3]
         if self.at == "end":
             level = rotation.dcm_from_rotation_vector(-site.earth_rate * sums.length)
@@ -116,6 +116,8 @@ class InertialFrame(CoarseAlignment):
             sums.start + (sums.length if self.at == "end" else 0.0),
             rotation.quaternion_from_dcm(C_nb),
             covariance,
+            measured_latitude_deg=measured,
+            measured_latitude_sd_deg=measured_sd,
             findings=tuple(findings),
         )
 
@@ -140,12 +142,24 @@ def _own_covariance(
     return sensor_covariance(sums, turn, push, sensors) + sensor_noise(sums, turn, push, sensors)
 
 
-def _refuse_travel(noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site) -> None:
+def _refuse_travel(
+    noise: ResidualNoise, sd: Array, imu: pd.DataFrame, site: Site, findings: list[Finding]
+) -> None:
     """Refuse a record whose leftovers drown north."""
     if not (noise.significant and sd[2] > LARGEST_SD):
         return
     rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
     length = float(imu.index[-1] - imu.index[0])
+    # A burst of outliers or a gap explains it better than a drive.
+    known = [f for f in findings if f.row is not None]
+    if known:
+        raise DataError(
+            f"{known[0].what}; the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
+            file=known[0].file,
+            row=known[0].row,
+            quantity=known[0].quantity,
+            remedy=known[0].remedy,
+        )
     raise DataError(
         f"the body did not stay at its place, or the gyros do not tell its turns: within "
         f"{length:.4g} s the second integral of the specific force departs from gravity's by "
@@ -171,20 +185,4 @@ def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | Non
         quantity="accel",
         remedy="align for longer, while the vehicle does not drive; where it stood, state noisier "
         "sensors",
-    )
-
-
-def _gravity_findings(fit: InertialFit, sd: float, source: str | None) -> tuple[Finding, ...]:
-    off = fit.gravity_change
-    if not abs(off) > CONTRADICTION * sd:
-        return ()
-    return (
-        Finding(
-            f"gravity is measured {1e6 * off:+.4g} ppm off that of the site, "
-            f"{abs(off) / max(sd, 1e-300):.1f} standard deviations of the accelerometers",
-            file=source,
-            quantity="accel",
-            remedy="check the height and the latitude of the site, the scale of the "
-            "accelerometers and their stated bias, and that the vehicle did not drive",
-        ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 
@@ -109,6 +110,14 @@ def test_another_latitude(method, stood):
         assert "latitude" in found
     # The measured one is the true one, within what a bias of 0.01 deg/h leaves.
     assert "the sensors tell 5" in words(method.align(imu, Site(50.0, 37.0, 150.0), sensors))
+
+
+@each
+def test_another_height(method, stood):
+    """Gravity falls by 0.31 ppm a metre: 5 km are 1570 ppm, the accelerometers' are 70."""
+    imu, _, sensors = stood
+    found = words(method.align(imu, Site(55.0, 37.0, 5150.0), sensors))
+    assert "log.csv, accel: gravity is measured +15" in found
 
 
 def test_a_latitude_of_the_wrong_sign_is_called_that(stood):
@@ -247,6 +256,22 @@ def test_noisier_gyros_than_stated_are_in_the_uncertainty():
 def test_rocking_alone_is_no_fault_to_the_inertial_frame():
     imu, _, sensors = unit(rocking(600.0), 50.0, 3)
     assert not InertialFrame().align(imu, SITE, sensors).findings
+
+
+@each
+def test_a_burst_of_outliers(method, stood):
+    imu, truth, sensors = stood
+    burst = changed(imu)
+    burst.iloc[3000:3005, burst.columns.get_loc("accel_x")] += 50.0
+    place = r"log.csv, row 300[16], accel_x: 2 steps from sample to sample"
+    if method.name == "inertial_frame":
+        with pytest.raises(DataError, match=rf"(?s){place}.*heading is not known.*robust filter"):
+            method.align(burst, SITE, sensors)
+        return
+    found = method.align(burst, SITE, sensors)
+    assert re.search(place, words(found))
+    if method.name != "levelling":
+        assert chi_square(found, truth[-1]) < 16.0
 
 
 def test_options_out_of_range():
