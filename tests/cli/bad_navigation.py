@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown.increments import motion_increments
-from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
+from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.tables import imu_table, motion_increments_table, trajectory_table
 
@@ -75,6 +75,10 @@ def over_the_pole():
     run_mechanization(NorthEastDown(height="held"), start, motion_increments(imu))
 
 
+def limit_for_no_pole():
+    WanderAzimuth(latitude_limit_deg=85.0)
+
+
 def another_start():
     imu = imu_table(TIME + 100.0, STILL, LEVEL, source="drive.csv")
     run_mechanization(NorthEastDown(), HOME, motion_increments(imu))
@@ -121,6 +125,7 @@ CALLS = (
     Call("Gravity with the other sign", gravity_upside_down),
     Call("One wild sample", one_wild_sample),
     Call("A flight over the pole", over_the_pole),
+    Call("A limit of latitude for axes that have none", limit_for_no_pole),
     Call("A start at another time", another_start),
     Call("No accelerometer", no_accelerometer),
     Call("A height to be damped by nothing", nothing_to_damp_by),

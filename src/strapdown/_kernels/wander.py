@@ -230,13 +230,13 @@ def wander_step(
     bend = 1.5 * e2 * w * w * pz * sine * sine
     pull = along * far * (more + bend)
     third = THIRD * dt * dt
-    more_x, more_y = third * (pull * px - u * qx), third * (pull * py - u * qy)
+    bent_x, bent_y = third * (pull * px - u * qx), third * (pull * py - u * qy)
 
     # Mean change of the normal, and gravity at the mean place. On the way over the Earth the body
     # is turned back by its rate.
     ex, ey = mx - sixth * veer_x, my - sixth * veer_y
     toward = along * (px * ex + py * ey)
-    nx, ny = across * ex + toward * px + more_x, across * ey + toward * py + more_y
+    nx, ny = across * ex + toward * px + bent_x, across * ey + toward * py + bent_y
     north = px * nx + py * ny
     rise = TWO_THIRDS * (mx * nx + my * ny) + mz - sixth * lift
     inward = lean * (alt * north + rise * pz)
@@ -297,18 +297,17 @@ def wander_step(
     q_ew, low_ew = tilt_place(q_ew, low_ew, fd, fx, fy)
     bw, b1, b2, b3 = quat_from_rotvec(phi[0], phi[1], phi[2])
     q_ib, low_ib = turn_body(q_ib, low_ib, bw - 1.0, b1, b2, b3)
-    c, s = spin[0], spin[1]
-    c1, c2 = add(c, spin[2], yd * c - ys * s)
-    s1, s2 = add(s, spin[3], yd * s + ys * c)
+    c, low_c = add(spin[0], spin[2], yd * spin[0] - ys * spin[1])
+    s, low_s = add(spin[1], spin[3], yd * spin[1] + ys * spin[0])
     return (
         q_ew,
         low_ew,
         alt + up,
         (vx, vy, vz),
-        body_to_level(q_ew, c1, s1, q_ib),
+        body_to_level(q_ew, c, s, q_ib),
         q_ib,
         low_ib,
-        (c1, s1, c2, s2),
+        (c, s, low_c, low_s),
         w,
         t2,
     )

@@ -29,7 +29,7 @@ from strapdown._kernels.ned import (
 from strapdown._kernels.ned_level import ned_correct, ned_levels
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, DataError, DivergenceError, nearest
+from strapdown.exceptions import ConfigError, DataError, DivergenceError, Finding, nearest
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
 from strapdown.tables.checks import is_number, values_of
@@ -331,6 +331,10 @@ class Mechanization(ABC):
         """Return the geodetic latitude of a row of a history, rad."""
         return float(row[LAT])
 
+    def remarks(self, time: Array, history: Array) -> tuple[Finding, ...]:
+        """Return what a person should know of the states of a run."""
+        return ()
+
     def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
         if self.height != "damped":
             if heights is None:
@@ -403,7 +407,8 @@ class Mechanization(ABC):
                 "it, changes too fast there",
                 file=source,
                 quantity="lat",
-                remedy="end the run before it; north-east-down has no meaning at a pole",
+                remedy="end the run before it, or navigate with WanderAzimuth, which knows no "
+                "pole; north-east-down has no meaning there",
             )
         if why == LEAP:
             raise DivergenceError(

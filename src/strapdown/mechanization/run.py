@@ -43,7 +43,7 @@ class NavigationRun:
     history : ndarray, (n, `mechanization.row`)
         The states as the kernels have them: `Mechanization.advance`.
     findings : tuple of Finding
-        What a person should know of the increments.
+        What a person should know of the increments, and of the states.
     source : str, optional
         Name of the log.
     """
@@ -119,13 +119,18 @@ def run_mechanization(
     history[-1 if backward else 0] = state[: mechanization.row]
     others = history[:-1] if backward else history[1:]
     mechanization.advance_into(state, rows, increments, heights, others, backward=backward)
+    time = np.concatenate([[begin], ends])
     return NavigationRun(
         mechanization=mechanization,
         start=start,
         end=mechanization.nav_state(state, begin if backward else float(ends[-1])),
-        time=np.concatenate([[begin], ends]),
+        time=time,
         history=history,
-        findings=(*_large_turns(increments), *_wide_steps(increments)),
+        findings=(
+            *_large_turns(increments),
+            *_wide_steps(increments),
+            *mechanization.remarks(time, history),
+        ),
         source=increments.attrs.get("source"),
     )
 

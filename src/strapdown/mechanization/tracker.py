@@ -177,7 +177,8 @@ class NavTracker:
                 f"{self._mechanization.latitude_limit_deg:g} deg of latitude",
                 row=row,
                 quantity="lat",
-                remedy="end here; north-east-down has no meaning at a pole",
+                remedy="end here, or track with WanderAzimuth, which knows no pole; "
+                "north-east-down has no meaning there",
             )
         if why == LEAP:
             raise DivergenceError(

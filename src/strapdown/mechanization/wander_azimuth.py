@@ -16,9 +16,12 @@ from strapdown._kernels import wander_level as level
 from strapdown._kernels.level import LEVEL
 from strapdown._kernels.wander_sample import wander_update
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, Finding
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
+
+# Nearer to a pole than this, in m, a metre is more than 0.06 deg of heading.
+NEAR = 1000.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class WanderAzimuth(Mechanization):
 
     name: ClassVar[str] = "wander_azimuth"
     summary: ClassVar[str] = "wander azimuth, zeta up, across poles too"
-    source: ClassVar[str] = "Chernodarov (2009) (1), (2), (4)"
+    source: ClassVar[str] = "Chernodarov (2009)"
     row: ClassVar[int] = kernel.ROW
     level_up: ClassVar[float] = 1.0
     alt_at: ClassVar[int] = kernel.ALT
@@ -141,6 +144,27 @@ class WanderAzimuth(Mechanization):
     def latitude(self, row: Array) -> float:
         """Return the geodetic latitude of a row of a history, rad."""
         return float(level.geodetic_from_wander(*row[: kernel.ALT])[0])
+
+    def remarks(self, time: Array, history: Array) -> tuple[Finding, ...]:
+        """Say where a run comes so near to a pole that angles from north mean little."""
+        w, x, y, z = history[:, : kernel.ALT].T
+        cosine = 2.0 * np.sqrt((x * x + y * y) * (w * w + z * z))
+        ellipsoid = find_ellipsoid(self.ellipsoid)
+        distance = cosine * ellipsoid.semi_major_axis**2 / ellipsoid.semi_minor_axis
+        near = np.flatnonzero(distance < NEAR)
+        if not near.size:
+            return ()
+        begin, end = time[near[0]], time[near[-1]]
+        return (
+            Finding(
+                f"{near.size} states from {begin:.9g} s to {end:.9g} s are within {NEAR:g} m of a "
+                f"pole, the nearest {distance.min():.3g} m: there an error of the place across is "
+                "as large an angle of longitude, heading and velocity from north as it is a part "
+                "of that distance",
+                quantity="heading",
+                remedy="compare places in ECEF and attitudes by earth_attitude of the history",
+            ),
+        )
 
     def wander_angle(self, history: Array) -> Array:
         """Return the angle from east to xi, anticlockwise.

@@ -225,6 +225,19 @@ def test_a_limit_of_latitude_is_refused_where_there_is_none():
     assert "across them" in caught.value.finding.remedy
 
 
+def test_a_run_near_a_pole_says_where_angles_from_north_mean_little():
+    motion = OverThePole(half=30.0, miss=60.0, wave=0.0)
+    time = np.arange(0.0, 61.0)
+    (found,) = run_mechanization(WANDER, motion.state(0.0), motion.increments(time)).findings
+    # At 250 m/s it is 1000.4 m away after 26 s, on the ground, 9 km below.
+    assert "7 states from 27 s to 33 s are within 1000 m of a pole" in found.what
+    assert "the nearest 59.9 m" in found.what
+    assert found.quantity == "heading"
+    assert "earth_attitude" in found.remedy
+    far = OverThePole(half=30.0, miss=2000.0)
+    assert run_mechanization(WANDER, far.state(0.0), far.increments(time)).findings == ()
+
+
 def leap():
     """200 m/s for 400 s, in one step."""
     force = np.array([[0.0, 0.0, -9.8 * 400.0]])
