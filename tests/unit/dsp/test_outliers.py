@@ -140,8 +140,8 @@ def test_no_pulse_of_eight_samples_or_more_is_touched(base, amplitude):
         ]
     x = amplitude * np.column_stack(shapes)
     flags = screened(x + noise(10, 1500, x.shape[1])).flags
-    # Of some ten times the noise a kink is decided by it: of 10 000 such pulses one loses a sample.
-    assert (flags == REPLACED).sum() <= (1 if amplitude == 30.0 else 0)
+    # Of some ten times the noise a kink is decided by it: of 10 000 such pulses one loses a run.
+    assert (flags == REPLACED).sum() <= (3 if amplitude == 30.0 else 0)
 
 
 @pytest.mark.parametrize("cutoff", [0.02, 0.1, 0.2, 0.3, 0.45])
