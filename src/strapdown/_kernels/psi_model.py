@@ -232,7 +232,7 @@ def noise_of_step(f, matrix, dt, gyro_noise, accel_noise, decay, drive, held, ad
 
 
 @njit(cache=True, error_model="numpy")
-def means_of_steps(levels, rows, at, longest, rate, matrix):
+def means_of_steps(levels, rows, at, longest, matrix):
     """Fill `matrix` (6, 3) with means over the steps from `at` on, up to `longest` seconds.
 
     Rows 0 to 2: C_lb; row 3: C_lb f; rows 4 and 5: rate and force of the body. Returns the first
@@ -259,29 +259,23 @@ def means_of_steps(levels, rows, at, longest, rate, matrix):
         qy, qz = a[Q_LB + 2] + sign * b[Q_LB + 2], a[Q_LB + 3] + sign * b[Q_LB + 3]
         norm = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
         c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
-        start = dcm_from_quat(a[Q_LB], a[Q_LB + 1], a[Q_LB + 2], a[Q_LB + 3])
+        # Velocity increments are in the axes of the start of their step: to those of its middle.
+        x, y, z = rows[end, 4], rows[end, 5], rows[end, 6]
+        tx, ty, tz = cross(rows[end, 1], rows[end, 2], rows[end, 3], x, y, z)
+        x, y, z = x - 0.5 * tx, y - 0.5 * ty, z - 0.5 * tz
         for i in range(3):
             for j in range(3):
                 matrix[i, j] += h * c[3 * i + j]
-                # Velocity increments are in the axes of the start of their step.
-                matrix[3, i] += start[3 * i + j] * rows[end, 4 + j]
+            matrix[3, i] += c[3 * i] * x + c[3 * i + 1] * y + c[3 * i + 2] * z
             matrix[4, i] += rows[end, 1 + i]
-            matrix[5, i] += rows[end, 4 + i]
+        matrix[5, 0] += x
+        matrix[5, 1] += y
+        matrix[5, 2] += z
         dt += h
         end += 1
     for i in range(6):
         for j in range(3):
             matrix[i, j] /= dt
-    # From the level axes of the start of a step to those of its middle.
-    turn = 0.5 * dt / (end - at)
-    a = levels[at]
-    wx = turn * (rate * a[AXIS] + a[OMEGA_EL])
-    wy = turn * (rate * a[AXIS + 1] + a[OMEGA_EL + 1])
-    wz = turn * (rate * a[AXIS + 2] + a[OMEGA_EL + 2])
-    x, y, z = cross(wx, wy, wz, matrix[3, 0], matrix[3, 1], matrix[3, 2])
-    matrix[3, 0] -= x
-    matrix[3, 1] -= y
-    matrix[3, 2] -= z
     return end, dt
 
 
@@ -321,7 +315,7 @@ def psi_transitions(
     at = 0
     count = rows.shape[0]
     while at < count:
-        end, dt = means_of_steps(levels, rows, at, longest, earth[RATE], matrix)
+        end, dt = means_of_steps(levels, rows, at, longest, matrix)
         # The level row of the middle; attitude and force are means already.
         middle = levels[(at + end) // 2]
         psi_dynamics(

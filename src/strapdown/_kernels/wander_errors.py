@@ -191,7 +191,7 @@ def wander_transitions(
         phi[DV + 2, DV + 2] = 0.0
     at = 0
     while at < rows.shape[0]:
-        end, dt = means_of_steps(levels, rows, at, longest, earth[RATE], matrix[:6])
+        end, dt = means_of_steps(levels, rows, at, longest, matrix[:6])
         for j in range(LEVEL):
             level[j] = 0.5 * (levels[at, j] + levels[end, j])
         wander_dynamics(

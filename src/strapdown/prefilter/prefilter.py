@@ -187,7 +187,7 @@ class Prefilter(ABC):
         if not len(rows):
             if ACCEL[0] not in table.columns:
                 return pd.DataFrame(columns=MOTION, dtype=float)
-            return motion_increments(table)
+            return motion_increments(table, interpolation="cubic")
         out = pd.DataFrame(rows, index=table.index.copy(), columns=MOTION)
         out.attrs["source"] = table.attrs.get("source")
         check_motion_increments(out)

@@ -30,7 +30,8 @@ class SummedState:
     given : int
         Outputs so far.
     values : ndarray, (k, c)
-        Screened samples from the stamp of the last output on.
+        Screened samples from the one before the stamp of the last output on; at the start of the
+        record there is none before.
     """
 
     grid: Grid
@@ -39,15 +40,21 @@ class SummedState:
     given: int
     values: Array
 
+    @property
+    def before(self) -> int:
+        """Samples before the first that is to be joined."""
+        return int(self.given > 0)
+
 
 @dataclass(frozen=True)
 class Summed(Prefilter):
     """Outliers replaced; turn, velocity and distance of each step joined to those of an interval.
 
-    Nothing is filtered: coning and sculling of all frequencies are in the increments, as far as
-    the samples show them. The samples of the Imu table that comes with them, for levelling and
-    the like, are means over the intervals: of what is above their Nyquist frequency they hold
-    much.
+    Nothing is filtered. Each step is the flow of the cubic through four samples, or of the
+    parabola with the means of three (`motion_increments`, 'cubic'): of coning and sculling that
+    turn by x = 2 pi f step it lacks 11/360 x⁴, 6e-4 at 60 Hz and 1 kHz. The samples of the Imu
+    table that comes with them, for levelling and the like, are means over the intervals: of what is
+    above their Nyquist frequency they hold much.
 
     Parameters
     ----------
@@ -78,36 +85,25 @@ class Summed(Prefilter):
         self, state: SummedState, values: Array, last: bool = False
     ) -> tuple[SummedState, Portion]:
         """As `Prefilter.advance`."""
-        from strapdown._kernels.motion_blocks import join_blocks
-        from strapdown._kernels.motion_increments import motion_increments_linear
-
-        grid, factor = state.grid, state.factor
+        grid, factor, before = state.grid, state.factor, state.before
         outliers, part = self.outliers.advance(state.outliers, values, last)
         held = np.vstack([state.values, part.values])
-        count = max(0, (len(held) - 1) // factor)
-        used = held[: count * factor + 1] if count else held[:0]
+        # A step's polynomial goes through its neighbours: one more sample, unless there is none.
+        count = max(0, (len(held) - before - (1 if last else 2)) // factor)
+        steps = count * factor
+        used = held[before : before + steps + 1] if count else held[:0]
         channels = held.shape[1]
-        rows, means = np.empty((0, 10)), np.empty((count, channels))
+        means, rows = np.empty((count, channels)), np.empty((0, 10))
         if count:
-            ends, starts = used[1:], used[:-1]
-            each = ends if grid.means else 0.5 * (starts + ends)
-            # Reduced in one order whatever the number of rows.
-            for j in range(factor):
-                means = each[j::factor].copy() if j == 0 else means + each[j::factor]
-            means /= factor
+            each = used[1:] if grid.means else 0.5 * (used[:-1] + used[1:])
+            # Summed in one order whatever the number of rows.
+            means = sum((each[j::factor] for j in range(1, factor)), each[::factor]) / factor
         if count and channels == 6:
-            dt = np.full(len(used) - 1, grid.step)
-            steps, rows = np.empty((len(dt), 10)), np.empty((len(dt), 10))
-            rate, force = (np.ascontiguousarray(used[:, k : k + 3]) for k in (0, 3))
-            motion_increments_linear(dt, rate, force, grid.means, steps)
-            joined = join_blocks(dt, factor, steps, np.empty(len(dt), np.int64), rows)
-            rows = rows[:joined].copy()
+            rows = _joined(held[: before + steps + 2], grid, factor, before, steps)
         number = factor * np.arange(state.given + 1, state.given + count + 1)
         portion = Portion(grid.time(number), means, rows, Changed.of(part))
-        after = SummedState(
-            grid, factor, outliers, state.given + count, held[count * factor :].copy()
-        )
-        return after, portion
+        left = held[before + steps - 1 :] if count else held
+        return SummedState(grid, factor, outliers, state.given + count, left.copy()), portion
 
     def figures(self, grid: Grid) -> dict[str, float]:
         """As `Prefilter.figures`; noise and band are those of the means."""
@@ -115,7 +111,7 @@ class Summed(Prefilter):
         length = factor * grid.step
         return {
             "delay": 0.0,
-            "latency": self.outliers.latency * grid.step,
+            "latency": (self.outliers.latency + 1) * grid.step,
             "noise_factor": 1.0 / math.sqrt(factor),
             # Where sinc(f length) is down by 0.1 dB: (pi f length)²/6 = 0.0114.
             "passband": 0.0833 / length,
@@ -127,3 +123,17 @@ class Summed(Prefilter):
     def sampling(self, grid: Grid) -> str:
         """Means over the intervals."""
         return "mean"
+
+
+def _joined(values: Array, grid: Grid, factor: int, before: int, steps: int) -> Array:
+    """Motion increments of each step, joined over the outputs' intervals."""
+    from strapdown._kernels import motion_blocks as kernels
+
+    dt = np.full(len(values) - 1, grid.step)
+    rows, scratch = np.empty((len(dt), 10)), np.empty((kernels.ROWS, kernels.WIDEST))
+    rate, force = (np.ascontiguousarray(values[:, k : k + 3]) for k in (0, 3))
+    kernels.motion_increments_neighbours(dt, rate, force, grid.means, scratch, rows)
+    out = np.empty((steps, 10))
+    own = np.ascontiguousarray(rows[before : before + steps])
+    count = kernels.join_blocks(dt[:steps], factor, own, np.empty(steps, np.int64), out)
+    return out[:count].copy()

@@ -114,7 +114,7 @@ def test_a_perfect_observation_takes_an_error_off(mechanization, model):
     there = mechanization.nav_state(wrong, 0.0)
     turn = np.kron(np.eye(3), mechanization.level_from_ned(row))
     z = turn @ state_error(there, START)
-    observation = Observation("all", z[rows], np.eye(size)[rows], np.full(len(rows), 1e-18), ())
+    observation = Observation("all", z[rows], np.eye(size)[rows], np.full(len(rows), 1e-12), ())
     after, (seen,) = filter_.observe(state, [observation])
     left = state_error(mechanization.nav_state(after.mechanization, 0.0), START)
     # The second order of 3e-3 rad, 50 m / 6.4e6 m and their products.

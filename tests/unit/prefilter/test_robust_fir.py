@@ -5,11 +5,12 @@ import pytest
 from scipy.signal import csd, welch
 
 from strapdown import rotation
+from strapdown.increments import motion_increments
 from strapdown.prefilter import RobustFir, Summed
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Coning, Sculling
 from strapdown.simulation.imu import simulate_imu
-from strapdown.tables import ACCEL, DV, GYRO, PHI, imu_table
+from strapdown.tables import DV, GYRO, PHI, imu_table
 
 STEP = 1e-3
 N = 120_000
@@ -129,14 +130,12 @@ def test_increments_sum_to_the_same_angle():
         assert done.increments["dv_x"].sum() == pytest.approx(0.5 * np.pi, abs=1e-12)
 
 
-def held(frequency, step):
-    """Part of a rectified vibration that lines between samples hold.
+def joined(frequency):
+    """Part that the cubic of a step holds: its integral lacks 11/720 x⁴, and coning is its square.
 
-    Of a vector that turns by x = 2 pi f T a step, the polygon of its integrals and the share
-    within the steps, T²/12 w0 x w1, over the circle: x sin x (cot²(x/2)/4 + 1/6).
+    The middle interval of four samples: h - 11/720 h^5 times the fourth derivative.
     """
-    x = 2.0 * np.pi * frequency * step
-    return x * np.sin(x) * (0.25 / np.tan(0.5 * x) ** 2 + 1.0 / 6.0)
+    return 1.0 - 11.0 / 360.0 * (2.0 * np.pi * frequency * STEP) ** 4
 
 
 def turned(increments):
@@ -146,50 +145,70 @@ def turned(increments):
     return rotation.rotation_vector_from_quaternion(q)
 
 
-@pytest.mark.parametrize(
-    ("frequency", "passes"), [(5.0, True), (10.0, True), (20.0, True), (60.0, False)]
-)
-def test_coning_that_is_left_and_lost(frequency, passes):
-    """After whole cycles the body is back. What is not held of the coning is seen as a turn."""
-    half = 0.1
-    imu, _ = simulate_imu(Coning(half, frequency, 2.5), ImuErrors(), rate=1000.0)
-    drift = 4.0 * np.pi * frequency * np.sin(np.radians(0.5 * half)) ** 2  # rad/s
-    fir = RobustFir()
-    for prefilter, step in ((fir, 0.01), (Summed(), STEP)):
-        done = prefilter.apply(imu)
-        assert done.report.replaced.empty
-        part = done.increments.iloc[:200]  # two seconds
-        kept = held(frequency, step)
-        if prefilter is fir:
-            gain = 1.0 if passes else 0.0
-            kept = kept * gain if gain else 0.0
-        # Ripple, twice, and the angle's square.
-        slack = 3e-4 if prefilter is fir else 1e-5
-        assert turned(part)[2] / (-2.0 * drift) == pytest.approx(1.0 - kept, abs=slack)
+def driven(increments, frequency):
+    """Velocity after two seconds, in the axes of the middle of the swing."""
+    # From the start of a cycle on.
+    first = increments.index[0] - increments["dt"].iloc[0]
+    skip = round(100.0 * (np.ceil(first * frequency - 1e-9) / frequency - first))
+    v, q = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+    part = increments.iloc[skip : skip + 200]
+    for phi, dv in zip(part[PHI].to_numpy(), part[DV].to_numpy(), strict=True):
+        v += rotation.rotate(q, dv)
+        q = rotation.compose(q, rotation.quaternion_from_rotation_vector(phi))
+    return v
 
 
-@pytest.mark.parametrize(("frequency", "passes"), [(5.0, True), (20.0, True), (60.0, False)])
-def test_sculling_that_is_left_and_lost(frequency, passes):
-    """In phase, swing and push drive the body; in body axes the velocity is what is joined."""
-    swing, push = 0.1, 10.0
-    imu, _ = simulate_imu(Sculling(swing, push, frequency, 2.5), ImuErrors(), rate=1000.0)
-    weight = imu[ACCEL].to_numpy().mean(axis=0)
-    imu[ACCEL] -= [0.0, 0.0, weight[2]]
-    expected = 0.5 * push * np.radians(swing)  # m/s²; J1 = half, to its square
-    for prefilter, step in ((RobustFir(), 0.01), (Summed(), STEP)):
-        done = prefilter.apply(imu)
-        v, q = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-        first = done.increments.index[0] - done.increments["dt"].iloc[0]
-        # The start of a cycle of the swing, so that the axes are those of the middle.
-        skip = (
-            0 if np.isclose(first * frequency % 1.0, 0.0) else int(np.ceil(10 - first * 100 % 10))
-        )
-        for row in done.increments.iloc[skip : skip + 200].to_dict("records"):
-            v += rotation.rotate(q, np.array([row[k] for k in DV]))
-            phi = np.array([row[k] for k in PHI])
-            q = rotation.compose(q, rotation.quaternion_from_rotation_vector(phi))
-        kept = held(frequency, step) if passes or step == STEP else 0.0
-        assert np.abs(v).max() / (2.0 * expected) == pytest.approx(abs(kept), abs=2e-3)
+@pytest.mark.parametrize("frequency", [5.0, 10.0, 20.0])
+def test_coning_in_the_band_is_that_of_samples_of_the_motion(frequency):
+    """The filter adds nothing to what 100 Hz samples of the motion itself lack."""
+    coning = Coning(0.1, frequency, 2.5)
+    drift = 8.0 * np.pi * frequency * np.sin(np.radians(0.05)) ** 2  # rad in 2 s
+    imu, _ = simulate_imu(coning, ImuErrors(), rate=1000.0)
+    ideal, _ = simulate_imu(coning, ImuErrors(), rate=100.0)
+    done = RobustFir().apply(imu)
+    assert done.report.replaced.empty
+    expected = turned(motion_increments(ideal, interpolation="cubic").iloc[20:220])[2]
+    # Twice the ripple, of the drift. At its start a record has no cubic.
+    assert abs(turned(done.increments.iloc[5:205])[2] - expected) < 2.5e-4 * drift
+
+
+@pytest.mark.parametrize("frequency", [5.0, 20.0, 60.0])
+def test_coning_of_all_frequencies_is_in_the_joined_increments(frequency):
+    imu, _ = simulate_imu(Coning(0.1, frequency, 2.5), ImuErrors(), rate=1000.0)
+    drift = 8.0 * np.pi * frequency * np.sin(np.radians(0.05)) ** 2
+    lost = 1.0 - joined(frequency)
+    part = Summed().apply(imu).increments.iloc[:200]
+    # The next order in x, and rounding of 2000 turns.
+    assert turned(part)[2] / -drift == pytest.approx(lost, rel=0.05, abs=1e-8)
+
+
+def test_coning_above_the_band_is_lost():
+    """The gyro that is left sees the steady part alone: the whole drift."""
+    imu, _ = simulate_imu(Coning(0.1, 60.0, 2.5), ImuErrors(), rate=1000.0)
+    drift = 8.0 * np.pi * 60.0 * np.sin(np.radians(0.05)) ** 2
+    part = RobustFir().apply(imu).increments.iloc[:200]
+    assert turned(part)[2] / -drift == pytest.approx(1.0, abs=1e-5)
+
+
+@pytest.mark.parametrize("frequency", [5.0, 20.0, 60.0])
+def test_sculling(frequency):
+    """In phase, swing and push drive the body by B J1(swing) a second, J1 = half to its square."""
+    sculling = Sculling(0.1, 10.0, frequency, 2.5)
+    imu, ideal = (simulate_imu(sculling, ImuErrors(), rate=rate)[0] for rate in (1000.0, 100.0))
+    weight = imu["accel_z"].mean()
+    for table in (imu, ideal):
+        table["accel_z"] -= weight
+    whole = 2.0 * 0.5 * 10.0 * np.radians(0.1)
+    v = driven(Summed().apply(imu).increments, frequency)
+    # Lacks 11/360 x⁴ of it, and twice the square of the swing of the rest of gravity.
+    axis = int(np.argmax(np.abs(v)))
+    assert abs(v[axis]) / whole == pytest.approx(joined(frequency), abs=2e-3)
+    fir = driven(RobustFir().apply(imu).increments.iloc[5:], frequency)
+    if frequency > 50.0:
+        assert np.abs(fir).max() < 1e-4 * whole
+    else:
+        same = driven(motion_increments(ideal, interpolation="cubic").iloc[5:], frequency)
+        np.testing.assert_allclose(fir, same, atol=5e-4 * whole)
 
 
 @pytest.mark.parametrize("columns", [GYRO])
