@@ -22,7 +22,7 @@ SIDE = 3
 # Windows at rest that tell what is usual: fewer have no tail.
 LEAST_WINDOWS = 40
 # Of the step: how well the means at both its sides are known where its abruptness is judged.
-KNOWN = 0.1
+KNOWN = 0.05
 
 
 def find_jumps(log: HealthLog) -> list[ChannelFault]:
