@@ -206,7 +206,6 @@ def vote(
     events = [(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)]
     events.clear()
     w, c, y, x = np.empty(m), np.empty(m), np.empty(m), np.empty(3)
-    estimates = np.zeros((windows, 3))
     chi = np.zeros(windows)
     cs = np.empty((windows, m))
     for k in range(n):
@@ -244,8 +243,6 @@ def vote(
                 count += 1 if out[i] == 0 else 0
                 y[i] = mean[s, i] - offset[i]
             chi[s] = fit(axes, w, y, x)
-            for j in range(3):
-                estimates[s, j] = x[j]
             if count > 3 and chi[s] > limits[count - 3]:
                 alarms[s] += 1
             else:
@@ -309,11 +306,14 @@ def vote(
                 continue
             within = math.isfinite(z[k, i])
             for s in range(windows):
-                r = mean[s, i] - offset[i]
-                for j in range(3):
-                    r -= axes[i, j] * estimates[s, j]
-                # Half of the limit, so that what stands at it does not come and go.
-                if r * r > 0.5 * limits[1] * cs[s, i]:
+                for j in range(m):
+                    w[j] = 1.0 / cs[s, j] if out[j] == 0 else 0.0
+                    y[j] = mean[s, j] - offset[j]
+                without = fit(axes, w, y, x)
+                w[i] = 1.0 / cs[s, i]
+                # What it adds to the chi-square is its own, of one degree of freedom. Half of the
+                # limit, so that what stands at it does not come and go.
+                if fit(axes, w, y, x) - without > 0.5 * limits[1]:
                     within = False
             calm[i] = calm[i] + 1 if within else 0
             if calm[i] >= readmit:

@@ -21,8 +21,10 @@ __all__ = ["find_jumps"]
 SIDE = 3
 # Windows at rest that tell what is usual: fewer have no tail.
 LEAST_WINDOWS = 40
+# Of what a turn would make of the specific force: that much is seen, by so many of its sd.
+SEEN, SURE = 0.5, 3.0
 # Of the step: how well the means at both its sides are known where its abruptness is judged.
-KNOWN = 0.1
+KNOWN = 0.05
 
 
 def find_jumps(log: HealthLog) -> list[ChannelFault]:
@@ -152,7 +154,10 @@ def _turned(log: HealthLog, k: int, at: int, step: float) -> bool:
     if told_size < 1e-6 * float(before @ before):
         return False  # about the vertical: nothing is seen
     share = float((seen @ told) @ angles) / (told_size * float(angles @ angles))
-    return share > 0.5
+    # Where their noise would say so by chance they say nothing.
+    noise = float(np.median(log.blocks.noise[:, 3:].max(axis=1))) / math.sqrt(log.blocks.samples)
+    unsure = noise / math.sqrt(told_size * float(angles @ angles))
+    return share > SEEN and SURE * unsure < SEEN
 
 
 def _where(log: HealthLog, k: int, block: int, step: float) -> int | None:

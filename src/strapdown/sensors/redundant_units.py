@@ -11,18 +11,12 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding
-from strapdown.sensors.axis_voting import (
-    AxisErrors,
-    AxisEvent,
-    AxisVote,
-    AxisVoting,
-    VotingRule,
-    VotingState,
-)
-from strapdown.sensors.health_log import WORDS
+from strapdown.sensors.axis_voting import AxisVoting, VotingState
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.sensors.unit_checks import SAME_STAMP
+from strapdown.sensors.vote_events import VoteEvent, told_events
+from strapdown.sensors.voting_rule import AxisErrors, VotingRule
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
@@ -69,33 +63,6 @@ class MountedUnit:
                 remedy="give three orthonormal columns, the unit's axes in body axes",
             )
         object.__setattr__(self, "mounting", c)
-
-
-@dataclass(frozen=True)
-class VoteEvent:
-    """Something that the vote decided.
-
-    Attributes
-    ----------
-    kind : {'excluded', 'readmitted', 'disagree'}
-    channels : tuple of str
-        As ``A.gyro_x``; of a disagreement the most likely.
-    time, since : float, s
-        When it was decided, and from when on the disagreement has lasted.
-    size : float, rad/s or m/s²
-        How far the first channel is off what the others tell.
-    chi_square, limit : float
-    finding : Finding
-    """
-
-    kind: str
-    channels: tuple[str, ...]
-    time: float
-    since: float
-    size: float
-    chi_square: float
-    limit: float
-    finding: Finding
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,8 +208,8 @@ class UnitVoting:
         )
         noise = np.hstack([_noise(self.gyro, rates.used), _noise(self.accel, forces.used)])
         events = [
-            *_events(rates, time, columns[0], "rad/s", state.gyro.samples),
-            *_events(forces, time, columns[1], "m/s²", state.accel.samples),
+            *told_events(rates, time, columns[0], "rad/s", state.gyro.samples),
+            *told_events(forces, time, columns[1], "m/s²", state.accel.samples),
         ]
         return UnitVotingState(gyro_state, accel_state, (float(time[-1]),)), VotedImu(
             imu,
@@ -388,47 +355,3 @@ def _fused_drift(voting: AxisVoting) -> BiasDrift:
     x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, e.drift**2))).tolist()
     # The shortest: what the slower ones do is allowed for too early.
     return BiasDrift((x, y, z), float(e.correlation_time.min()))
-
-
-def _events(
-    vote: AxisVote, time: Array, columns: Sequence[str], unit: str, before: int
-) -> list[VoteEvent]:
-    return [_event(e, time, columns, unit, before) for e in vote.events]
-
-
-def _event(
-    event: AxisEvent, time: Array, columns: Sequence[str], unit: str, before: int
-) -> VoteEvent:
-    channels = tuple(columns[k] for k in event.axes)
-    when = float(time[event.row])
-    step = float(time[1] - time[0]) if time.size > 1 else 0.0
-    since = float(time[event.since]) if event.since >= 0 else float(time[0] + event.since * step)
-    words = " and ".join(_words(c) for c in channels)
-    if event.kind == "readmitted":
-        what = f"{words} agrees with the others again, and is used from {when:.6g} s on"
-        remedy = "look into why it failed before"
-    else:
-        off = (
-            f"{abs(event.size):.3g} {unit} apart since {since:.6g} s (chi-square "
-            f"{event.chi_square:.3g}, limit {event.limit:.3g})"
-        )
-        if event.kind == "excluded" and len(channels) > 1:
-            what = f"unit {channels[0].split('.')[0]} disagrees with the others, {off}: excluded"
-        elif event.kind == "excluded":
-            what = f"{words} is off what the others tell, {off}: excluded"
-        else:
-            what = f"{words} disagree, {off}, and nothing tells which is wrong: both go on"
-        remedy = (
-            "a third unit would tell which; until then end the run there, or state larger errors"
-            if event.kind == "disagree"
-            else "look at its cable, its power and its mounting; the others go on without it"
-        )
-    finding = Finding(what, row=before + event.row + 1, quantity=channels[0], remedy=remedy)
-    return VoteEvent(
-        event.kind, channels, when, since, event.size, event.chi_square, event.limit, finding
-    )
-
-
-def _words(channel: str) -> str:
-    name, column = channel.rsplit(".", 1)
-    return f"{WORDS[column]} of unit {name}"

@@ -88,10 +88,10 @@ def find_limits(
     -----
     A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
     an end where it stays on the very same extreme value of the record for three samples or
-    more, up to `longest_flat`, and jumps by three steps or more on both sides (ten samples or more: on one
-    side): the top of a smooth pulse is left by fewer steps. Fewer than ten must also jump by five
-    times the record's scatter, for noise in steps repeats a number. Below a tenth of the range, or
-    of the largest reading, it needs ten samples and jumps on both sides.
+    more, up to `longest_flat`, and jumps by three steps or more on both sides (ten samples or more:
+    on one side): the top of a smooth pulse is left by fewer steps. Fewer than ten must also jump by
+    five times the scatter, for noise in steps repeats a number. Below a tenth of the range,
+    or of the largest reading, it needs ten samples and jumps on both sides.
     """
     lower, upper = -np.asarray(full_scale, dtype=np.float64), np.array(full_scale, dtype=np.float64)
     axes = values.shape[1]

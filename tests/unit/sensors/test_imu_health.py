@@ -11,10 +11,18 @@ import pytest
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.equal_runs import equal_runs, longest_by_chance
+from strapdown.sensors.error_chain import apply
+from strapdown.sensors.error_draws import child
 from strapdown.sensors.imu_health import TESTS, check_imu_channels
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.tail_limit import tail_limit
-from strapdown.simulation import Origin, StationaryMotion, simulate_imu
+from strapdown.simulation import (
+    ImuErrors,
+    Origin,
+    SmoothRandom,
+    StationaryMotion,
+    simulate_imu,
+)
 from strapdown.simulation.sensor_faults import (
     Burst,
     Dead,
@@ -25,7 +33,7 @@ from strapdown.simulation.sensor_faults import (
     Stuck,
     inject_faults,
 )
-from strapdown.tables import imu_table
+from strapdown.tables import ACCEL, GYRO, imu_table
 
 # Of each class, from the phone's to the navigator's.
 GRADES = ("mpu-6050", "adis16448", "stim300", "hg1700", "hg9900", "fog-1000")
@@ -54,6 +62,29 @@ def test_sound_units_at_rest_have_no_faults(name):
     for seed in range(2):
         imu, uncertainty = at_rest(name, seed)
         for sensors in (uncertainty, None):
+            assert check_imu_channels(imu, sensors).faults == ()
+
+
+@functools.cache
+def true_motion():
+    motion = SmoothRandom(100.0, seed=1, rms_rate=20.0, rms_acceleration=1.0, band=(0.1, 2.0))
+    return simulate_imu(motion, ImuErrors(), rate=RATE, sampling="mean")[0]
+
+
+@pytest.mark.parametrize("name", GRADES)
+def test_sound_units_in_motion_have_no_faults(name):
+    sensor, true = load_sensor(name), true_motion()
+    force = true[ACCEL].to_numpy()
+    for seed in range(3):
+        errors = sensor.draw(seed)
+        # The low-pass, which is slow to simulate between samples, is left out.
+        more = {"sampling": "mean", "sampled": True}
+        gyro = apply(
+            errors.gyro, true.index, true[GYRO], seed=child(seed, 0), specific_force=force, **more
+        )
+        accel = apply(errors.accel, true.index, force, seed=child(seed, 1), **more)
+        imu = imu_table(true.index, gyro, accel, sampling="mean")
+        for sensors in (ImuUncertainty.of_sensor(sensor), None):
             assert check_imu_channels(imu, sensors).faults == ()
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.rotation import dcm_from_euler
-from strapdown.sensors.axis_voting import AxisErrors, AxisVoting, VotingRule
+from strapdown.sensors.axis_voting import AxisVoting
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.error_chain import apply
 from strapdown.sensors.error_draws import child
@@ -17,6 +17,7 @@ from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.parity import isolable_axes, parity_matrix
 from strapdown.sensors.redundant_units import MountedUnit, UnitVoting, vote_units
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.voting_rule import AxisErrors, VotingRule
 from strapdown.simulation import ImuErrors, SmoothRandom, simulate_imu
 from strapdown.simulation.sensor_faults import (
     Dead,
