@@ -28,9 +28,10 @@ def samples(count: int) -> tuple[np.ndarray, np.ndarray]:
 def ratios() -> Iterator[Ratio]:
     from strapdown._kernels import motion_increments as increments
     from strapdown._kernels import ned as kernel
+    from strapdown._kernels import wander
     from strapdown.ellipsoids import WGS84
     from strapdown.increments import motion_increments
-    from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
+    from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
     from strapdown.tables import imu_table
 
@@ -76,6 +77,29 @@ def ratios() -> Iterator[Ratio]:
             "ns",
             1.25,
         )
+
+    wandering = WanderAzimuth(**LIMITS)
+    at_start = wandering.begin(start)
+    wandered = np.empty((SAMPLES - 1, wandering.row))
+
+    def steps() -> None:
+        kernel.ned_advance(begin.copy(), rows, none, earth, options, history)
+
+    def wander_steps() -> None:
+        wander.wander_advance(at_start.copy(), rows, none, earth, options, wandered)
+
+    batch()
+    ours, theirs = by_turns(wander_steps, steps)
+    # The same motion, to what the two methods differ by.
+    assert np.abs(wandered[5998, 4] - history[5998, 2]) < 1e-3
+    yield Ratio(
+        "wander azimuth, a step",
+        ours / SAMPLES * 1e9,
+        "north-east-down",
+        theirs / SAMPLES * 1e9,
+        "ns",
+        1.5,
+    )
 
     imu = imu_table(np.arange(SAMPLES) * STEP, gyro, accel)
 

@@ -25,8 +25,8 @@ def inertial_attitude(motion, time):
     return rotation.compose(rotation.compose(turned, level), k.q_nb)
 
 
-def exact_increments(motion, time, nodes=20):
-    """MotionIncrements table between the instants `time`.
+def exact_increments(motion, time, nodes=20, attitude=inertial_attitude):
+    """MotionIncrements table between the instants `time`; `attitude` gives that of a motion.
 
     The turn is that of the exact attitudes; velocity and distance are ``int C f dt`` and
     ``int (end - t) C f dt``, by Gauss and Legendre, which is exact here: what is integrated
@@ -34,13 +34,13 @@ def exact_increments(motion, time, nodes=20):
     """
     time = np.asarray(time, dtype=np.float64)
     dt = np.diff(time)
-    at_stamps = inertial_attitude(motion, time)
+    at_stamps = attitude(motion, time)
     back = rotation.conjugate(at_stamps[:-1])
     phi = rotation.rotation_vector_from_quaternion(rotation.compose(back, at_stamps[1:]))
     dv, dr = np.zeros((2, len(dt), 3))
     for x, w in zip(*np.polynomial.legendre.leggauss(nodes), strict=True):
         at = time[:-1] + 0.5 * (1.0 + x) * dt
-        turn = rotation.compose(back, inertial_attitude(motion, at))
+        turn = rotation.compose(back, attitude(motion, at))
         force = rotation.rotate(turn, motion.specific_force(at))
         dv += (0.5 * w * dt)[:, None] * force
         dr += (0.5 * w * dt * (time[1:] - at))[:, None] * force

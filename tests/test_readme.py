@@ -17,7 +17,7 @@ def test_there_are_runs_to_hold():
 
 
 @pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash"])
-def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch):
+def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch, sketched):
     words = shlex.split(command.replace("\\\n", " "))
     monkeypatch.chdir(tmp_path)
     if words[0] == "crash":

@@ -11,6 +11,8 @@ from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.handling import Handling
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 FEW = ["--algorithms", "naive quaternion", "--rates", "50,25"]
 
 

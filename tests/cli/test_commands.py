@@ -13,6 +13,8 @@ import pytest
 
 from strapdown.cli.main import EXIT_CODES
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 COMMANDS = ["attitude", "simulate", "reproduce", "verify", "modules", "demo"]
 
 
@@ -216,7 +218,7 @@ def test_a_place_that_cannot_be_written_is_told_before_the_run(here, run_cli, ou
 
 def test_a_job_that_is_stopped_leaves_nothing_behind(tmp_path):
     job = subprocess.Popen(
-        [sys.executable, "-m", "strapdown", "attitude", "alexiev-fig2c", "--rate", "100000"],
+        [sys.executable, "-m", "strapdown", "attitude", "alexiev-fig2c", "--rate", "2000"],
         cwd=tmp_path,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

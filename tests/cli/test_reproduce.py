@@ -16,13 +16,15 @@ from strapdown.report.reproduction import (
     statements_markdown,
 )
 
+pytestmark = pytest.mark.usefixtures("sketched_module")
+
 PAGE = Path(__file__).parents[2] / "docs" / "alexiev.md"
 BEGIN = "<!-- statements: begin; written by `make statements` -->\n"
 END = "<!-- statements: end -->"
 
 
 @pytest.fixture(scope="module")
-def bundle(tmp_path_factory, run_cli):
+def bundle(tmp_path_factory, run_cli, sketched_module):
     out = tmp_path_factory.mktemp("reproduce") / "alexiev"
     found = run_cli("reproduce", "alexiev", "--out", out)
     assert found.code == 0, found.err

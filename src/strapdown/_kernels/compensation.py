@@ -18,10 +18,18 @@ def compensate(rows, gyro, accel, states, out):
     k = states.size
     for i in range(rows.shape[0]):
         dt = rows[i, 0]
+        px, py, pz = rows[i, 1], rows[i, 2], rows[i, 3]
+        ux, uy, uz = rows[i, 4], rows[i, 5], rows[i, 6]
+        # The force that the sensors measured, without the turn of the body.
+        tx, ty, tz = cross(px, py, pz, ux, uy, uz)
+        force = (ux - 0.5 * tx, uy - 0.5 * ty, uz - 0.5 * tz)
         dx = dy = dz = ex = ey = ez = 0.0
         for m in range(7):
-            # Columns 1 to 3 are the turn, 4 to 6 the velocity.
-            weight = rows[i, m] / dt if m > 0 else 1.0
+            weight = 1.0
+            if m > 3:
+                weight = force[m - 4] / dt
+            elif m > 0:
+                weight = rows[i, m] / dt
             for j in range(k):
                 part = weight * states[j]
                 dx += part * gyro[m, 0, j]
@@ -32,8 +40,6 @@ def compensate(rows, gyro, accel, states, out):
                 ez += part * accel[m, 2, j]
         dx, dy, dz = dx * dt, dy * dt, dz * dt
         ex, ey, ez = ex * dt, ey * dt, ez * dt
-        px, py, pz = rows[i, 1], rows[i, 2], rows[i, 3]
-        ux, uy, uz = rows[i, 4], rows[i, 5], rows[i, 6]
         tx, ty, tz = cross(px, py, pz, ex, ey, ez)
         sx, sy, sz = cross(dx, dy, dz, ux, uy, uz)
         out[i, 0] = dt

@@ -31,10 +31,10 @@ def gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m):
 
     `s2` is the squared sine of the latitude, `w` the prime vertical's radius over a, `curvature`
     that of the meridian at the height. With sine s and the horizontal part k of the Earth's axis,
-    whose length is the cosine, gravity is ``-s slope alt k`` and ``down``; it changes by
-    ``-slope (alt (k (k . n) - s² n) + s k d(alt))`` and ``s steep (k . n) + loss d(alt)``, where n is
-    the change of the normal. Returns slope, down, steep, loss and half the second derivative of
-    down with height.
+    whose length is the cosine, gravity is ``-s slope alt k`` and ``down``. With a change n of the
+    normal and one of the height it changes by ``-slope (alt (k (k . n) - s² n) + s k d(alt))`` and
+    ``s steep (k . n) + loss d(alt)``. Returns slope, down, steep, loss and half the second
+    derivative of down with height.
 
     On the surface Somigliana's formula, which is exact. Above it, with ``x = alt / a``:
 

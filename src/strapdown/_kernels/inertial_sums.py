@@ -17,14 +17,14 @@ NORMALISE_EVERY = 1000
 
 
 @njit(cache=True, error_model="numpy")
-def inertial_sums(rows, last, turned, fallen, velocity, attitude, times, turns, pushes):
+def inertial_sums(rows, last, turned, fallen, velocity, times, turns, pushes):
     """Sum motion increments; rows (n, 10) are dt, phi, dv, dr, and last (m,) ends m nodes.
 
     fallen (n + 1, 3) is the second integral of the force at every stamp, and turned (n + 1, 4)
-    the body's attitude. At the end of each node: velocity (m, 3), the first integral, and
-    attitude (m, 4). Of each node: times (m, 3, 3), the integral of C; turns and pushes
-    (m, 3, 3, 3), the sums of C[:, i] phi[j] and C[:, i] dv[j]: what an error of axis i that is
-    proportional to the input of axis j adds.
+    the body's attitude. At the end of each node: velocity (m, 3), the first integral. Of each
+    node: times (m, 3, 3), the integral of C; turns and pushes (m, 3, 3, 3), the sums of
+    C[:, i] phi[j] and C[:, i] dv[j]: what an error of axis i that is proportional to the input
+    of axis j adds.
     """
     w, x, y, z = 1.0, 0.0, 0.0, 0.0
     v = np.zeros(3)
@@ -61,8 +61,6 @@ def inertial_sums(rows, last, turned, fallen, velocity, attitude, times, turns, 
         if k == last[node]:
             for i in range(3):
                 velocity[node, i] = v[i]
-            attitude[node, 0], attitude[node, 1] = w, x
-            attitude[node, 2], attitude[node, 3] = y, z
             node += 1
 
 

@@ -19,6 +19,8 @@ STRIDE = 3
 REPLACED, KEPT = 1, 2
 # Part of the residual that the straight lines from either side must confirm.
 CONFIRMED = 0.5
+# Part of it by which the two lines to a single sample may differ: at a step they do by twice it.
+APART = 0.75
 # Of the converter's step: rounding alone makes up to 1.6 of it.
 STEPS = 2.0
 # At an end of the record, where one window must do, its median scatters more.
@@ -81,6 +83,21 @@ def stands_out(left, row, i, low, high, guard, window, value):
     return not behind or median_below(left, row, c, d, value)
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def in_window(left, row, i, high, guard, window, factor):
+    """Whether a residual may stand out of the window behind it; for sure not, if not."""
+    if i + guard + window > high:
+        return True
+    value = abs(left[row, i]) / factor
+    most = (window + STRIDE - 1) // STRIDE // 2
+    for k in range(i + guard, i + guard + window, STRIDE):
+        if abs(left[row, k]) >= value:
+            most -= 1
+            if most < 0:
+                return False
+    return True
+
+
 @njit(cache=True, error_model="numpy")
 def half_range(x, i, m):
     """Half the range of the samples around a run, without it."""
@@ -107,9 +124,11 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, le
     last = x[j] - predicted(x, i, m, weights[m - 1, m - 1])
     if abs(first) <= least or abs(last) <= least:
         return False
-    if not same_side(x[i] - 2.0 * x[i - 1] + x[i - 2], first):
+    before = x[i] - 2.0 * x[i - 1] + x[i - 2]
+    behind = x[j] - 2.0 * x[j + 1] + x[j + 2]
+    if not (same_side(before, first) and same_side(behind, last)):
         return False
-    if not same_side(x[j] - 2.0 * x[j + 1] + x[j + 2], last):
+    if m == 1 and abs(before - behind) > APART * abs(first):
         return False
     a, b = abs(first) / factor, abs(last) / factor
     if not stands_out(left, 2 * m - 2, i, low, high, guard, window, a):
@@ -168,7 +187,19 @@ def replace_outliers(
             continue
         least = STEPS * abs(state[0])
         found = 0
+        line = work[i] - 2.0 * work[i - 1] + work[i - 2]
+        # Most samples are settled without a call: by the residuals that are there already.
+        as_it_came = low < i < high - 1 and i >= state[1] + state[2] + NODES
         for m in range(min(runs, n - NODES - i), 0, -1):
+            if as_it_came:
+                j = i + m - 1
+                behind = work[j] - 2.0 * work[j + 1] + work[j + 2]
+                if not (
+                    same_side(line, left[2 * m - 2, i])
+                    and same_side(behind, left[2 * m - 1, i])
+                    and in_window(left, 2 * m - 2, i, high, guard, window, factor)
+                ):
+                    continue
             if is_run(work, left, i, m, low, high, weights, allowed, guard, window, factor, least):
                 found = m
                 break
@@ -203,6 +234,13 @@ def replace_outliers(
                     flags[j] = 0
             state[1], state[2] = i, found
             i += found
+            continue
+        if as_it_came and (
+            abs(left[0, i]) < abs(left[0, i - 1])
+            or abs(left[0, i]) < abs(left[0, i + 1])
+            or not in_window(left, 0, i, high, guard, window, factor)
+        ):
+            i += 1
             continue
         if is_odd(work, left, i, low, high, weights, allowed, guard, window, factor, least):
             flags[i] = KEPT

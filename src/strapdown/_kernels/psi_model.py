@@ -17,6 +17,7 @@ from numba import njit
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
 from strapdown._kernels.level import ALT, AXIS, OMEGA_EL, Q_LB, curvatures
 from strapdown._kernels.rotation import dcm_from_quat
+from strapdown._kernels.rotation_vector import cross
 
 CORE = 9
 # Below this cosine of the latitude there is no direction to the north, and no slope along it.
@@ -231,7 +232,7 @@ def noise_of_step(f, matrix, dt, gyro_noise, accel_noise, decay, drive, held, ad
 
 
 @njit(cache=True, error_model="numpy")
-def means_of_steps(levels, rows, at, longest, matrix):
+def means_of_steps(levels, rows, at, longest, rate, matrix):
     """Fill `matrix` (6, 3) with means over the steps from `at` on, up to `longest` seconds.
 
     Rows 0 to 2: C_lb; row 3: C_lb f; rows 4 and 5: rate and force of the body. Returns the first
@@ -271,6 +272,16 @@ def means_of_steps(levels, rows, at, longest, matrix):
     for i in range(6):
         for j in range(3):
             matrix[i, j] /= dt
+    # From the level axes of the start of a step to those of its middle.
+    turn = 0.5 * dt / (end - at)
+    a = levels[at]
+    wx = turn * (rate * a[AXIS] + a[OMEGA_EL])
+    wy = turn * (rate * a[AXIS + 1] + a[OMEGA_EL + 1])
+    wz = turn * (rate * a[AXIS + 2] + a[OMEGA_EL + 2])
+    x, y, z = cross(wx, wy, wz, matrix[3, 0], matrix[3, 1], matrix[3, 2])
+    matrix[3, 0] -= x
+    matrix[3, 1] -= y
+    matrix[3, 2] -= z
     return end, dt
 
 
@@ -310,7 +321,7 @@ def psi_transitions(
     at = 0
     count = rows.shape[0]
     while at < count:
-        end, dt = means_of_steps(levels, rows, at, longest, matrix)
+        end, dt = means_of_steps(levels, rows, at, longest, earth[RATE], matrix)
         # The level row of the middle; attitude and force are means already.
         middle = levels[(at + end) // 2]
         psi_dynamics(

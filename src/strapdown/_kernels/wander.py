@@ -75,42 +75,43 @@ def earth_axis(w, x, y, z):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def curving(w, alt, a, e2):
-    """Radius N of the prime vertical, derivative of N s by s, and curvatures across and along.
+    """N + h, the derivative of N s by s, and the curvatures across and along the meridian.
 
-    s is the sine of the latitude, `w` N over a; the curvatures are those of the level surface at
-    the height, across and along the meridian.
+    N is the radius of the prime vertical, `w` that over a, s the sine of the latitude; the
+    curvatures are those of the level surface at the height h.
     """
     prime = a * w
     slope = prime * w * w
-    return prime, slope, 1.0 / (prime + alt), 1.0 / (slope * (1.0 - e2) + alt)
+    return prime + alt, slope, 1.0 / (prime + alt), 1.0 / (slope * (1.0 - e2) + alt)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def shift(kx, ky, s, w, prime, slope, across, curvature, alt, e2, rx, ry, rz):
-    """Tilt of the normal, as the tangent of its angle along xi and eta, and rise, by a straight way.
+def shift(kx, ky, s, w, far, slope, across, curvature, e2, rx, ry, rz):
+    """Tilt of the normal, as tangents along xi and eta, and rise, by a straight way r.
 
     A point of normal n and height h is ``(N + h) n - e² N s p``, p the Earth's axis and s = p . n.
     So the new normal is along ``(N + h) zeta + r + e² d p`` with d the change of N s, of which the
     first three orders in r are taken: what is left out is of ``e² (r/R)⁴`` and ``e⁴ (r/R)³``.
+    `far` is N + h, the rest as of `curving`.
     """
-    far = prime + alt
-    first = slope * curvature * (kx * rx + ky * ry)
-    pull = e2 * first
+    north = kx * rx + ky * ry
+    sine = curvature * north
+    per = e2 * slope * curvature
+    pull = per * north
     u = (rz + pull * s) * across
     tx, ty = (rx + pull * kx) * across, (ry + pull * ky) * across
     t2 = tx * tx + ty * ty
-    sine = kx * tx + ky * ty
     lost = 0.5 * t2
     # The second and the third order of the change of s, but for what d's own have on it: that is
     # the factor (N + h) / (M + h).
     more = u * (u * sine + s * t2 - sine) - lost * (s + sine)
-    bend = 1.5 * e2 * s * w * w * (sine + more) * (sine + more)
-    pull = e2 * (first + slope * far * curvature * (more + bend))
+    sine += more
+    bend = 1.5 * e2 * w * w * s * sine * sine
+    pull = per * (north + far * (more + bend))
     u = (rz + pull * s) * across
     inverse = across * ((1.0 - u) * (1.0 + u * u))
     tx, ty = (rx + pull * kx) * inverse, (ry + pull * ky) * inverse
     t2 = tx * tx + ty * ty
-    sine += more
     rise = rz + (far + rz + pull * s) * t2 * (0.5 - 0.125 * t2) - 0.5 * e2 * slope * sine * sine
     return tx, ty, t2, rise
 
@@ -123,6 +124,15 @@ def tilt(tx, ty, t2):
 
 
 @njit(cache=True, inline="always")
+def level_with(tx, ty, t2, x, y, z):
+    """Vector in the new w, of one in the old, as `tilt` turns it; up to the sixth order."""
+    less = 0.5 - 0.375 * t2
+    along = tx * x + ty * y
+    lean = z - t2 * less * z + less * along
+    return x - tx * lean, y - ty * lean, (1.0 - t2 * less) * (z + along)
+
+
+@njit(cache=True, inline="always")
 def half_turn(y):
     """Cosine less 1 and sine of a small angle."""
     y2 = y * y
@@ -130,10 +140,24 @@ def half_turn(y):
 
 
 @njit(cache=True, inline="always")
-def multiply_on(q, low, d, x, y, z):
+def tilt_place(q, low, d, x, y):
+    """Quaternion times (1 + d, x, y, 0), and what rounding left.
+
+    The norm needs no care: d is known to its own last digit.
+    """
+    w0, x0, y0, z0 = q
+    w1, w2 = add(w0, low[0], d * w0 - (x0 * x + y0 * y))
+    x1, x2 = add(x0, low[1], d * x0 + (w0 * x - z0 * y))
+    y1, y2 = add(y0, low[2], d * y0 + (w0 * y + z0 * x))
+    z1, z2 = add(z0, low[3], d * z0 + (x0 * y - y0 * x))
+    return (w1, x1, y1, z1), (w2, x2, y2, z2)
+
+
+@njit(cache=True, inline="always")
+def turn_body(q, low, d, x, y, z):
     """Quaternion times (1 + d, x, y, z), drawn to norm 1, and what rounding left.
 
-    Only what is across q changes the rotation; the norm may have the rounding of its square.
+    Only what is across q changes the rotation; along q, d may have the rounding of a number near 1.
     """
     w0, x0, y0, z0 = q
     d += 0.5 * (1.0 - (w0 * w0 + x0 * x0 + y0 * y0 + z0 * z0))
@@ -169,15 +193,13 @@ def wander_step(
     s2 = pz * pz
     # One Newton step from its value a step before, as in `ned`.
     w = w * (1.5 - 0.5 * (1.0 - e2 * s2) * w * w)
-    prime, slope, across, curvature = curving(w, alt, a, e2)
-    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(
-        q_wb[0], q_wb[1], q_wb[2], q_wb[3]
-    )
+    far, slope, across, curvature = curving(w, alt, a, e2)
+    per = e2 * slope * curvature
+    along = per * across
+    c11, c12, c13, c21, c22, c23, c31, c32, c33 = dcm_from_quat(q_wb[0], q_wb[1], q_wb[2], q_wb[3])
     ux, uy, uz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dv[0], dv[1], dv[2])
     sx, sy, sz = rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, dr[0], dr[1], dr[2])
-    lean, down, steep, loss, loss2 = gravity_parts(
-        s2, alt, w, curvature, a, e2, gamma, k, f, m
-    )
+    lean, down, steep, loss, loss2 = gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m)
     vx, vy, vz = v
     ox, oy, oz = rate * px, rate * py, rate * pz
     outward = -lean * alt * pz
@@ -197,27 +219,33 @@ def wander_step(
     my += sixth * (gy - veer_y - swing * (ox - across * vy))
     mz = half * vz + 0.5 * sz - twelfth * uz + sixth * (gz - lift)
 
-    # Mean change of the normal, and gravity at the mean place. On the way over the Earth the body
-    # is turned back by its rate. What is of the second order grows with the square of time, whose
-    # mean is 4/3 of the square of the mean: so much of what climbing and the change of the
-    # curvature do, as in `shift`.
-    ex, ey = mx - sixth * veer_x, my - sixth * veer_y
-    sine = curvature * (px * ex + py * ey)
-    pull = e2 * slope * sine
-    u = (mz + pull * pz) * across
-    qx, qy = (ex + pull * px) * across, (ey + pull * py) * across
+    # What climbing and the change of the curvature do to the normal, as in `shift`, at the velocity
+    # of the start: the mean of the square of time is a third.
+    north = px * vx + py * vy
+    sine = curvature * north
+    pull = per * north
+    u = (vz + pull * pz) * across
+    qx, qy = (vx + pull * px) * across, (vy + pull * py) * across
     more = -(u * sine + 0.5 * pz * (qx * qx + qy * qy))
-    bend = 1.5 * e2 * pz * w * w * sine * sine
-    pull = 2.0 * TWO_THIRDS * e2 * slope * (prime + alt) * curvature * across * (more + bend)
-    u *= 2.0 * TWO_THIRDS
-    nx, ny = qx - u * qx + pull * px, qy - u * qy + pull * py
+    bend = 1.5 * e2 * w * w * pz * sine * sine
+    pull = along * far * (more + bend)
+    third = THIRD * dt * dt
+    more_x, more_y = third * (pull * px - u * qx), third * (pull * py - u * qy)
+
+    # Mean change of the normal, and gravity at the mean place. On the way over the Earth the body
+    # is turned back by its rate.
+    ex, ey = mx - sixth * veer_x, my - sixth * veer_y
+    toward = along * (px * ex + py * ey)
+    nx, ny = across * ex + toward * px + more_x, across * ey + toward * py + more_y
     north = px * nx + py * ny
     rise = TWO_THIRDS * (mx * nx + my * ny) + mz - sixth * lift
     inward = lean * (alt * north + rise * pz)
     level = lean * alt * s2
     more_x = level * nx - inward * px
     more_y = level * ny - inward * py
-    more_z = -(pz * steep * north + rise * (loss + rise * loss2))
+    # Down gravity goes with the square of the sine, which a tilt changes to its second order too.
+    tilted = pz * north + TWO_THIRDS * (north * north - s2 * (nx * nx + ny * ny))
+    more_z = -(steep * tilted + rise * (loss + rise * loss2))
     gx += more_x
     gy += more_y
     gz += more_z
@@ -251,36 +279,25 @@ def wander_step(
         py,
         pz,
         w,
-        prime,
+        far,
         slope,
         across,
         curvature,
-        alt,
         e2,
         rx - (oy * bz - oz * by),
         ry - (oz * bx - ox * bz),
         rz - (ox * by - oy * bx),
     )
 
-    fd, fx, fy = tilt(tx, ty, t2)
+    # The velocity is turned back by the Earth's turn and then by the level's.
     yd, ys = half_turn(0.5 * rate * dt)
-    # The velocity is turned by the Earth's turn and the level's.
-    fw = 1.0 + fd
-    yw = 1.0 + yd
-    vx, vy, vz = turn_back(
-        yw * fw - ys * (px * fx + py * fy),
-        yw * fx + ys * (px * fw - pz * fy),
-        yw * fy + ys * (py * fw + pz * fx),
-        ys * (px * fy - py * fx + pz * fw),
-        wx,
-        wy,
-        wz,
-    )
-    q_ew, low_ew = multiply_on(q_ew, low_ew, fd, fx, fy, 0.0)
+    wx, wy, wz = turn_back(1.0 + yd, ys * px, ys * py, ys * pz, wx, wy, wz)
+    fd, fx, fy = tilt(tx, ty, t2)
+    vx, vy, vz = level_with(tx, ty, t2, wx, wy, wz)
+    q_ew, low_ew = tilt_place(q_ew, low_ew, fd, fx, fy)
     bw, b1, b2, b3 = quat_from_rotvec(phi[0], phi[1], phi[2])
-    q_ib, low_ib = multiply_on(q_ib, low_ib, bw - 1.0, b1, b2, b3)
+    q_ib, low_ib = turn_body(q_ib, low_ib, bw - 1.0, b1, b2, b3)
     c, s = spin[0], spin[1]
-    yd += 0.5 * (1.0 - (c * c + s * s))
     c1, c2 = add(c, spin[2], yd * c - ys * s)
     s1, s2 = add(s, spin[3], yd * s + ys * c)
     return (
@@ -306,6 +323,19 @@ def four(state, at):
 def put(state, at, numbers):
     for j in range(len(numbers)):
         state[at + j] = numbers[j]
+
+
+@njit(cache=True, inline="always")
+def put_state(state, q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, pull, since):
+    put(state, Q_EW, q_ew)
+    state[ALT] = alt
+    put(state, V, v)
+    put(state, Q_WB, q_wb)
+    put(state, Q_IB, q_ib)
+    put(state, LOW_EW, low_ew)
+    put(state, LOW_IB, low_ib)
+    put(state, SPIN, spin)
+    state[PRIME], state[PULL], state[SINCE] = w, pull, since
 
 
 @njit(cache=True, inline="always")
@@ -377,13 +407,5 @@ def wander_advance(state, increments, reference, earth, options, history):
         history[i, ALT] = alt
         history[i, 5], history[i, 6], history[i, 7] = v
         history[i, 8], history[i, 9], history[i, 10], history[i, 11] = q_wb
-    put(state, Q_EW, q_ew)
-    state[ALT] = alt
-    put(state, V, v)
-    put(state, Q_WB, q_wb)
-    put(state, Q_IB, q_ib)
-    put(state, LOW_EW, low_ew)
-    put(state, LOW_IB, low_ib)
-    put(state, SPIN, spin)
-    state[PRIME], state[PULL], state[SINCE] = w, pull, since
+    put_state(state, q_ew, low_ew, alt, v, q_wb, q_ib, low_ib, spin, w, pull, since)
     return made, why

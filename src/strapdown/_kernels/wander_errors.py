@@ -1,9 +1,9 @@
 """Growth of the errors of a wander-azimuth mechanization, by the variation of its equations.
 
 Chernodarov 2009: ``2 q0' = q0 (x) w_ib`` (1), ``2 q1' = q1 (x) w_ew`` (2) and
-``V' = C_wb f + g - (2 W + w_ew) x V`` (4), with w_ew of V through the curvature of the level surface
-and without a vertical part. Their variation is written in variables that are left of the errors of
-the quaternions when the rotation of the axes is taken out, without any approximation:
+``V' = C_wb f + g - (2 W + w_ew) x V`` (4), with w_ew of V through the curvature of the level
+surface and without a vertical part. Their variation is written in variables that are left of the
+errors of the quaternions when the rotation of the axes is taken out, without any approximation:
 ``dq1 = 1/2 q1 (x) (n1, theta)`` and ``dq0 = 1/2 q_iw (x) (n0, eps) (x) q_wb``. The norms n0 and n1
 do not change. theta and eps, in level axes w, are the rotations of the computed level relative to
 the Earth and of the computed body relative to inertial space:
@@ -13,9 +13,9 @@ the Earth and of the computed body relative to inertial space:
     eps'   = -(W + w_ew) x eps + C dw_ib
 
 The level axes have the Earth's axis p (unit vector) where the true ones have p - dp,
-``dp = p x theta``; so dW is the Earth's rate along it, dg the slopes of gravity along p, whose third
-component is the sine of the latitude, and dw has a part from dV and one from dp. States: theta (3),
-dV (3), eps (3), then k states of the sensors. There is no state of the height.
+``dp = p x theta``; so dW is the Earth's rate along it, dg the slopes of gravity along p, whose
+third component is the sine of the latitude, and dw has a part from dV and one from dp. States:
+theta (3), dV (3), eps (3), then k states of the sensors. There is no state of the height.
 """
 
 from __future__ import annotations
@@ -191,7 +191,7 @@ def wander_transitions(
         phi[DV + 2, DV + 2] = 0.0
     at = 0
     while at < rows.shape[0]:
-        end, dt = means_of_steps(levels, rows, at, longest, matrix[:6])
+        end, dt = means_of_steps(levels, rows, at, longest, earth[RATE], matrix[:6])
         for j in range(LEVEL):
             level[j] = 0.5 * (levels[at, j] + levels[end, j])
         wander_dynamics(

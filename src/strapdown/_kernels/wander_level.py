@@ -1,4 +1,4 @@
-"""A wander azimuth as places and directions: from north-east-down, to it, and as a filter sees it."""
+"""A wander azimuth from north-east-down and back, and as a filter sees it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from numba import njit
 from strapdown._kernels.earth import E2, A
 from strapdown._kernels.level import ALT as LEVEL_ALT
 from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L, curvatures
-from strapdown._kernels.ned import turn_back
 from strapdown._kernels.rotation import (
     DEGREES,
     euler_degrees_from_quat,
@@ -21,6 +20,8 @@ from strapdown._kernels.rotation import (
 )
 from strapdown._kernels.wander import (
     ALT,
+    LOW_EW,
+    LOW_IB,
     PRIME,
     Q_EW,
     Q_IB,
@@ -29,6 +30,7 @@ from strapdown._kernels.wander import (
     V,
     curving,
     earth_axis,
+    level_with,
     put,
     shift,
     tilt,
@@ -75,8 +77,8 @@ def level_from_north(angle, vx, vy, vz, w, x, y, z):
     """Velocity and quaternion of xi, eta, zeta from those of north, east, down, or back.
 
     East turned by the angle anticlockwise is xi: ``V_E = V_xi cos A - V_eta sin A`` and
-    ``V_N = V_xi sin A + V_eta cos A``, whose second sign is wrong in print. As a rotation it is half
-    a turn about the line between xi and north, which is its own inverse.
+    ``V_N = V_xi sin A + V_eta cos A``, whose plus is a minus in print. As a rotation it is half a
+    turn about the line between xi and north, which is its own inverse.
     """
     c, s = math.cos(angle), math.sin(angle)
     half = 0.5 * angle
@@ -174,17 +176,16 @@ def wander_correct(state, error, earth):
     w, x, y, z = state[0], state[1], state[2], state[3]
     px, py, pz = earth_axis(w, x, y, z)
     over = 1.0 / math.sqrt(1.0 - e2 * pz * pz)
-    prime, slope, across, curvature = curving(over, state[ALT], a, e2)
+    far, slope, across, curvature = curving(over, state[ALT], a, e2)
     tx, ty, t2, up = shift(
         px,
         py,
         pz,
         over,
-        prime,
+        far,
         slope,
         across,
         curvature,
-        state[ALT],
         e2,
         -error[0],
         -error[1],
@@ -194,13 +195,8 @@ def wander_correct(state, error, earth):
     fw = 1.0 + fd
     put(state, Q_EW, quat_normalise(*quat_multiply(w, x, y, z, fw, fx, fy, 0.0)))
     state[ALT] += up
-    put(
-        state,
-        V,
-        turn_back(
-            fw, fx, fy, 0.0, state[V] - error[3], state[V + 1] - error[4], state[V + 2] - error[5]
-        ),
-    )
+    vx, vy, vz = state[V] - error[3], state[V + 1] - error[4], state[V + 2] - error[5]
+    put(state, V, level_with(tx, ty, t2, vx, vy, vz))
     bw, bx, by, bz = quat_from_rotvec(-error[6], -error[7], -error[8])
     bw, bx, by, bz = quat_multiply(
         bw, bx, by, bz, state[Q_WB], state[Q_WB + 1], state[Q_WB + 2], state[Q_WB + 3]
@@ -208,5 +204,7 @@ def wander_correct(state, error, earth):
     bw, bx, by, bz = quat_multiply(fw, -fx, -fy, 0.0, bw, bx, by, bz)
     put(state, Q_WB, quat_normalise(bw, bx, by, bz))
     put(state, Q_IB, _inertial(state, state[SPIN], state[SPIN + 1]))
+    put(state, LOW_EW, (0.0, 0.0, 0.0, 0.0))
+    put(state, LOW_IB, (0.0, 0.0, 0.0, 0.0))
     sine = earth_axis(state[0], state[1], state[2], state[3])[2]
     state[PRIME] = 1.0 / math.sqrt(1.0 - e2 * sine * sine)

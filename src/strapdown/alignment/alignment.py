@@ -32,6 +32,8 @@ class Alignment:
     gyro_bias, accel_bias : ndarray, (3,), rad/s and m/s², optional
         Where the method tells them, body axes: reading less truth.
     gyro_bias_sd, accel_bias_sd : ndarray, (3,), optional
+    heading_given : bool
+        Whether the heading owes nothing to the gyros: it was stated, or is that of a course.
     findings : tuple of Finding
         Assumptions that do not hold, and what the sensors cannot tell.
     """
@@ -44,6 +46,7 @@ class Alignment:
     accel_bias: Array | None = None
     gyro_bias_sd: Array | None = None
     accel_bias_sd: Array | None = None
+    heading_given: bool = False
     findings: tuple[Finding, ...] = field(default=())
 
     @property

@@ -45,8 +45,9 @@ def heading_rate(
     level = rotation.dcm_from_rotation_vector(-site.earth_rate * time[:, None])
     turn = level @ (C_nb @ turned @ C_nb.T)
     angle = np.unwrap(np.arctan2(turn[:, 1, 0], turn[:, 0, 0]))
-    line = np.polynomial.Polynomial.fit(time, angle, 1).convert().coef
-    left = angle - line[0] - line[1] * time
+    off = time - time.mean()
+    slope = float(off @ angle) / float(off @ off)
+    left = angle - angle.mean() - slope * off
     means = np.array([part.mean() for part in np.array_split(left, BLOCKS)])
     scatter = 12.0 * means.var(ddof=2) / (BLOCKS * sums.length**2)
     gyro = sensors.gyro
@@ -56,7 +57,7 @@ def heading_rate(
     across = np.square(gyro.axis("misalignment")) + np.square(gyro.axis("scale"))
     own = own + across * float(site.earth_rate @ site.earth_rate)
     own = own + np.square(gyro.axis("g_sensitivity")) * 9.8**2
-    return float(line[1]), float(np.sqrt(own.max() + scatter))
+    return slope, float(np.sqrt(own.max() + scatter))
 
 
 def turn_findings(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,6 +11,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.fine_epochs import (
+    MOST_HEADING,
+    epoch_ends,
+    initial_covariance,
+    prior_heading_sd,
+    settled,
+)
 from strapdown.alignment.fine_findings import fine_findings
 from strapdown.alignment.fine_result import Epochs, FineResult
 from strapdown.alignment.site import Site
@@ -19,13 +26,11 @@ from strapdown.alignment.stationary import (
     Standing,
     home_of,
     measured_standing,
-    observations,
 )
-from strapdown.estimation.covariance import CovarianceForm, Innovations
+from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
-from strapdown.estimation.error_model import PHYSICAL, ErrorModel
-from strapdown.estimation.observation import Observation
+from strapdown.estimation.error_model import ErrorModel
 from strapdown.estimation.resting_sensors import resting_states
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
@@ -48,11 +53,6 @@ LEAST = Standing(
     velocity=np.full(3, 3e-4),  # m/s
     turn=np.zeros(3),  # rad
 )
-# Tilt and heading before the filter: much more than a coarse alignment leaves, for it was made of
-# the same rests, by the same biases, and says nothing that the filter does not find by itself.
-WIDER = 10.0
-LEAST_TILT, LEAST_HEADING = math.radians(0.1), math.radians(1.0)
-MOST_TILT, MOST_HEADING = math.radians(5.0), math.radians(20.0)
 # Fewer epochs tell nothing of how still a body stands.
 LEAST_EPOCHS = 10
 
@@ -145,8 +145,10 @@ class FineAlignment:
         Raises
         ------
         DataError
-            The record is too short, or the coarse alignment belongs to another instant.
+            The record is too short, or the coarse alignment belongs to another instant or does not
+            know the heading.
         """
+        _check_coarse(coarse, imu)
         increments = motion_increments(imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         start = self._start(increments, site, coarse, begin)
@@ -178,7 +180,7 @@ class FineAlignment:
         if standing is None:
             state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
             whole = filter_.predict(state, time, rows)[1]
-            standing = measured_standing(whole, int(ends[0]), LEAST)
+            standing = measured_standing(whole, int(ends[0]), LEAST, filter_.model.gyro_noise)
         home = home_of(site, begin)
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = Epochs(filter_)
@@ -197,6 +199,8 @@ class FineAlignment:
             innovations=epochs.innovations(),
             standing=standing,
             interval=self.interval,
+            heading_given=coarse.heading_given,
+            prior_heading_sd_deg=math.degrees(prior_heading_sd(coarse)),
             filter=filter_,
             state=state,
             source=imu.attrs.get("source"),
@@ -244,68 +248,13 @@ class FineAlignment:
         return replace(last, time=back.end.time, q_nb=back.end.q_nb)
 
 
-def settled(
-    filter_: ErrorFilter,
-    state: FilterState,
-    time: Array,
-    rows: Array,
-    ends: NDArray[np.int64],
-    home: NavState,
-    standing: Standing,
-    observe: tuple[str, ...],
-) -> Iterator[tuple[FilterState, dict[str, tuple[Observation, Innovations]]]]:
-    """Go from epoch to epoch over a rest.
-
-    Parameters
-    ----------
-    filter_ : ErrorFilter
-    state : FilterState
-    time : ndarray, (k,), s
-        Ends of the steps.
-    rows : ndarray, (k, 10)
-        Motion increments.
-    ends : ndarray of int
-        Number of steps before the end of each epoch.
-    home : NavState
-    standing : Standing
-    observe : tuple of str
-
-    Yields
-    ------
-    state : FilterState
-    seen : dict
-        By name, each observation and its innovations.
-    """
-    at = 0
-    for end in ends.tolist():
-        state, segment = filter_.predict(state, time[at:end], rows[at:end])
-        made = observations(filter_, state, segment, home, standing, observe)
-        state, innovations = filter_.observe(state, made)
-        seen = {one.name: (one, of) for one, of in zip(made, innovations, strict=True)}
-        yield state, seen
-        at = end
-
-
-def epoch_ends(begin: float, time: Array, interval: float) -> NDArray[np.int64]:
-    """Number of steps before the end of each whole interval, (m,)."""
-    count = math.floor((float(time[-1]) - begin) / interval + 1e-6)
-    wanted = begin + interval * np.arange(1, count + 1)
-    half = 0.5 * float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    return np.unique(np.searchsorted(time, wanted - half) + 1).clip(max=time.size)
-
-
-def initial_covariance(filter_: ErrorFilter, coarse: Alignment, standing: Standing) -> Array:
-    """Covariance of the physical errors before the first epoch, in north-east-down."""
-    P = np.zeros((filter_.model.physical_size,) * 2)
-    P[0:3, 0:3] = np.diag(standing.position**2)
-    P[3:6, 3:6] = np.diag(standing.velocity**2)
-    tilt = float(np.sqrt(np.diagonal(coarse.covariance)[:2].max()))
-    heading = float(np.sqrt(coarse.covariance[2, 2]))
-    P[6, 6] = P[7, 7] = min(max(WIDER * tilt, LEAST_TILT), MOST_TILT) ** 2
-    P[8, 8] = min(max(WIDER * heading, LEAST_HEADING), MOST_HEADING) ** 2
-    at = PHYSICAL
-    for block in filter_.model.sensors:
-        end = at + len(block.block)
-        P[at:end, at:end] = np.diag(block.sd**2)
-        at = end
-    return P
+def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
+    sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
+    if not sd <= math.degrees(MOST_HEADING):
+        raise DataError(
+            f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard "
+            f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
+            file=imu.attrs.get("source"),
+            quantity="heading",
+            remedy="state the heading, or align longer, or use gyros of a better grade",
+        )

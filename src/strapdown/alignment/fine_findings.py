@@ -13,6 +13,8 @@ from strapdown.exceptions import Finding
 
 # A heading less sure than this is no north.
 NO_NORTH = 5.0  # deg
+# Of what it was before, where a filter has found nothing.
+UNCHANGED = 0.5
 # What people, wind and an engine do to a parked vehicle stays below.
 MOST_VELOCITY = 0.05  # m/s
 MOST_TURN = 0.5  # deg from epoch to epoch
@@ -46,7 +48,7 @@ def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
 
 def _north(result: FineResult, site: Site) -> Iterator[Finding]:
     sd = float(result.alignment.sd_deg[2])
-    if sd > NO_NORTH:
+    if sd > min(NO_NORTH, UNCHANGED * result.prior_heading_sd_deg) and not result.heading_given:
         east = float(np.linalg.norm(site.earth_rate[:2])) * DEG_PER_HOUR
         yield Finding(
             f"heading is known to ± {sd:.3g} deg only (one standard deviation): the horizontal "

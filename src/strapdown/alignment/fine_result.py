@@ -47,6 +47,10 @@ class FineResult:
         How still the body stood.
     interval : float, s
         From epoch to epoch.
+    heading_given : bool
+        Whether the heading before it owes nothing to the gyros.
+    prior_heading_sd_deg : float, deg
+        How well the heading was taken to be known before the first epoch.
     filter : ErrorFilter
     state : FilterState
         At the last epoch: navigation goes on from here.
@@ -60,6 +64,8 @@ class FineResult:
     innovations: Mapping[str, pd.DataFrame]
     standing: Standing
     interval: float
+    heading_given: bool
+    prior_heading_sd_deg: float
     filter: ErrorFilter = field(repr=False)
     state: FilterState = field(repr=False)
     findings: tuple[Finding, ...] = ()

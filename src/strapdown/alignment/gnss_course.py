@@ -22,7 +22,7 @@ from strapdown.alignment.tilt_and_heading import error_of_force_and_heading
 from strapdown.earth import transport_rate
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.tables.checks import is_number
+from strapdown.tables.checks import is_number, source_of
 
 Array = NDArray[np.float64]
 
@@ -99,7 +99,7 @@ class GnssCourse(CoarseAlignment):
             is too slow, or what is known of the accelerations leaves no level.
         """
         findings = check_record(imu)
-        source = imu.attrs.get("source")
+        source = source_of(imu)
         fixes = course_fixes(imu, gnss, self.least_speed, math.radians(self.largest_sd_deg))
         first = _window(fixes, sensors)
         force_b, force_n, force_sd = _forces(fixes, first, site, sensors)

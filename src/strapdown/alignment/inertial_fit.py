@@ -151,11 +151,11 @@ def fit_inertially(sums: InertialSums, site: Site) -> InertialFit:
     cross = np.array([rotation.cross_matrix(x) for x in known])
     design = np.concatenate([-cross, by_latitude[:, :, None], known[:, :, None]], axis=2)
     normal = np.einsum("d,dik,dil->kl", weights, design, design)
-    gain3 = np.linalg.solve(normal[:3, :3], _rows(design[:, :, :3], weights))
+    # The estimate turns so as to undo an error: C d + phi x W = 0. Latitude and gravity tell it.
+    gain3 = -np.linalg.solve(normal[:3, :3], _rows(design[:, :, :3], weights))
     gain5 = _solve(normal, _rows(design, weights))
     gain = np.concatenate([gain3, gain5[3:]]).reshape(5, DEGREES, 3)
     change = np.einsum("kdi,di->k", gain[3:], measured - known)
-    # The error of the attitude has the sign of C_estimated = exp([phi x]) C_true.
     return InertialFit(
         C_nb,
         measured,
@@ -186,17 +186,30 @@ def _solve(normal: Array, rows: Array) -> Array:
     return np.asarray((inner @ (rows / scale[:, None])) / scale[:, None])
 
 
-def _legendre(u: Array, degrees: int) -> Array:
-    return np.asarray(np.polynomial.legendre.legvander(u, degrees - 1).T)
-
-
 def functionals(sums: InertialSums) -> tuple[Array, Array]:
-    """Coefficients (DEGREES, m) per second integral times time, and per gain of velocity."""
-    t, dt = sums.middles, sums.node_length
-    factor = (2.0 * np.arange(DEGREES) + 1.0) / sums.length
-    place = factor[:, None] * _legendre(2.0 * t / sums.length - 1.0, DEGREES)
-    push = (place * dt) @ np.maximum(t[:, None] - t[None, :], 0.0)
-    return place, push
+    """Coefficients per second integral times time in a node, and per velocity gained in it.
+
+    Parameters
+    ----------
+    sums : InertialSums
+
+    Returns
+    -------
+    place, push : ndarray, (DEGREES, m)
+        Exact for what is constant within a node: by integrals of the polynomials from the end.
+    """
+    from numpy.polynomial import legendre
+
+    ends = np.concatenate([[0.0], np.cumsum(sums.node_length)])
+    u = 2.0 * ends / ends[-1] - 1.0
+    place, push = (np.empty((DEGREES, len(u) - 1)) for _ in range(2))
+    for d in range(DEGREES):
+        once = legendre.legint(np.eye(d + 1)[d], lbnd=1)
+        # The second is the integral of P_d(s) (s - u) from u to the end.
+        thrice = legendre.legint(once, m=2, lbnd=1)
+        for out, whole in ((place, once), (push, thrice)):
+            out[d] = (2 * d + 1) / sums.length * np.diff(legendre.legval(u, whole)) / np.diff(u)
+    return place, push * (0.5 * sums.length) ** 2
 
 
 def _response(sums: InertialSums, gain: Array, C_nb: Array) -> Response:

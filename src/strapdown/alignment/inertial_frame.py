@@ -30,6 +30,7 @@ from strapdown.alignment.still import still_by_gnss
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -84,7 +85,7 @@ class InertialFrame(CoarseAlignment):
             few samples; its force is not gravity; the body travelled; or the heading is not
             known to 1 rad.
         """
-        source = imu.attrs.get("source")
+        source = source_of(imu)
         findings = [*check_record(imu)]
         sums = sum_inertially(imu)
         findings += check_gravity(_mean_force(sums), source)

@@ -92,9 +92,9 @@ def sum_inertially(imu: pd.DataFrame) -> InertialSums:
     last[-1] = n - 1
     m = len(last)
     turned, fallen = np.empty((n + 1, 4)), np.empty((n + 1, 3))
-    velocity, attitude = np.empty((m, 3)), np.empty((m, 4))
+    velocity = np.empty((m, 3))
     times, turns, pushes = np.zeros((m, 3, 3)), np.zeros((m, 3, 3, 3)), np.zeros((m, 3, 3, 3))
-    inertial_sums(rows, last, turned, fallen, velocity, attitude, times, turns, pushes)
+    inertial_sums(rows, last, turned, fallen, velocity, times, turns, pushes)
     ends = stamps[last + 1]
     return InertialSums(
         float(time[0]),

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.alignment.fine_epochs import settled_epoch
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
-from strapdown.alignment.stationary import home_of, observations
+from strapdown.alignment.stationary import home_of
 from strapdown.estimation.error_filter import FilterState
 from strapdown.estimation.error_model import PHYSICAL
 
@@ -145,11 +146,15 @@ def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: floa
     rows = np.tile(_resting(site, q_nb), (each, 1))
     for _ in range(max(1, math.floor(rest / result.interval))):
         time = state.time + STEP * np.arange(1.0, each + 1)
-        state, segment = filter_.predict(state, np.asarray(time), rows)
-        made = observations(
-            filter_, state, segment, home, result.standing, tuple(result.innovations)
+        state, _ = settled_epoch(
+            filter_,
+            state,
+            np.asarray(time),
+            rows,
+            home,
+            result.standing,
+            tuple(result.innovations),
         )
-        state, _ = filter_.observe(state, made)
     P = filter_.physical_covariance(state)
     level = used.level_from_ned(state.row)
     attitude = level.T @ P[6:9, 6:9] @ level

@@ -18,6 +18,8 @@ __all__ = ["LEAST_SAMPLES", "check_gravity", "check_record"]
 NEAR_GRAVITY = 0.2
 #: Fewer tell no scatter.
 LEAST_SAMPLES = 20
+# rad/s or m/s²; no sensor is as quiet, and no simulation without errors as loud.
+ROUNDING = 1e-12
 WHAT_IT_READS = {"gyro": "the rate of the Earth", "accel": "gravity"}
 
 
@@ -119,7 +121,7 @@ def _check_alive(values: Array, source: str | None) -> None:
     spread = np.ptp(values, axis=0)
     for name, columns in (("gyro", slice(0, 3)), ("accel", slice(3, 6))):
         still = spread[columns] == 0.0
-        rounding = 1e-12 * np.abs(values[:, columns]).max(initial=0.0)
+        rounding = ROUNDING * max(1.0, float(np.abs(values[:, columns]).max(initial=0.0)))
         if not still.any() or not (spread[columns] > rounding).any():
             continue
         channel = (GYRO if name == "gyro" else ACCEL)[int(np.argmax(still))]

@@ -23,6 +23,7 @@ from strapdown.estimation.observation import Observation
 from strapdown.estimation.sensor_states import stacked
 from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState
+from strapdown.sensors.triad_errors import Triad
 
 Array = NDArray[np.float64]
 
@@ -31,6 +32,9 @@ AXES = ("x", "y", "z")
 OBSERVATIONS = ("rate", "position", "velocity")
 # Fewer say little of how much they vary.
 LEAST_STRETCHES = 8
+# The largest of several variances of as few numbers, over the one that is expected: of eight
+# chi-square with 8 degrees of freedom one in a thousand is beyond 3.9.
+BY_CHANCE = 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,22 +55,20 @@ class Standing:
     turn: Array
 
 
-def observations(
+def still_observations(
     filter_: ErrorFilter,
     state: FilterState,
-    segment: Segment,
     home: NavState,
     standing: Standing,
     names: Sequence[str],
 ) -> list[Observation]:
-    """Make the observations of an epoch.
+    """Make the observations of the end of an epoch: (17) and (18).
 
     Parameters
     ----------
     filter_ : ErrorFilter
     state : FilterState
-        At the end of the segment.
-    segment : Segment
+        At the end of the epoch.
     home : NavState
         The place of alignment.
     standing : Standing
@@ -78,13 +80,10 @@ def observations(
     list of Observation
     """
     made = []
-    for name in names:
-        if name == "rate":
-            made.append(rate_observation(filter_, segment, standing))
-        elif name == "position":
-            made.append(position_observation(filter_, state, home, standing))
-        else:
-            made.append(velocity_observation(filter_, state, standing))
+    if "position" in names:
+        made.append(position_observation(filter_, state, home, standing))
+    if "velocity" in names:
+        made.append(velocity_observation(filter_, state, standing))
     return made
 
 
@@ -129,9 +128,9 @@ def rate_observation(filter_: ErrorFilter, segment: Segment, standing: Standing)
 
     The matrix that turns the gyros' axes is that of each instant, inside the integral: a body that
     rocks comes back, and its rocking leaves only the difference of two angles. In level axes
-    instead of inertial ones, in which a body that stands turns by ``omega_ie dt`` as exactly. The
-    noise of the gyros is in the attitude too; taken as independent of it, which makes the filter's
-    standard deviations too large rather than too small.
+    instead of inertial ones, in which a body that stands turns by ``omega_ie dt`` as exactly. Of
+    the errors at the start of the segment; the noise of the gyros, which is in the attitude too, is
+    not in R.
     """
     model = filter_.model
     levels = segment.mechanization.levels(segment.history)
@@ -147,17 +146,16 @@ def rate_observation(filter_: ErrorFilter, segment: Segment, standing: Standing)
     H[:, 6:9] = -rotation.cross_matrix(turned)
     mean = np.einsum("k,kij->ij", rows[:, 0], matrices)
     H[:, PHYSICAL:] = mean @ np.einsum("m,mij->ij", weights, gyro)
-    noise = np.square(model.gyro_noise) * length
     return Observation(
         "rate",
         turned - earth * length,
         H,
-        standing.turn**2 + (mean / length) ** 2 @ noise,
+        standing.turn**2,
         _labels("rad"),
     )
 
 
-def measured_standing(segment: Segment, every: int, least: Standing) -> Standing:
+def measured_standing(segment: Segment, every: int, least: Standing, gyro_noise: Triad) -> Standing:
     """Find from a run without observations how still a body stands.
 
     A filter takes what moves the body as independent from epoch to epoch. What sways slowly, or
@@ -174,6 +172,9 @@ def measured_standing(segment: Segment, every: int, least: Standing) -> Standing
         Steps from epoch to epoch.
     least : Standing
         No body is taken to stand more still than this.
+    gyro_noise : triad, rad/√s
+        It turns the level, too, and is not the body's motion: where no more is found than chance
+        makes of it, the body does not turn.
 
     Returns
     -------
@@ -186,10 +187,13 @@ def measured_standing(segment: Segment, every: int, least: Standing) -> Standing
     matrices = rotation.dcm_from_quaternion(levels[:-1, Q_LB : Q_LB + 4])
     turns = np.einsum("kij,kj->ki", matrices, segment.increments[:, 1:4])
     turns = _stretches(turns, every).sum(axis=1)
+    found = _as_independent(turns, 1) ** 2
+    noise = max(gyro_noise) ** 2 * float(segment.increments[:every, 0].sum())
+    turn = np.sqrt(np.where(found > BY_CHANCE * noise, found - noise, 0.0))
     return Standing(
         position=np.maximum(_as_independent(place, 4), least.position),
         velocity=np.maximum(_as_independent(velocity, 3), least.velocity),
-        turn=np.maximum(_as_independent(turns, 1), least.turn),
+        turn=np.maximum(turn, least.turn),
     )
 
 

@@ -33,6 +33,7 @@ from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -85,7 +86,7 @@ class TwoVector(CoarseAlignment):
             is not known to 1 rad.
         """
         findings = [*check_record(imu)]
-        source = imu.attrs.get("source")
+        source = source_of(imu)
         means = block_means(imu, self.blocks)
         findings += check_gravity(means.whole_force, source)
         C_nb = triad_attitude(means.whole_force, means.whole_rate, site)

@@ -36,8 +36,8 @@ class Screened:
     values, raw : ndarray, (k, c)
         With outliers replaced, and as they came.
     flags : ndarray of int8, (k, c)
-        `REPLACED`, `KEPT` where a sample stands out but both sides do not agree that it should
-        not, as at a step, or zero.
+        `REPLACED`; `KEPT` where a sample stands out, more than those beside it, but the two sides
+        do not agree that it should not, as at a step; or zero.
     """
 
     first: int
@@ -116,14 +116,14 @@ class OutlierDesign:
     threshold: float = 6.0
     window: int = 128
     longest_run: int = 3
-    bandwidth: float = 0.15
+    bandwidth: float = 0.2
 
     def __post_init__(self) -> None:
         for name, good, remedy in (
             ("threshold", 3.0 <= self.threshold < math.inf, "give 3 or more, as 6"),
             ("window", self.window >= LEAST_WINDOW, f"give {LEAST_WINDOW} samples or more, as 128"),
             ("longest_run", 1 <= self.longest_run <= LONGEST_RUN, "give 1 to 5 samples, as 3"),
-            ("bandwidth", 0.0 < self.bandwidth < 0.25, "give a part of the rate, as 0.15"),
+            ("bandwidth", 0.0 < self.bandwidth < 0.25, "give a part of the rate, as 0.2"),
         ):
             if not good:
                 raise ConfigError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +21,11 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
+
+# Part by which noise is larger than what is known of it, so that what is left is no less than zero.
+ROUNDING = 1e-9
+# Place of the rotation among the physical errors.
+ROTATION = slice(6, 9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,38 +141,58 @@ class ErrorFilter:
         DivergenceError
             The mechanization has left the range in which it means anything.
         """
-        used = self.mechanization
-        rows = self.compensated(state, rows)
-        history = np.empty((len(rows) + 1, used.row))
-        history[0] = state.row
-        after = state.mechanization.copy()
-        made, why = used.advance_rows(after, rows, np.empty(0), self.earth, history[1:])
-        if why:
-            raise DivergenceError(
-                f"the state has diverged with the sample at {time[made]:.9g} s",
-                quantity="state",
-                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-                "gravity, a burst; or begin from a state that is nearer to the truth",
-            )
-        segment = Segment(used, np.concatenate([[state.time], time]), history, rows)
+        after, segment = self._run(state, time, rows)
         Phi, Q = self.model.transition(segment, self.step)
-        blocks = self.model.sensors
-        sensors = state.sensors.copy()
-        at = 0
-        for one in blocks:
-            end = at + len(one.block)
-            sensors[at:end] *= np.exp(-one.decay * (float(time[-1]) - state.time))
-            at = end
-        return (
-            FilterState(
-                time=float(time[-1]),
-                mechanization=after,
-                row=history[-1],
-                sensors=sensors,
-                covariance=self.form.predict(state.covariance, Phi, Q),
-            ),
-            segment,
+        return replace(after, covariance=self.form.predict(state.covariance, Phi, Q)), segment
+
+    def predict_observing(
+        self,
+        state: FilterState,
+        time: Array,
+        rows: Array,
+        observe: Callable[[Segment], Observation],
+    ) -> tuple[FilterState, Segment, Innovations]:
+        """Go on over motion increments that are themselves observed, and take off what that tells.
+
+        The noise of such an observation is in the state, too: that of gyros whose turn is compared
+        with the Earth's turns the attitude as well. It is met by taking the observation before the
+        prediction, from which then comes off what is known of the noise: with the noise v of the
+        observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and the
+        covariance of the noise ``Q - S M'`` (Brown and Hwang 1997, sec. 7.3).
+
+        Parameters
+        ----------
+        state : FilterState
+        time, rows : ndarray
+            As `predict`.
+        observe : callable
+            Makes the observation of a segment: of the errors at its start, R without the noise
+            that is in the rotation of the state.
+
+        Returns
+        -------
+        state : FilterState
+        segment : Segment
+        innovations : Innovations
+        """
+        after, segment = self._run(state, time, rows)
+        Phi, Q = self.model.transition(segment, self.step)
+        observation = observe(segment)
+        used = self.mechanization
+        H = observation.H @ self.model.to_physical(used, state.time, state.row)
+        to_physical = self.model.to_physical(used, after.time, after.row)
+        M = Q @ to_physical[ROTATION].T
+        shared = to_physical[ROTATION] @ M
+        # As independent components, each with no less than its part.
+        R = observation.R + (1.0 + ROUNDING) * np.abs(shared).sum(axis=1)
+        covariance, x, seen = self.form.update(
+            state.covariance, np.zeros(len(Q)), observation.z, H, R, self.rule
         )
+        S = M * (seen.weight / R)
+        Phi = Phi - S @ H
+        covariance = self.form.predict(covariance, Phi, symmetric(Q - S @ M.T))
+        after = replace(after, covariance=covariance)
+        return self._fed_back(after, to_physical, Phi @ x + S @ observation.z), segment, seen
 
     def observe(
         self, state: FilterState, observations: Sequence[Observation]
@@ -186,8 +211,7 @@ class ErrorFilter:
         innovations : list of Innovations
             Of each observation.
         """
-        used = self.mechanization
-        to_physical = self.model.to_physical(used, state.time, state.row)
+        to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
         covariance, x, seen = self.form.update(
             state.covariance,
             np.zeros(to_physical.shape[1]),
@@ -196,29 +220,57 @@ class ErrorFilter:
             np.concatenate([one.R for one in observations]),
             self.rule,
         )
-        physical = to_physical @ x
-        corrected = used.correct(state.mechanization, physical[:PHYSICAL])
-        row = used.history_row(corrected)
-        if not self.model.states_are_physical:
-            # States that are components of what has just been corrected are meant of it from now
-            # on: the norm of a quaternion is along the new one.
-            carried = self.model.from_physical(used, state.time, row) @ to_physical
-            covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
-        return (
-            replace(
-                state,
-                mechanization=corrected,
-                row=row,
-                sensors=state.sensors + physical[PHYSICAL:],
-                covariance=covariance,
-            ),
-            _split(seen, [one.z.size for one in observations]),
-        )
+        after = self._fed_back(replace(state, covariance=covariance), to_physical, x)
+        return after, _split(seen, [one.z.size for one in observations])
 
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
         T = self.model.to_physical(self.mechanization, state.time, state.row)
         return symmetric(T @ self.form.matrix(state.covariance) @ T.T)
+
+    def _run(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
+        """The mechanization over increments without estimated errors; the covariance as it was."""
+        used = self.mechanization
+        rows = self.compensated(state, rows)
+        history = np.empty((len(rows) + 1, used.row))
+        history[0] = state.row
+        after = state.mechanization.copy()
+        made, why = used.advance_rows(after, rows, np.empty(0), self.earth, history[1:])
+        if why:
+            raise DivergenceError(
+                f"the state has diverged with the sample at {time[made]:.9g} s",
+                quantity="state",
+                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+                "gravity, a burst; or begin from a state that is nearer to the truth",
+            )
+        segment = Segment(used, np.concatenate([[state.time], time]), history, rows)
+        sensors = state.sensors.copy()
+        at = 0
+        for one in self.model.sensors:
+            end = at + len(one.block)
+            sensors[at:end] *= np.exp(-one.decay * (float(time[-1]) - state.time))
+            at = end
+        return FilterState(float(time[-1]), after, history[-1], sensors, state.covariance), segment
+
+    def _fed_back(self, state: FilterState, to_physical: Array, x: Array) -> FilterState:
+        """Take an estimate off the mechanization and off the sensors."""
+        used = self.mechanization
+        physical = to_physical @ x
+        corrected = used.correct(state.mechanization, physical[:PHYSICAL])
+        row = used.history_row(corrected)
+        covariance = state.covariance
+        if not self.model.states_are_physical:
+            # States that are components of what has just been corrected are meant of it from now
+            # on: the norm of a quaternion is along the new one.
+            carried = self.model.from_physical(used, state.time, row) @ to_physical
+            covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
+        return replace(
+            state,
+            mechanization=corrected,
+            row=row,
+            sensors=state.sensors + physical[PHYSICAL:],
+            covariance=covariance,
+        )
 
 
 def symmetric(P: Array) -> Array:

@@ -1,17 +1,15 @@
-"""Seventeen states: velocity in a wander azimuth, two quaternions, and the biases of the sensors."""
+"""Seventeen states: velocity in a wander azimuth, two quaternions, biases of the sensors."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from strapdown import rotation
-from strapdown._kernels import wander as rows
+from strapdown._kernels import wander_error_states as states
 from strapdown._kernels import wander_errors as kernel
-from strapdown._kernels.level import ALT, AXIS, LEVEL, V_L, curvatures
+from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import PHYSICAL, Array, ErrorModel, Segment
 from strapdown.estimation.sensor_states import stacked
@@ -21,13 +19,8 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 
 COMPONENTS = ("w", "x", "y", "z")
-#: States of the core: of velocity, and of the two quaternions.
-CORE = 11
-VELOCITY, BODY, PLACE = slice(0, 3), slice(3, 7), slice(7, 11)
-# Where the variables of the kernel stand.
-THETA = slice(kernel.THETA, kernel.THETA + 3)
-DV = slice(kernel.DV, kernel.DV + 3)
-EPS = slice(kernel.EPS, kernel.EPS + 3)
+#: Number of states before those of the sensors.
+STATES = states.STATES
 
 
 @dataclass(frozen=True)
@@ -81,11 +74,12 @@ class QuaternionModel(ErrorModel):
             of its own.
         """
         used = _checked(segment.mechanization)
-        k = self.layout.size - CORE
+        k = self.layout.size - STATES
         n = PHYSICAL + k
         levels = used.levels(segment.history)
         phi, q = np.empty((n, n)), np.empty((n, n))
         gyro, accel, decay, drive = stacked(self.sensors, k)
+        earth = find_ellipsoid(used.ellipsoid).parameters()
         kernel.wander_transitions(
             levels,
             segment.increments,
@@ -97,7 +91,7 @@ class QuaternionModel(ErrorModel):
             np.array(self.gyro_noise),
             np.array(self.accel_noise),
             used.height == "held",
-            find_ellipsoid(used.ellipsoid).parameters(),
+            earth,
             phi,
             q,
             np.empty((PHYSICAL, n)),
@@ -108,43 +102,56 @@ class QuaternionModel(ErrorModel):
             np.empty((15, 3)),
             np.empty(LEVEL),
         )
-        fixed = _without_gauge(levels[-1], n)
-        begin = self._components(used, segment.time[0], segment.history[0])
-        end = self._components(used, segment.time[-1], segment.history[-1])
-        Phi = end[:, :n] @ (fixed @ phi) @ _inverse(begin)[:n] + end[:, n:] @ _inverse(begin)[n:]
-        half = end[:, :n] @ fixed
-        Q = half @ q @ half.T
-        return Phi, 0.5 * (Q + Q.T)
+        end = levels[-1]
+        states.fix_gauge(end, phi)
+        states.fix_gauge(end, q)
+        states.fix_gauge(end, q.T)
+        _, back = _columns(used, segment.time[0], segment.history[0])
+        forth, _ = _columns(used, segment.time[-1], segment.history[-1])
+        core = forth[:, :PHYSICAL]
+        Phi, Q = np.zeros((2, n + 2, n + 2))
+        Phi[:STATES, :STATES] = (
+            core @ phi[:PHYSICAL, :PHYSICAL] @ back[:PHYSICAL]
+            + forth[:, PHYSICAL:] @ back[PHYSICAL:]
+        )
+        Phi[:STATES, STATES:] = core @ phi[:PHYSICAL, PHYSICAL:]
+        Phi[STATES:, STATES:] = phi[PHYSICAL:, PHYSICAL:]
+        of_core = core @ q[:PHYSICAL, :PHYSICAL] @ core.T
+        Q[:STATES, :STATES] = 0.5 * (of_core + of_core.T)
+        Q[:STATES, STATES:] = core @ q[:PHYSICAL, PHYSICAL:]
+        Q[STATES:, :STATES] = Q[:STATES, STATES:].T
+        Q[STATES:, STATES:] = q[PHYSICAL:, PHYSICAL:]
+        return Phi, Q
 
     def to_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
         """Return T, as `ErrorModel.to_physical`: its row of the vertical displacement is zero."""
         used = _checked(mechanization)
-        level = used.levels(row[None])[0]
-        tensor = _curvature(used, level)
-        n = self.physical_size
-        out = np.zeros((n, n))
-        # The normal turns by theta x zeta, and the displacement turns it so.
-        out[0:2, THETA] = np.linalg.solve(tensor, [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
-        out[3:6, DV] = np.eye(3)
-        out[3:6, THETA] = -_cross(level[V_L : V_L + 3])
-        out[6:9, EPS] = np.eye(3)
-        out[PHYSICAL:, PHYSICAL:] = np.eye(n - PHYSICAL)
-        return out @ _inverse(self._components(used, time, row))[:n]
+        core = np.empty((PHYSICAL, PHYSICAL))
+        earth = find_ellipsoid(used.ellipsoid).parameters()
+        states.physical_of_variables(used.levels(row[None])[0], earth, core)
+        _, back = _columns(used, time, row)
+        k = self.layout.size - STATES
+        out = np.zeros((PHYSICAL + k, STATES + k))
+        out[:PHYSICAL, :STATES] = core @ back[:PHYSICAL]
+        out[PHYSICAL:, STATES:] = np.eye(k)
+        return out
 
     def from_physical(self, mechanization: Mechanization, time: float, row: Array) -> Array:
-        """Return E, as `ErrorModel.from_physical`: a vertical displacement is lost."""
+        """Return E, as `ErrorModel.from_physical`: a vertical displacement is lost.
+
+        With a height that is held a vertical velocity is lost, too.
+        """
         used = _checked(mechanization)
-        level = used.levels(row[None])[0]
-        n = self.physical_size
-        out = np.zeros((n, n))
-        out[THETA, 0:2] = [[0.0, -1.0], [1.0, 0.0], [0.0, 0.0]] @ _curvature(used, level)
-        out[DV, 3:6] = np.eye(3)
-        out[DV, 0:2] = _cross(level[V_L : V_L + 3]) @ out[THETA, 0:2]
-        if used.height == "held":
-            out[kernel.DV + 2] = 0.0
-        out[EPS, 6:9] = np.eye(3)
-        out[PHYSICAL:, PHYSICAL:] = np.eye(n - PHYSICAL)
-        return self._components(used, time, row)[:, :n] @ out
+        core = np.empty((PHYSICAL, PHYSICAL))
+        earth = find_ellipsoid(used.ellipsoid).parameters()
+        held = used.height == "held"
+        states.variables_of_physical(used.levels(row[None])[0], earth, held, core)
+        forth, _ = _columns(used, time, row)
+        k = self.layout.size - STATES
+        out = np.zeros((STATES + k, PHYSICAL + k))
+        out[:STATES, :PHYSICAL] = forth[:, :PHYSICAL] @ core
+        out[STATES:, PHYSICAL:] = np.eye(k)
+        return out
 
     def null_directions(self, mechanization: Mechanization, time: float, row: Array) -> Array:
         """Return what is nothing physical.
@@ -153,72 +160,32 @@ class QuaternionModel(ErrorModel):
         ----------
         mechanization : Mechanization
         time : float, s
-        row : ndarray
+        row : ndarray, (12,)
 
         Returns
         -------
         ndarray, (3, n)
-            Norm of ``q_ib``, norm of ``q_ew``, and a turn of the level axes about zeta by 1 rad.
+            Twice the norm of ``q_ib`` and of ``q_ew`` by 1, and a turn of the level axes about
+            zeta by 1 rad.
         """
         used = _checked(mechanization)
-        level = used.levels(row[None])[0]
-        n = self.physical_size
-        components = self._components(used, time, row)
-        gauge = np.zeros(n)
-        gauge[kernel.THETA + 2] = 1.0
-        gauge[kernel.DV : kernel.DV + 2] = level[V_L + 1], -level[V_L]
-        return np.stack([components[:, n], components[:, n + 1], components[:, :n] @ gauge])
-
-    def _components(self, used: Mechanization, time: float, row: Array) -> Array:
-        """States of the variables of the kernel, and last of the two norms."""
-        n = self.physical_size
-        place, body = row[rows.Q_EW : rows.Q_EW + 4], row[rows.Q_WB : rows.Q_WB + 4]
-        half = 0.5 * find_ellipsoid(used.ellipsoid).rotation_rate * time
-        of_earth = np.array([math.cos(half), 0.0, 0.0, math.sin(half)])
-        units = np.eye(4)
-        # Columns: the quaternion times, or between two, each of 1, i, j, k.
-        left = rotation.compose(place, units).T
-        around = rotation.compose(
-            rotation.compose(rotation.compose(of_earth, place), units), body
-        ).T
-        out = np.zeros((n + 2, n + 2))
-        out[VELOCITY, DV] = np.eye(3)
-        out[BODY, EPS], out[BODY, n] = 0.5 * around[:, 1:], 0.5 * around[:, 0]
-        out[PLACE, THETA], out[PLACE, n + 1] = 0.5 * left[:, 1:], 0.5 * left[:, 0]
-        out[CORE:, PHYSICAL:n] = np.eye(n - PHYSICAL)
+        forth, _ = _columns(used, time, row)
+        turn = np.zeros(PHYSICAL)
+        turn[kernel.THETA + 2] = 1.0
+        states.turn_gauge(used.levels(row[None])[0], 1.0, turn[kernel.DV : kernel.DV + 3])
+        out = np.zeros((3, self.layout.size))
+        out[:2, :STATES] = forth[:, PHYSICAL:].T
+        out[2, :STATES] = forth[:, :PHYSICAL] @ turn
         return out
 
 
-def _inverse(components: Array) -> Array:
-    """Inverse of `_components`: columns are orthogonal, those of quaternions half as long."""
-    out = components.T.copy()
-    out[:, BODY] *= 4.0
-    out[:, PLACE] *= 4.0
-    return out
-
-
-def _without_gauge(level: Array, n: int) -> Array:
-    """Take the turn of the level axes about zeta out of the variables of the kernel."""
-    out = np.eye(n)
-    turn = kernel.THETA + 2
-    out[turn, turn] = 0.0
-    out[kernel.DV, turn], out[kernel.DV + 1, turn] = -level[V_L + 1], level[V_L]
-    return out
-
-
-def _curvature(used: Mechanization, level: Array) -> Array:
-    """Turn of the normal, xi and eta, over a horizontal displacement, 1/m."""
-    earth = find_ellipsoid(used.ellipsoid)
-    across, along = curvatures(
-        level[AXIS + 2], level[ALT], earth.semi_major_axis, earth.eccentricity_squared
-    )
-    k = level[AXIS : AXIS + 2]
-    return across * np.eye(2) + along * np.outer(k, k)
-
-
-def _cross(v: Array) -> Array:
-    out: Array = rotation.cross_matrix(v[None])[0]
-    return out
+def _columns(used: Mechanization, time: float, row: Array) -> tuple[Array, Array]:
+    """States of the variables of the kernel and of the two norms, and the inverse."""
+    forth, back = np.empty((2, STATES, STATES))
+    turn = find_ellipsoid(used.ellipsoid).rotation_rate * time
+    states.component_columns(row, turn, forth)
+    states.invert_columns(forth, back)
+    return forth, back
 
 
 def _checked(mechanization: Mechanization) -> Mechanization:

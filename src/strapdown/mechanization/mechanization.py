@@ -84,8 +84,6 @@ class Mechanization(ABC):
     #: Places of the height and of the velocity in a state and in a row.
     alt_at: ClassVar[int] = ALT
     v_at: ClassVar[int] = V
-    #: Compiled function that takes one sample (`_kernels.sample`), where there is one.
-    update: ClassVar[Callable[..., int] | None] = None
 
     def __post_init__(self) -> None:
         find_ellipsoid(self.ellipsoid)
@@ -129,6 +127,10 @@ class Mechanization(ABC):
         self, state: Array, increments: Array, heights: Array, earth: Array, history: Array
     ) -> tuple[int, int]:
         """Advance `state` over rows of increments; return the steps made, and why no more."""
+
+    def sample_kernel(self) -> Callable[..., int] | None:
+        """Return the compiled function that takes one sample, if there is one."""
+        return None
 
     def levels(self, history: Array) -> Array:
         """Return what a filter needs to know of each row of a history.
@@ -405,8 +407,8 @@ class Mechanization(ABC):
             )
         if why == LEAP:
             raise DivergenceError(
-                f"with the sample at {time:.9g} s (step {step + 1}, of {row['dt']:.4g} s) the place "
-                f"moves by more than {LARGEST_TURN:g} rad around the Earth{before}",
+                f"with the sample at {time:.9g} s (step {step + 1}, of {row['dt']:.4g} s) the "
+                f"place moves by more than {LARGEST_TURN:g} rad around the Earth{before}",
                 file=source,
                 quantity="state",
                 remedy="a step so long has no course between its ends: cut the log there",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown._kernels import ned as kernel
+from strapdown._kernels.ned_sample import ned_update
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
@@ -52,6 +54,10 @@ class NorthEastDown(Mechanization):
         place = [start.lat, start.lon, start.alt]
         level = self._level(start.lat)
         return np.array([*place, *start.v_n[:2], down, *start.q_nb, *level, 0.0, 0.0])
+
+    def sample_kernel(self) -> Callable[..., int]:
+        """Return the compiled function that takes one sample."""
+        return ned_update
 
     def correct(self, state: Array, error: ArrayLike) -> Array:
         """Take an error off a state, as `Mechanization.correct`."""

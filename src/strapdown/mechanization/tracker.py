@@ -9,11 +9,11 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike
 
-from strapdown._kernels import ned_sample as kernel
-from strapdown._kernels.ned import POLE
+from strapdown._kernels import sample as kernel
+from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError
-from strapdown.mechanization.mechanization import Array
+from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.run import LONGEST_STEP, check_longest_step
 from strapdown.nav_state import NavState
@@ -33,7 +33,8 @@ class NavTracker:
     ----------
     start : NavState
         At the first sample.
-    mechanization : NorthEastDown, optional
+    mechanization : NorthEastDown or WanderAzimuth, optional
+        North-east-down on WGS 84 with a free height, if not given.
     sampling : {'instantaneous', 'mean'}
         What a sample is: the value at its stamp, or its mean over the interval that ends there.
     longest_step : float, s
@@ -51,7 +52,7 @@ class NavTracker:
     def __init__(
         self,
         start: NavState,
-        mechanization: NorthEastDown | None = None,
+        mechanization: Mechanization | None = None,
         sampling: str = "instantaneous",
         longest_step: float = LONGEST_STEP,
     ) -> None:
@@ -63,23 +64,25 @@ class NavTracker:
                 remedy=f"use {' or '.join(SAMPLINGS)}",
             )
         used: object = NorthEastDown() if mechanization is None else mechanization
-        if not isinstance(used, NorthEastDown):
+        update = used.sample_kernel() if isinstance(used, Mechanization) else None
+        if not isinstance(used, Mechanization) or update is None:
             raise ConfigError(
-                f"a tracker steps with NorthEastDown, and not with {used!r}",
+                f"a tracker steps with NorthEastDown or WanderAzimuth, and not with {used!r}",
                 quantity="mechanization",
-                remedy="leave it out, or give NorthEastDown with its options; others navigate a "
+                remedy="leave it out, or give one of these with its options; others navigate a "
                 "whole log with run_mechanization",
             )
-        record = np.zeros(kernel.SIZE)
+        begin = used.begin(start)
+        record = np.zeros(kernel.STATE + len(begin))
         record[kernel.TIME] = start.time
         record[kernel.LONGEST] = longest_step
         record[kernel.MEAN] = float(sampling == "mean")
         record[kernel.EARTH : kernel.OPTIONS] = find_ellipsoid(used.ellipsoid).parameters()
         record[kernel.OPTIONS : kernel.STATE] = used.kernel_options()
-        record[kernel.STATE :] = used.begin(start)
+        record[kernel.STATE :] = begin
         self._mechanization = used
         self._record = record
-        self._update = kernel.ned_update
+        self._update = update
 
     def update(
         self,
@@ -148,8 +151,8 @@ class NavTracker:
                 "that is infinite",
                 row=row,
                 quantity="height",
-                remedy="give finite heights to NorthEastDown(height='damped') alone, NaN where "
-                "there is none",
+                remedy="give finite heights to a mechanization with height='damped' alone, NaN "
+                "where there is none",
             )
         if why == kernel.GAP:
             raise DataError(
@@ -175,6 +178,15 @@ class NavTracker:
                 row=row,
                 quantity="lat",
                 remedy="end here; north-east-down has no meaning at a pole",
+            )
+        if why == LEAP:
+            raise DivergenceError(
+                f"in the step to {time:.9g} s the place would move by more than {LARGEST_TURN:g} "
+                "rad around the Earth",
+                row=row,
+                quantity="state",
+                remedy="a step so long has no course between its ends: begin again from a known "
+                "state",
             )
         raise DivergenceError(
             f"the state would diverge: {given}",

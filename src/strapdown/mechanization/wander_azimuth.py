@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,6 +14,7 @@ from strapdown import rotation
 from strapdown._kernels import wander as kernel
 from strapdown._kernels import wander_level as level
 from strapdown._kernels.level import LEVEL
+from strapdown._kernels.wander_sample import wander_update
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Array, Mechanization
@@ -27,7 +29,7 @@ class WanderAzimuth(Mechanization):
     level axes in the Earth's, and the velocity. Level axes are xi, eta, zeta with zeta up; xi is
     turned anticlockwise from east by the wander angle A, which is zero at the start and then is
     whatever keeps the rate of the axes about zeta, relative to the Earth, at zero:
-    ``V_E = V_xi cos A - V_eta sin A``, ``V_N = V_xi sin A + V_eta cos A`` (the paper prints a minus).
+    ``V_E = V_xi cos A - V_eta sin A``, ``V_N = V_xi sin A + V_eta cos A`` (in print a minus).
     Gravity is normal gravity, which is the paper's gravitation and centrifugal term together.
 
     The error of a run is of the fourth order of the step (`_kernels.wander`), at a pole as
@@ -101,6 +103,10 @@ class WanderAzimuth(Mechanization):
         options = self.kernel_options()
         made, why = kernel.wander_advance(state, increments, heights, earth, options, history)
         return made, why
+
+    def sample_kernel(self) -> Callable[..., int]:
+        """Return the compiled function that takes one sample."""
+        return wander_update
 
     def levels(self, history: Array) -> Array:
         """Return what a filter needs to know of each row, as `Mechanization.levels`."""

@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+from strapdown.prefilter.none import NoPrefilter
 from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, Prefiltered
 from strapdown.prefilter.report import PrefilterReport
 from strapdown.prefilter.robust_fir import RobustFir
+from strapdown.prefilter.summed import Summed
+from strapdown.prefilter.w_d import RobustWd
 
 __all__ = [
     "PREFILTERS",
     "Grid",
+    "NoPrefilter",
     "Portion",
     "Prefilter",
     "PrefilterReport",
     "Prefiltered",
     "RobustFir",
+    "RobustWd",
+    "Summed",
 ]
 
 #: Every prefilter, by name.
-PREFILTERS: dict[str, type[Prefilter]] = {"robust_fir": RobustFir}
+PREFILTERS: dict[str, type[Prefilter]] = {
+    "none": NoPrefilter,
+    "robust_fir": RobustFir,
+    "summed": Summed,
+    "w_d": RobustWd,
+}

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from strapdown.dsp.samples import even_step
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.prefilter.report import Changed, PrefilterReport, report_of
-from strapdown.tables import ACCEL, GYRO, MOTION, check_imu
+from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
 from strapdown.tables.checks import index_of, source_of, values_of
 
 Array = NDArray[np.float64]
@@ -190,8 +190,8 @@ class Prefilter(ABC):
             return motion_increments(table)
         out = pd.DataFrame(rows, index=table.index.copy(), columns=MOTION)
         out.attrs["source"] = table.attrs.get("source")
-        # Before the first mean no motion is known: its row has no length.
-        return out[out["dt"] > 0.0]
+        check_motion_increments(out)
+        return out
 
 
 def grid_of(imu: pd.DataFrame) -> Grid:

@@ -19,9 +19,7 @@ Indices = NDArray[np.int64]
 __all__ = ["Changed", "PrefilterReport", "report_of"]
 
 # Flagged samples with fewer between them belong to one event.
-APART = 8
-# Kept samples of a step, of which both sides stand out.
-OF_A_STEP = 4
+APART = 32
 # A share of outliers above this is no rare fault.
 USUAL_SHARE = 0.01
 # Events of one channel that are told one by one.
@@ -147,15 +145,16 @@ def report_of(
 def _bursts(
     changed: Changed, grid: Any, columns: Sequence[str], source: str | None
 ) -> list[Finding]:
-    """Events of more samples than are bridged, none of which is a mere step."""
+    """Events of more samples than are bridged, but no mere steps."""
     found = []
     for c, column in enumerate(columns):
         of = changed.channel == c
         number, flag = changed.number[of], changed.flag[of]
         told, left = 0, 0
         for event in np.split(np.arange(len(number)), np.flatnonzero(np.diff(number) > APART) + 1):
-            kept = int((flag[event] == KEPT).sum())
-            if kept <= OF_A_STEP:
+            kept = number[event][flag[event] == KEPT]
+            # A step stands out at one place: at two samples beside each other, or one.
+            if (np.diff(kept) > 1).sum() < 1:
                 continue
             if told == MOST_TOLD:
                 left += 1
@@ -165,8 +164,8 @@ def _bursts(
             found.append(
                 Finding(
                     f"from {grid.time(a):.9g} to {grid.time(b):.9g} s (rows {a + 1} to {b + 1}) "
-                    f"{kept} samples stand out, too close to each other to be bridged: they are "
-                    "left as they came",
+                    f"{len(kept)} samples stand out, too close to each other to be bridged: they "
+                    "are left as they came",
                     file=source,
                     row=a + 1,
                     quantity=column,

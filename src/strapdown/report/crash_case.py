@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +22,13 @@ from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
 from strapdown.systems.crash_case import CaseResult, run_case
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 
 __all__ = ["file_name", "reconstruct_case", "rerun_crash", "write_crash"]
 
-Progress = Callable[[str, float], None]
-
-
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
 
 def reconstruct_case(
-    case: str | Path, out: str | Path, *, force: bool = False, progress: Progress = _silent
+    case: str | Path, out: str | Path, *, force: bool = False, progress: Progress = silent
 ) -> Seal:
     """Reconstruct a crash from its case file and write the report as a sealed bundle.
 
@@ -80,7 +75,7 @@ def write_crash(
     *,
     name: str | None = None,
     force: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Seal:
     """Write the report of a case as a sealed bundle.
 

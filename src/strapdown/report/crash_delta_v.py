@@ -16,8 +16,8 @@ from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.crash.velocity_course import VelocityCourse
 from strapdown.crash.window_weights import window_weights
 from strapdown.report.chart import GREY, PURPLE, Chart, Fill, Line, Panel, curve
-from strapdown.report.crash_moments import AROUND, event_marks, signed, unit_look
-from strapdown.report.crash_values import MEAN
+from strapdown.report.crash_moments import AROUND, event_marks, unit_look
+from strapdown.report.crash_values import MEAN, plain
 
 Array = NDArray[np.float64]
 
@@ -178,8 +178,8 @@ def delta_v_chart(
             0.15,
             legend=k == 0,
         )
-        words = f"{axis}: {signed(KMH * values[k], 1)} ± {signed(KMH * halves[k], 1)} km/h "
-        words += f"({signed(values[k], 2)} ± {signed(halves[k], 2)} m/s)"
+        words = f"{axis}: {plain(KMH * values[k], 1)} ± {plain(KMH * halves[k], 1)} km/h "
+        words += f"({plain(values[k], 2)} ± {plain(halves[k], 2)} m/s)"
         ends = KMH * np.array([values[k] - halves[k], values[k] + halves[k]])
         at = np.array([1e3 * end])
         marks = [

@@ -10,8 +10,9 @@ import numpy as np
 
 from strapdown.crash.pdof_interval import AngleInterval
 from strapdown.report.chart import BLUE, GREY, ORANGE, VERMILLION
-from strapdown.report.crash_moments import interval_words, signed
+from strapdown.report.crash_moments import interval_words
 from strapdown.report.crash_outline import Outline, draw_outline
+from strapdown.report.crash_values import plain
 from strapdown.report.document import Picture
 from strapdown.report.svg_drawing import INK, SMALL, Drawing, shortened
 
@@ -220,7 +221,7 @@ def _words(d: Direction) -> str:
 
 def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
-    speed = f"{signed(d.delta_v, 1)} m/s ({signed(3.6 * d.delta_v, 1)} km/h)"
+    speed = f"{plain(d.delta_v, 1)} m/s ({plain(3.6 * d.delta_v, 1)} km/h)"
     if not d.main:
         out.text((14.0, at), _words(d), SMALL, _SOFT)
         out.text((14.0, at + 14.0), f"change of velocity {speed}", SMALL, _SOFT)

@@ -13,6 +13,7 @@ from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof_interval import AngleInterval
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.report.chart import BLACK, Mark, look
+from strapdown.report.crash_values import plain
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,6 @@ __all__ = [
     "interval_words",
     "marks_apart",
     "path_moments",
-    "signed",
     "unit_look",
 ]
 
@@ -138,18 +138,10 @@ def marks_apart(
     return tuple(out)
 
 
-def signed(value: float, digits: int) -> str:
-    """Write a number with a true minus sign, and no minus before a zero."""
-    text = f"{value:.{digits}f}"
-    if not float(text):
-        text = text.removeprefix("-")
-    return text.replace("-", "−")
-
-
 def angle_words(angle_deg: float, digits: int) -> str:
     """Write an angle in degrees, in (-180, 180]."""
     wrapped = -math.remainder(-angle_deg, 360.0)
-    text = signed(wrapped, digits)
+    text = plain(wrapped, digits)
     return f"{text.removeprefix('−') if wrapped <= -179.9999 else text}°"
 
 

@@ -14,8 +14,9 @@ from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
 from strapdown.report.chart import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILLION
-from strapdown.report.crash_moments import path_moments, signed
+from strapdown.report.crash_moments import path_moments
 from strapdown.report.crash_outline import Outline, draw_outline
+from strapdown.report.crash_values import plain
 from strapdown.report.document import Picture
 from strapdown.report.error_envelope import envelope
 from strapdown.report.plan_view import PlanView
@@ -119,8 +120,8 @@ def path_plan(
     bottom = _TOP + view.height + _UNDER
     end = path.table[NED].iloc[-1]
     alt = (
-        f"Path of the reference point from above: it ends {signed(float(end['north']), 2)} m "
-        f"{names[0]}, {signed(float(end['east']), 2)} m {names[1]} of its place at the entry"
+        f"Path of the reference point from above: it ends {plain(float(end['north']), 2)} m "
+        f"{names[0]}, {plain(float(end['east']), 2)} m {names[1]} of its place at the entry"
     )
     out = Drawing(whole, bottom + 17.0 * len(legend) + 4.0, alt)
     view.draw_grid(out)
@@ -148,7 +149,7 @@ def path_plan(
         out.arrow(tail_at.tolist(), tip.tolist(), VERMILLION, 2.6)
         middle = (0.5 * (tail_at + tip)).tolist()
         bodies = [_box(view.pixels(car.body)) for car in cars]
-        words = f"{signed(math.hypot(*path.entry.velocity[:2]), 1)} m/s"
+        words = f"{plain(math.hypot(*path.entry.velocity[:2]), 1)} m/s"
         out.label(middle, words, 10.5, VERMILLION, away=9.0, avoid=bodies)
     if beside is not None:
         beside.draw_grid(out)
@@ -257,9 +258,7 @@ def _legend_rows(
 ) -> list[list[tuple[float, str, str, str]]]:
     """Rows of entries: place from the left, kind, colour, words."""
     speed = math.hypot(*plan.path.entry.velocity[:2])
-    told = (
-        f"{signed(speed, 1)} m/s ({signed(3.6 * speed, 1)} km/h)" if speed >= _SLOW else "at rest"
-    )
+    told = f"{plain(speed, 1)} m/s ({plain(3.6 * speed, 1)} km/h)" if speed >= _SLOW else "at rest"
     entries = [
         ("path", INK, "path of the reference point"),
         ("band", _BAND_EDGE, "within this with 95 %"),
@@ -269,7 +268,7 @@ def _legend_rows(
         entries.append(("dash", VERMILLION, reference_name))
     for m in plan.moments:
         kind = f"moment {m.dash}"
-        entries.append((kind, m.colour, f"{m.name}, {signed(1e3 * m.at, 0)} ms"))
+        entries.append((kind, m.colour, f"{m.name}, {plain(1e3 * m.at, 0)} ms"))
     rows: list[list[tuple[float, str, str, str]]] = [[]]
     x = _LEFT
     for kind, colour, words in entries:

@@ -13,7 +13,8 @@ from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.report.chart import BLUE
 from strapdown.report.crash_body import VehicleBody
-from strapdown.report.crash_moments import path_moments, signed
+from strapdown.report.crash_moments import path_moments
+from strapdown.report.crash_values import plain
 from strapdown.report.document import Picture
 from strapdown.report.plan_view import nice_step
 from strapdown.report.svg_drawing import INK, SMALL, Drawing
@@ -70,7 +71,7 @@ def crash_stills(
     scale = min((width - 16.0) / size[0], 240.0 / size[1])
     height = scale * float(size[1]) + 16.0
     lines = -(-len(rows) // columns)
-    words = ", ".join(f"{name} {signed(1e3 * at, 0)} ms" for name, at in instants)
+    words = ", ".join(f"{name} {plain(1e3 * at, 0)} ms" for name, at in instants)
     out = Drawing(_WIDTH, lines * (height + _HEAD + _GAP), f"The vehicle in space at {words}")
     for k, (row, (name, at)) in enumerate(zip(rows, instants, strict=True)):
         left = (k % columns) * (width + _GAP)
@@ -81,7 +82,7 @@ def crash_stills(
             page = flat.page(points) - 0.5 * (low + high)
             return np.asarray(centre + scale * page * [1.0, -1.0])
 
-        _cell(out, (left, top, width, height), f"{signed(1e3 * at, 0)} ms", name)
+        _cell(out, (left, top, width, height), f"{plain(1e3 * at, 0)} ms", name)
         shadow = places.copy()
         shadow[:, 2] = ground
         with out.within((left, top + _HEAD, left + width, top + _HEAD + height)):

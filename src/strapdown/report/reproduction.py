@@ -15,6 +15,7 @@ from strapdown.report.page import embedded, render
 from strapdown.report.plotly_chart import figure as plotly_figure
 from strapdown.report.reproduction_charts import chart
 from strapdown.report.svg_chart import draw
+from strapdown.systems.progress import Progress, silent
 from strapdown.systems.reproduce_alexiev import reproduce_alexiev
 from strapdown.systems.reproduce_tadic import reproduce_tadic
 from strapdown.systems.reproduction import (
@@ -37,20 +38,14 @@ __all__ = [
     "write_reproduction",
 ]
 
-Progress = Callable[[str, float], None]
-
 REPRODUCTIONS: dict[str, Callable[[Progress], Reproduction]] = {
     "alexiev": reproduce_alexiev,
     "tadic": reproduce_tadic,
 }
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
 def reproduce(
-    paper: str, out: str | Path, *, force: bool = False, progress: Progress = _silent
+    paper: str, out: str | Path, *, force: bool = False, progress: Progress = silent
 ) -> Seal:
     """Re-make a paper and write it as a sealed bundle.
 
@@ -96,7 +91,7 @@ def reproduction_specification(paper: str) -> ReproduceSpec:
     return specify(ReproduceSpec, paper=name)
 
 
-def make_reproduction(spec: ReproduceSpec, progress: Progress = _silent) -> Reproduction:
+def make_reproduction(spec: ReproduceSpec, progress: Progress = silent) -> Reproduction:
     """Re-make a paper from its specification.
 
     Raises

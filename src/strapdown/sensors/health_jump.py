@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.sensors.channel_health import ABRUPT
-from strapdown.sensors.health_log import ChannelFault, HealthLog, intervals_of, name_in_words
+from strapdown.sensors.health_log import ChannelFault, HealthLog, Mask, intervals_of, name_in_words
 from strapdown.sensors.tail_limit import tail_limit
 from strapdown.tables import ACCEL, GYRO
 
@@ -28,11 +28,12 @@ KNOWN = 0.1
 def find_jumps(log: HealthLog) -> list[ChannelFault]:
     """Steps of the mean of three seconds and more between blocks at rest by the others' word.
 
-    The limit is what the tail of the record's own changes over the same time tells, those about the
-    step left out (`tail_limit` of those that a fifth and a fiftieth exceed), and no less than what
-    noise from sample to sample and the stated drift give. A step of an accelerometer must also be left when the turning that the
-    gyros tell in between is taken off, and one of a gyro is none where the accelerometers
-    turn with it, or where it takes time: a body needs some to begin to turn.
+    The limit is what the tail of the record's own changes over the same time tells, those about
+    the step left out (`tail_limit` of those that a fifth and a fiftieth exceed), and no less than
+    what noise from sample to sample and the stated drift give. A step of an accelerometer must
+    also be left when the turning that the gyros tell in between is taken off, and one of a gyro is
+    none where the accelerometers turn with it, or where it takes time: a body needs some to begin
+    to turn.
     """
     if log.blocks.sd.shape[0] < 2 * SIDE + 1:
         return []
@@ -40,7 +41,8 @@ def find_jumps(log: HealthLog) -> list[ChannelFault]:
     faults = []
     for k, name in enumerate(log.names):
         rest = log.rests(k) & log.blocks.valid[:, k]
-        still = np.lib.stride_tricks.sliding_window_view(rest, 2 * SIDE + 1).all(axis=1)
+        windows = np.lib.stride_tricks.sliding_window_view(rest, 2 * SIDE + 1)
+        still = np.asarray(windows.all(axis=1))
         if still.sum() < LEAST_WINDOWS:
             continue
         change = _change(log.blocks.mean[:, k])
@@ -80,7 +82,7 @@ def _least(log: HealthLog, k: int, count: int) -> float:
     return max(chance * math.hypot(white, _quantum(log, k) / math.sqrt(12.0)), _drift(log, k))
 
 
-def _usual(size: Array, still: NDArray[np.bool_], at: int, false_alarm: float) -> float:
+def _usual(size: Array, still: Mask, at: int, false_alarm: float) -> float:
     """What the changes elsewhere in the record tell."""
     elsewhere = still.copy()
     elsewhere[max(at - 2 * SIDE, 0) : at + 2 * SIDE + 1] = False
@@ -178,8 +180,8 @@ def _fault(log: HealthLog, k: int, at: int, step: float, limit: float) -> Channe
     name = log.names[k]
     unit = "rad/s" if name in GYRO else "m/s²"
     what = (
-        f"the zero of {name_in_words([name])} jumps by {step:.3g} {unit} at {log.time[at]:.6g} s, while "
-        f"the other channels are at rest; {limit:.2g} would be usual"
+        f"the zero of {name_in_words([name])} jumps by {step:.3g} {unit} at {log.time[at]:.6g} s, "
+        f"while the other channels are at rest; {limit:.2g} would be usual"
     )
     remedy = "estimate its bias anew from there on; " + (
         "a steady slow turn about the vertical that begins at once looks the same"

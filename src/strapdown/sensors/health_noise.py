@@ -31,9 +31,13 @@ LASTING = 3
 WHITE = 0.8
 # Of the scatter of its own ratio to the others over the record.
 OWN_SCATTER = 6.0
-# In noise all second differences are large, in a burst those about the outliers alone.
-OUTLIER, BURST_SHARE, LEAST_OUTLIERS = 6.0, 0.5, 3
+# In noise all second differences are large, in a burst those about the outliers alone: a quarter of
+# those of normal noise is below 0.3186 of their rms.
+OUTLIER, LEAST_OUTLIERS = 6.0, 3
+QUARTER, BURST_SHARE = 0.3186, 0.5
 SAME_FAULT = 10  # blocks
+# Variance of a median over that of a mean, of normal values.
+MEDIAN = math.pi / 2.0
 
 
 def find_noisy(log: HealthLog) -> list[ChannelFault]:
@@ -42,8 +46,8 @@ def find_noisy(log: HealthLog) -> list[ChannelFault]:
     At rest, by the word of the other channels: beyond the data sheet's (with the noise of its
     quantization), or the middle one of its triad. Anywhere, if it is white: beyond its own middle
     over the record, each block being held against what the other channels do in it, and beyond 6
-    times the scatter of that ratio. All blocks of the rest together, or three blocks of a second in a
-    row; a single one, where it is a handful of outliers (``burst``).
+    times the scatter of that ratio. All blocks of the rest together, or three blocks of a second
+    in a row; a single one, where it is a handful of outliers (``burst``).
 
     The rms of the second differences of n white samples is known to 0.99/√n (their correlations are
     -2/3 and 1/6): limits are raised by the quantile of that.
@@ -77,10 +81,13 @@ def find_noisy(log: HealthLog) -> list[ChannelFault]:
             if last - first + 1 >= LASTING:
                 lasting[first : last + 1] = True
         base = usual(noise[rest & ~high]) if (rest & ~high).any() else usual(noise[own & ~high])
-        struck = high & rest & (_outliers(log, k, base) > 0.0)
-        for flags, kind in ((struck, "burst"), (lasting & ~struck, "noisy")):
-            for first, last in intervals_of(flags, SAME_FAULT):
-                faults.append(_fault(log, k, kind, (first, last), flags, sizes, limit, reason))
+        flags = lasting.copy()
+        alone = np.flatnonzero(high & rest & ~lasting)
+        flags[alone] = _struck(_second(log, k, alone), base)
+        for first, last in intervals_of(flags, SAME_FAULT):
+            within = np.flatnonzero(flags[first : last + 1]) + first
+            kind = "burst" if _is_burst(_second(log, k, within).ravel()) else "noisy"
+            faults.append(_fault(log, k, kind, (first, last), flags, sizes, limit, reason))
     return faults
 
 
@@ -99,8 +106,10 @@ def _throughout(
     count = int(rest.sum())
     if count < LASTING:
         return out
-    noise = np.sqrt((log.blocks.noise[rest] ** 2).mean(axis=0))
-    slack = NOISE_FACTOR * (1.0 + _quantile(log, 1) / math.sqrt(count * log.blocks.samples))
+    # What is noisy for a part of the rest only does not move the median.
+    noise = np.median(log.blocks.noise[rest], axis=0)
+    known = math.sqrt(MEDIAN / (count * log.blocks.samples))
+    slack = NOISE_FACTOR * (1.0 + _quantile(log, 1) * known)
     allowed = [(slack * stated, 0)] if stated > 0.0 else []
     if len(fellows) == 3:
         allowed.append((slack * float(np.median(noise[fellows])), 1))
@@ -161,17 +170,29 @@ def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
     return out
 
 
-def _outliers(log: HealthLog, k: int, base: float) -> Array:
-    """Number of outliers of blocks that have a few; zero where there are none, or all are."""
+def _second(log: HealthLog, k: int, blocks: NDArray[np.int64]) -> Array:
+    """Sizes of the second differences of some blocks."""
     size, count = log.blocks.samples, log.blocks.sd.shape[0]
+    cut = log.values[k, : count * size].reshape(count, size)[blocks]
+    return np.abs(np.diff(cut, 2, axis=1))
+
+
+def _struck(second: Array, base: float) -> Mask:
+    """Blocks with a few outliers among samples that are as they were."""
     if not base > 0.0:
-        return np.zeros(count)
-    cut = log.values[k, : count * size].reshape(count, size)
-    large = np.abs(np.diff(cut, 2, axis=1)) > OUTLIER * math.sqrt(6.0) * base
-    share = large.mean(axis=1)
+        return np.zeros(len(second), dtype=bool)
+    large = second > OUTLIER * math.sqrt(6.0) * base
     # An outlier is in three second differences.
-    number = large.sum(axis=1) / 3.0
-    return np.where((share < BURST_SHARE) & (number >= LEAST_OUTLIERS), number, 0.0)
+    few = large.sum(axis=1) >= 3 * LEAST_OUTLIERS
+    few[few] = [_is_burst(row) for row in second[few]]
+    return np.asarray(few)
+
+
+def _is_burst(second: Array) -> bool:
+    """Whether the quieter half is much quieter than all are: so it is not where all is noise."""
+    return float(np.quantile(second, 0.25)) / QUARTER < BURST_SHARE * float(
+        np.sqrt((second**2).mean())
+    )
 
 
 def _fault(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from strapdown.sensors.health_log import (
@@ -32,7 +34,13 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
         values = log.values[k, known]
         if float(values.min()) == float(values.max()):
             continue
-        limits = find_limits(log.time[known], values[:, None], np.array([full]), np.array([step]))
+        limits = find_limits(
+            log.time[known],
+            values[:, None],
+            np.array([full]),
+            np.array([step]),
+            longest_flat=math.inf,
+        )
         clipped = np.zeros(log.time.size, dtype=bool)
         clipped[known] = limits.clipped[:, 0]
         end = "its stated range" if not limits.found[0] else "a flat top: the end of a range"

@@ -29,7 +29,7 @@ def find_implausible(log: HealthLog) -> list[ChannelFault]:
     """
     if log.sensors is None:
         return []
-    rest = log.rests()
+    rest = log.rests() & log.blocks.valid.all(axis=1)
     spans = [s for s in intervals_of(rest) if s[1] - s[0] + 1 >= LEAST_REST]
     if not spans:
         return []
@@ -52,18 +52,16 @@ def _triad(
     k_sd: float,
 ) -> list[ChannelFault]:
     at = [log.names.index(c) for c in columns]
-    if not log.blocks.valid[:, at].any(axis=0).all():
-        return []
     mean = means[at]
-    sd = _sd(log, columns, mean, size[1])
+    sd = _sd(log, columns, mean, size[1], float(log.time[span[1]] - log.time[span[0]]))
     what_is = ("the Earth's rate", "rad/s") if columns is GYRO else ("gravity", "m/s²")
     faults = []
     for axis, channel in enumerate(at):
         limit = size[1] + k_sd * float(sd[axis])
         if abs(mean[axis]) > limit:
             what = (
-                f"{name_in_words([log.names[channel]])} reads {mean[axis]:.5g} {what_is[1]} at rest, "
-                f"and {what_is[0]} with its stated errors explains {limit:.5g} at most"
+                f"{name_in_words([log.names[channel]])} reads {mean[axis]:.5g} {what_is[1]} at "
+                f"rest, and {what_is[0]} with its stated errors explains {limit:.5g} at most"
             )
             remedy = "its zero or scale factor is not what is stated: calibrate, or replace it"
             faults.append(
@@ -83,8 +81,8 @@ def _triad(
     if low <= length <= high:
         return []
     what = (
-        f"at rest the three together read {length:.6g} {what_is[1]}, and {what_is[0]} with the stated "
-        f"errors is {low:.6g} to {high:.6g}"
+        f"at rest the three together read {length:.6g} {what_is[1]}, and {what_is[0]} with the "
+        f"stated errors is {low:.6g} to {high:.6g}"
     )
     remedy = (
         "check unit and scale factors, and that the axes are at right angles; or the body moves"
@@ -94,7 +92,7 @@ def _triad(
     return [log.fault(kind, "implausible", span, length, limit, what, remedy)]
 
 
-def _sd(log: HealthLog, columns: list[str], mean: Array, size: float) -> Array:
+def _sd(log: HealthLog, columns: list[str], mean: Array, size: float, duration: float) -> Array:
     """Stated standard deviation of the mean at rest, per axis."""
     assert log.sensors is not None
     gyro = columns is GYRO
@@ -104,6 +102,7 @@ def _sd(log: HealthLog, columns: list[str], mean: Array, size: float) -> Array:
     for axis in range(3):
         across = math.sqrt(max(size**2 - min(float(mean[axis]) ** 2, size**2), 0.0))
         terms = [
+            triad.axis("noise_density")[axis] / math.sqrt(duration),
             triad.axis("bias")[axis],
             drift.triad[axis],
             triad.axis("scale")[axis] * min(abs(float(mean[axis])), size),

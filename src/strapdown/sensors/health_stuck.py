@@ -53,11 +53,11 @@ def find_stuck(log: HealthLog) -> list[ChannelFault]:
     A run is stuck where it is longer than each of
 
     - ``1 + ln(P/n)/ln(r)``, with r the share of samples that repeat the one before: of the channel
-      in the 256 samples before and after the run, by its histogram of values there (the sum of
-      their squared shares), and of its two neighbours during the run, for what keeps all of
-      them still is a rest in coarse steps;
-    - what the tail of its own runs over the record tells (`tail_limit` of the 200th and the 20th longest; of fewer
-      than 2000, of those that a tenth and a hundredth exceed);
+      in the 256 samples before and after the run (where they are independent, the sum of the
+      squares of their histogram), and of its two neighbours during the run, for what keeps all
+      of them still is a rest in coarse steps;
+    - what the tail of its own runs over the record tells (`tail_limit` of the 200th and the
+      20th longest; of fewer than 2000, of those that a tenth and a hundredth exceed);
     - 10 samples.
     """
     same = np.zeros((len(log.names), log.time.size), dtype=bool)
@@ -105,10 +105,13 @@ def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> 
     """Share of repetitions about each run, its upper bound."""
     left, right = np.maximum(a - AROUND, 0), np.minimum(b + AROUND, n)
     repeats = sums[a] - sums[left] + sums[right] - sums[b]
-    pairs = np.maximum(a - left + right - b, 1)
-    share = repeats / pairs
-    # At least one is allowed for: none seen in so few says no more than that.
-    return np.minimum(share + SHARE_SLACK * np.sqrt(np.maximum(share, 1.0 / pairs) / pairs), 1.0)
+    pairs = a - left + right - b
+    share = repeats / np.maximum(pairs, 1)
+    # At least one is allowed for: none seen in so few says no more than that. A run over the whole
+    # record has nothing about it, and its neighbours speak alone.
+    least = 1.0 / np.maximum(pairs, 1)
+    bound = np.minimum(share + SHARE_SLACK * np.sqrt(np.maximum(share, least) * least), 1.0)
+    return np.asarray(np.where(pairs > LEAST_RUN, bound, 0.0))
 
 
 def _constant(sums: Array, n: int) -> bool:

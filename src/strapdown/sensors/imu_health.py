@@ -64,7 +64,7 @@ TESTS: dict[str, HealthTest] = {
     "stuck": HealthTest(
         "repeats a reading, or is dead",
         "length of a run, from its share of repetitions and the tail of its runs",
-        "P by construction, for repetitions that are independent",
+        "P where repetitions are independent, or their runs have an exponential tail",
         find_stuck,
         True,
     ),
@@ -84,10 +84,10 @@ TESTS: dict[str, HealthTest] = {
     ),
     "jump": HealthTest(
         "its zero steps while nothing moves",
-        "quantile of the record's own changes of the mean, and of its noise",
-        "P by construction, where changes at rest are normal",
+        "tail of the record's own changes of the mean, quantile of its noise, stated drift",
+        "P where changes at rest have an exponential tail; less where they are normal",
         find_jumps,
-        False,
+        True,
     ),
     "implausible": HealthTest(
         "at rest neither gravity nor the Earth's rate",
@@ -194,8 +194,8 @@ def check_imu_channels(
     -----
     A fault of one channel is told from motion only where the body rests, or where no motion can
     do it: what drives and has one unit alone has no test for a zero that moves
-    (`redundant_units` has). What all channels do together is taken for motion. Ends of blocks that are not full, less
-    than a second, have no test for noise and jumps.
+    (`redundant_units` has). What all channels do together is taken for motion. The last part of a
+    second that fills no block has no test for noise and jumps.
 
     It costs some 30 operations a sample and channel: 1 h of 1 kHz takes seconds.
     """

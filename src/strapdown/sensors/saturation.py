@@ -61,6 +61,8 @@ def find_limits(
     full_scale: Array,
     quantization: Array,
     held: Mask | None = None,
+    *,
+    longest_flat: float = LONGEST_FLAT,
 ) -> RangeLimits:
     """Find the ends of a triad's range and the samples that stand there.
 
@@ -75,6 +77,8 @@ def find_limits(
         Step of the output; zero where there is none.
     held : ndarray of bool, (n, k), optional
         Samples in which others count that stood at an end: a low-pass swings beyond it there.
+    longest_flat : float, s
+        For how long a flat extreme may last.
 
     Returns
     -------
@@ -84,7 +88,7 @@ def find_limits(
     -----
     A sample is clipped where it is within a step of the stated full scale. Besides, an axis has
     an end where it stays on the very same extreme value of the record for three samples or
-    more, up to 0.5 s, and jumps by three steps or more on both sides (ten samples or more: on one
+    more, up to `longest_flat`, and jumps by three steps or more on both sides (ten samples or more: on one
     side): the top of a smooth pulse is left by fewer steps. Fewer than ten must also jump by five
     times the record's scatter, for noise in steps repeats a number. Below a tenth of the range, or
     of the largest reading, it needs ten samples and jumps on both sides.
@@ -101,7 +105,7 @@ def find_limits(
         if np.isfinite(full):
             clipped[:, k] = (np.abs(y) >= full - slack) & (np.abs(y) <= full + slack)
         for sign in (1.0, -1.0):
-            flat = _flat_extreme(time, sign * y, full)
+            flat = _flat_extreme(time, sign * y, full, longest_flat)
             if flat is None or flat.all() or (flat & ~clipped[:, k]).sum() == 0:
                 continue
             end = float(y[flat][0])
@@ -114,7 +118,7 @@ def find_limits(
     return RangeLimits(lower, upper, clipped, found, beyond)
 
 
-def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
+def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | None:
     """Samples on the largest value, where it looks like an end of the range."""
     if y.size < LEAST_FLAT:
         return None
@@ -133,7 +137,7 @@ def _flat_extreme(time: Array, y: Array, full: float) -> Mask | None:
     for a, b in zip(starts.tolist(), ends.tolist(), strict=True):
         sides = [float(y[i]) for i in (a - 1, b) if 0 <= i < y.size]
         jumps = [top - side for side in sides] or [0.0]
-        short = time[b - 1] - time[a] <= LONGEST_FLAT
+        short = time[b - 1] - time[a] <= longest
         # The top of a parabola that stays within a step for n samples is left by ((n + 2)/n)².
         n = b - a
         least = max(LEAST_JUMP - 0.5, (1.0 + 2.0 / n) ** 2 + 0.5) * step

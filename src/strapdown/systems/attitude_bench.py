@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -52,16 +52,12 @@ from strapdown.systems.attitude_sweep import (
     sweep_rates,
 )
 from strapdown.systems.attitude_trials import gather, trial_names, worst_sweep
+from strapdown.systems.progress import Progress, silent
 from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 __all__ = ["bench_attitude", "run_bench"]
-
-
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
 
 
 def bench_attitude(
@@ -89,7 +85,7 @@ def bench_attitude(
     from_s: float | None = None,
     to_s: float | None = None,
     peers: Sequence[str] = (),
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> AttitudeBench:
     """Run attitude algorithms over a log or a scenario and compare them with what is known.
 
@@ -198,7 +194,7 @@ def bench_attitude(
     return run_bench(spec, progress)
 
 
-def run_bench(spec: AttitudeSpec, progress: Progress = _silent) -> AttitudeBench:
+def run_bench(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeBench:
     """Run attitude algorithms over a log or a scenario and compare them with what is known.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,10 +16,10 @@ from strapdown.evaluation.reference_points import reference_errors
 from strapdown.exceptions import ConfigError, DivergenceError, Finding
 from strapdown.increments import increments_from_imu
 from strapdown.systems.attitude_shares import OwnTruth
+from strapdown.systems.progress import Progress
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 MEANINGS = ("drop", "sum")
 COLUMNS = [

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,10 +25,9 @@ from strapdown.systems.case_units import case_unit
 from strapdown.systems.case_words import in_case_words, saying_case_words
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 
 __all__ = ["CaseResult", "run_case", "whole_records"]
-
-Progress = Callable[[str, float], None]
 
 # Numbers that a Monte Carlo may hold at once: half a gigabyte.
 MOST_NUMBERS = 64_000_000
@@ -69,13 +68,9 @@ class CaseResult:
     findings: tuple[Finding, ...]
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
 @one_thread()
 def run_case(
-    spec: CaseSpec, case_file: Path | None = None, progress: Progress = _silent
+    spec: CaseSpec, case_file: Path | None = None, progress: Progress = silent
 ) -> CaseResult:
     """Read the records of a case and reconstruct it.
 

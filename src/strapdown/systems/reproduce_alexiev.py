@@ -31,21 +31,18 @@ from strapdown.systems.alexiev.sampling import (
     final_error,
     scenario_motion,
 )
+from strapdown.systems.progress import Progress, silent
 from strapdown.systems.reproduction import (
     CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
     HOLDS,
     HOLDS_WHEN,
-    Figure,
+    Part,
     Reproduction,
-    Statement,
-    Table,
     amount,
+    put_together,
 )
 from strapdown.tables import QUATERNION
-
-Progress = Callable[[str, float], None]
-Part = tuple[list[Statement], list[Table], list[Figure]]
 
 __all__ = ["PAPER", "reproduce_alexiev"]
 
@@ -81,11 +78,7 @@ ORDER = (
 )
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
-def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
+def reproduce_alexiev(progress: Progress = silent) -> Reproduction:
     """Re-make Figs. 2, 4, 5 and 6 of Alexiev (2021) and judge its statements.
 
     Parameters
@@ -109,15 +102,9 @@ def reproduce_alexiev(progress: Progress = _silent) -> Reproduction:
         ("growth of errors", _growth),
         ("effort", _effort),
     )
-    statements: list[Statement] = []
-    tables: list[Table] = []
-    figures: list[Figure] = []
-    for k, (stage, make) in enumerate(parts):
-        progress(stage, k / (len(parts) + 2))
-        judged, listed, drawn = make()
-        statements += judged
-        tables += listed
-        figures += drawn
+    statements, tables, figures = put_together(
+        parts, lambda stage, share: progress(stage, 0.8 * share)
+    )
     statements.sort(key=lambda s: ORDER.index(s.key))
     made = Reproduction(
         "alexiev", PAPER, "", tuple(statements), tuple(tables), tuple(figures), CONVENTIONS

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from strapdown.systems.progress import Progress, silent
 from strapdown.systems.reproduction import (
     CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
     HOLDS,
     HOLDS_WHEN,
-    Figure,
+    Part,
     Reproduction,
-    Statement,
-    Table,
+    put_together,
 )
 from strapdown.systems.tadic import (
     better_sensors,
@@ -29,9 +29,6 @@ from strapdown.systems.tadic import (
     sensors,
 )
 from strapdown.systems.tadic.experiment import RUNS, Experiments, run_experiment
-
-Progress = Callable[[str, float], None]
-Part = tuple[list[Statement], list[Table], list[Figure]]
 
 __all__ = ["PAPER", "reproduce_tadic"]
 
@@ -79,11 +76,7 @@ TABLES = (
 )
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
-def reproduce_tadic(progress: Progress = _silent) -> Reproduction:
+def reproduce_tadic(progress: Progress = silent) -> Reproduction:
     """Re-make the crash test of Tadic and Vukajlovic (2016) and judge its statements.
 
     Parameters
@@ -115,15 +108,9 @@ def reproduce_tadic(progress: Progress = _silent) -> Reproduction:
         ("Fig. 9", lambda: _displacement(made)),
         ("better sensors", _better),
     )
-    statements: list[Statement] = []
-    tables: list[Table] = []
-    figures: list[Figure] = []
-    for k, (stage, make) in enumerate(parts):
-        progress(stage, 0.5 + 0.4 * k / len(parts))
-        judged, listed, drawn = make()
-        statements += judged
-        tables += listed
-        figures += drawn
+    statements, tables, figures = put_together(
+        parts, lambda stage, share: progress(stage, 0.5 + 0.4 * share)
+    )
     statements.sort(key=lambda s: ORDER.index(s.key))
     tables.sort(key=lambda t: TABLES.index(t.slug))
     whole = Reproduction(

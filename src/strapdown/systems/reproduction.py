@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from strapdown.systems.progress import Progress
 
 Array = NDArray[np.float64]
 
@@ -18,11 +21,13 @@ __all__ = [
     "Evidence",
     "Figure",
     "FigurePanel",
+    "Part",
     "Reproduction",
     "Statement",
     "Table",
     "Trace",
     "amount",
+    "put_together",
 ]
 
 HOLDS, HOLDS_WHEN = "holds", "holds when"
@@ -220,3 +225,34 @@ def amount(value: float, unit: str = "") -> str:
     else:
         digits = f"{value:.1e}"
     return f"{digits}{space}{unit}"
+
+
+#: What one part of a paper gives.
+Part = tuple[list[Statement], list[Table], list[Figure]]
+
+
+def put_together(parts: Sequence[tuple[str, Callable[[], Part]]], progress: Progress) -> Part:
+    """Make the parts of a paper one after the other.
+
+    Parameters
+    ----------
+    parts : sequence of (str, callable)
+        Name of the stage, and what makes the part.
+    progress : callable
+        Called before each with its stage and the share of the parts that is done.
+
+    Returns
+    -------
+    tuple of list
+        Statements, tables and figures of all, in the order of the parts.
+    """
+    statements: list[Statement] = []
+    tables: list[Table] = []
+    figures: list[Figure] = []
+    for k, (stage, make) in enumerate(parts):
+        progress(stage, k / len(parts))
+        judged, listed, drawn = make()
+        statements += judged
+        tables += listed
+        figures += drawn
+    return statements, tables, figures

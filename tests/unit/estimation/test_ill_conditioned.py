@@ -6,6 +6,8 @@ Truth is the same update in 80 digits.
 import mpmath
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from strapdown.estimation.covariances import COVARIANCES
 
@@ -118,3 +120,27 @@ def test_variances_stay_positive_over_a_long_run(name):
         assert (np.diagonal(P) > 0.0).all()
         if name != "joseph":
             assert (np.diagonal(state) > 0.0).all()
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=st.integers(0, 2**32 - 1), n=st.integers(1, 10), apart=st.floats(0.0, 9.0))
+@pytest.mark.parametrize("name", ["ud", "wd"])
+def test_d_is_never_negative_whatever_the_units(name, seed, n, apart):
+    """States, noises and observations up to 10^9 and 10^-9 of each other, of any rank."""
+    rng, form = np.random.default_rng(seed), COVARIANCES[name]()
+
+    def size(*shape):
+        return 10.0 ** rng.uniform(-apart, apart, shape)
+
+    B = rng.normal(size=(n, rng.integers(1, n + 1))) * size(n, 1)
+    P = B @ B.T
+    state, x = form.begin(0.5 * (P + P.T)), np.zeros(n)
+    for _ in range(6):
+        G = rng.normal(size=(n, rng.integers(0, 3))) * size(n, 1)
+        Phi = np.eye(n) + np.triu(rng.normal(size=(n, n)), 1)
+        H, R = rng.normal(size=(3, n)) * size(3, n), size(3) ** 2
+        state, x, told = form.epoch(state, Phi, G @ G.T, x, rng.normal(size=3), H, R)
+        assert (np.diagonal(state) >= 0.0).all()
+        assert np.isfinite(state).all()
+        assert np.isfinite(x).all()
+        assert (told.s > 0.0).all()

@@ -102,9 +102,9 @@ def test_transition_is_the_derivative_of_the_mechanization(mechanization, lat):
     found, segment = _differences(mechanization, start, _imu(5.0), len(SIZES))
     model = RotationVectorModel(sensors=SENSORS)
     phi, _ = model.transition(segment, 0.05)
-    # Means over h = 0.05 s leave out of a product, as of attitude and force, a part of h²/12 of what
-    # both change in a second (0.3 and 2 rad/s): 1e-4, of a scale factor that adds 5e-3 m/s and
-    # 1e-4 rad; central differences leave the third order of 1e-3 rad, and axes that differ by
+    # Means over h = 0.05 s leave out of a product, as of attitude and force, a part of h²/12 of
+    # what both change in a second (0.3 and 2 rad/s): 1e-4, of a scale factor that adds 5e-3 m/s
+    # and 1e-4 rad; central differences leave the third order of 1e-3 rad, and axes that differ by
     # 1e-5 rad what that does to 2e-1 of an error. Against the size of each error: 4e-6.
     held = mechanization.height == "held"
     rows = [i for i in range(PHYSICAL) if not (held and i in (2, 5))]

@@ -114,9 +114,7 @@ def test_every_entry_is_the_derivative_of_the_equations(seed, alt, pole):
     level, C = level_row(Y, t, alt)
     F = np.empty((9, 9 + k))
     rooms = [np.empty((3, 3)) for _ in range(3)]
-    kernel.wander_dynamics(
-        F, level, C, C @ force, rate, force, gyro, accel, False, EARTH, *rooms
-    )
+    kernel.wander_dynamics(F, level, C, C @ force, rate, force, gyro, accel, False, EARTH, *rooms)
 
     S = variables(Y, t)
     dY = equations(Y, t, alt, rate, force)

@@ -119,7 +119,8 @@ def test_aided_filters_never_share_axes_with_gyros_alone(full_bench):
 def test_what_there_is_not_is_not_drawn(make_bench, options, slugs, tmp_path):
     bench = make_bench(**options)
     assert list(by_slug(bench)) == slugs
-    for chart in charts(bench):
+    # The other charts are of the runs, which are the same however many there are.
+    for chart in charts(bench) if len(bench.runs) == 1 else by_slug(bench).values():
         assert figure(chart)["data"]
         draw(chart, tmp_path / f"{chart.slug}.svg")
 
@@ -131,7 +132,9 @@ def test_a_sweep_without_columns_is_no_sweep(make_bench):
 
 @pytest.mark.parametrize("ending", ["svg", "png"])
 def test_pictures_have_the_same_bytes_every_time(full_bench, tmp_path, ending):
-    for chart in charts(full_bench):
+    # Both are drawn by the same artists: of the slower pixels those with most on them are enough.
+    drawn = charts(full_bench) if ending == "svg" else by_slug(full_bench).values()
+    for chart in drawn:
         a, b = tmp_path / f"a.{ending}", tmp_path / f"b.{ending}"
         draw(chart, a)
         draw(chart, b)

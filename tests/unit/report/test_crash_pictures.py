@@ -22,9 +22,10 @@ from strapdown.report.crash_body import vehicle_body
 from strapdown.report.crash_conventions import MountingPoint, conventions_picture
 from strapdown.report.crash_dial import Direction, pdof_dial
 from strapdown.report.crash_figures import crash_figures, reference_in_path_axes
-from strapdown.report.crash_moments import angle_words, interval_words, path_moments, signed
+from strapdown.report.crash_moments import angle_words, interval_words, path_moments
 from strapdown.report.crash_outline import vehicle_outline
 from strapdown.report.crash_plan import path_plan
+from strapdown.report.crash_values import plain
 from strapdown.report.error_envelope import ellipse, envelope, hull
 from strapdown.report.plan_view import PlanView, nice_step, tick_words
 from strapdown.report.svg_drawing import SMALL, Drawing, overlap, shortened, text_width
@@ -180,7 +181,7 @@ def test_angles_are_written_within_half_a_turn():
     assert angle_words(-180.0, 1) == "180.0°"
     assert angle_words(-0.04, 1) == "0.0°"
     assert interval_words(3.0, None) == ("3.0°", "")
-    assert signed(-0.001, 2) == "0.00" and signed(-1.5, 1) == "−1.5"
+    assert plain(-0.001, 2) == "0.00" and plain(-1.5, 1) == "−1.5"
 
 
 @pytest.mark.parametrize(("sd", "turn"), [((2.0, 0.5), 0.6), ((1.0, 1.0), 0.0), ((3.0, 0.0), 1.0)])
@@ -262,13 +263,13 @@ def test_the_plan_tells_entry_end_and_instants():
     main = result.reconstruction.main
     figures = figures_of()
     end = main.path.table[NED].iloc[-1]
-    assert f"ends {signed(end['north'], 2)} m forward" in figures.path.alt
+    assert f"ends {plain(end['north'], 2)} m forward" in figures.path.alt
     words = [t for t, _, _ in texts(figures.path.svg)]
     assert "entry 7.1 m/s (25.6 km/h)" in words
     assert "cameras" in words
     named = path_moments(main.path, main.events.events)
     for name, at in named:
-        assert name == "begin" or f"{name}, {signed(1e3 * at, 0)} ms" in words
+        assert name == "begin" or f"{name}, {plain(1e3 * at, 0)} ms" in words
     # The path is 1.1 m long, the car 4.5 m: it is shown larger beside.
     assert any("times larger" in t for t in words)
     long = figures_of("rear", ("IMU1",))

@@ -17,6 +17,7 @@ from crash_case_folder import read_spec, reconstruct, unit
 from strapdown import simulate, verify
 from strapdown.constants import TWO_SIDED_95
 from strapdown.formats import read_raw
+from strapdown.report import crash_simulation
 from strapdown.simulation.case_recording import record_case
 from strapdown.simulation.crash_cases import CASES
 from strapdown.simulation.crash_scenarios import CRASHES
@@ -27,16 +28,32 @@ CRASHED = [name for name, c in CRASHES.items() if c.is_crash]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """A function that simulates each case once."""
-    root, made = tmp_path_factory.mktemp("cases"), {}
+def simulated(tmp_path_factory):
+    """A function that simulates each case once: its folder, and what was recorded for it."""
+    root, made, kept = tmp_path_factory.mktemp("cases"), {}, []
+
+    def keeping(*given, **options):
+        kept.append(record_case(*given, **options))
+        return kept[-1]
 
     def make(name):
         if name not in made:
-            made[name] = simulate(name, root / name).path
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(crash_simulation, "record_case", keeping)
+                made[name] = (simulate(name, root / name).path, kept.pop())
         return made[name]
 
     return make
+
+
+@pytest.fixture(scope="module")
+def folder(simulated):
+    return lambda name: simulated(name)[0]
+
+
+@pytest.fixture(scope="module")
+def recording(simulated):
+    return lambda name: simulated(name)[1]
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +88,8 @@ def test_the_files_are_those_that_are_told(folder):
 
 
 @pytest.mark.parametrize("name", ["tadic-pole", "saturated", "short-rest"])
-def test_a_record_comes_back_as_it_was_written(name, folder):
-    recorded = record_case(CASES[name], seed=0)
+def test_a_record_comes_back_as_it_was_written(name, folder, recording):
+    recorded = recording(name)
     spec = read_spec(folder(name))
     assert [u.name for u in spec.units] == [of.unit.name for of in recorded.units]
     for told, of in zip(spec.units, recorded.units, strict=True):
@@ -88,8 +105,8 @@ def test_a_record_comes_back_as_it_was_written(name, folder):
 
 
 @pytest.mark.parametrize("name", list(CASES))
-def test_the_case_states_what_the_recorders_tell(name, folder):
-    recorded = record_case(CASES[name], seed=0)
+def test_the_case_states_what_the_recorders_tell(name, folder, recording):
+    recorded = recording(name)
     spec = read_spec(folder(name))
     for told, of in zip(spec.units, recorded.units, strict=True):
         back = unit(folder(name), told)

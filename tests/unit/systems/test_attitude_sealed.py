@@ -10,6 +10,8 @@ import pytest
 from strapdown import bench_attitude, simulate, verify, write_attitude
 from strapdown.peers import available_peers
 
+pytestmark = pytest.mark.usefixtures("sketched")
+
 ASKED = {"algorithms": ["naive", "quaternion"], "rates": [50, 25]}
 SENSOR = (
     'title = "x"\nclass = "phone"\nsummary = "x"\n[gyro]\n'

@@ -36,8 +36,14 @@ from strapdown.systems.reproduction import (
 
 
 @pytest.fixture(scope="module")
-def made():
-    return system.reproduce_alexiev()
+def shares():
+    """What was told of the progress of `made`."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def made(shares):
+    return system.reproduce_alexiev(lambda stage, share: shares.append(share))
 
 
 @pytest.fixture(scope="module")
@@ -76,12 +82,10 @@ def test_a_second_run_has_the_same_bits(made):
     assert curves_json(again) == curves_json(made)
 
 
-def test_progress_runs_from_the_first_stage_and_never_back():
-    seen: list[float] = []
-    system.reproduce_alexiev(lambda stage, share: seen.append(share))
-    assert seen[0] == 0.0
-    assert seen == sorted(seen)
-    assert seen[-1] < 1.0
+def test_progress_runs_from_the_first_stage_and_never_back(made, shares):
+    assert shares[0] == 0.0
+    assert shares == sorted(shares)
+    assert shares[-1] < 1.0
 
 
 def test_the_headline_counts_what_is_there(made):

@@ -191,8 +191,3 @@ class Experiments:
     def rms(self, name: str) -> Array:
         """Quadratic mean over the experiments of the error after 750 ms, (3,), m."""
         return np.asarray(np.sqrt((self.ends(name) ** 2).mean(axis=0)))
-
-
-def run_experiments(runs: int = RUNS) -> Experiments:
-    """Make the test with the first seeds."""
-    return Experiments(tuple(run_experiment(seed) for seed in range(runs)))

@@ -1,0 +1,193 @@
+"""A signal as a level and a slope that wander, by a robust Kalman filter, and smoothed."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.estimation.covariance import CovarianceForm
+from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.update_rule import UpdateRule
+from strapdown.estimation.wd import Chernodarov
+from strapdown.exceptions import ConfigError
+
+Array = NDArray[np.float64]
+
+__all__ = ["SignalEpochs", "SignalFilter", "SignalState"]
+
+# What is left of a change that many time constants of the smoother away.
+FORGOTTEN = 1e-4
+# Integral of 1/(1 + x^4)² from zero to infinity.
+MEAN_SQUARE_GAIN = 3.0 * math.pi / (8.0 * math.sqrt(2.0))
+
+
+@dataclass(frozen=True, eq=False)
+class SignalState:
+    """What is remembered of one channel between epochs.
+
+    Attributes
+    ----------
+    form : ndarray, (2, 2)
+        The covariance, in the form's own way.
+    x : ndarray, (2,)
+        Level and slope at the last epoch.
+    level_slope : ndarray, (k, 2)
+        Filtered, of the epochs that wait for later ones.
+    P : ndarray, (k, 3)
+        Their covariances: (11, 12, 22).
+    """
+
+    form: Array
+    x: Array
+    level_slope: Array
+    P: Array
+
+
+@dataclass(frozen=True, eq=False)
+class SignalEpochs:
+    """What came out.
+
+    Attributes
+    ----------
+    level : ndarray, (m,)
+        Of the epochs that are final.
+    weight, expected : ndarray, (k, l)
+        Of every new sample: what the rule gave it, and what it should have been.
+    """
+
+    level: Array
+    weight: Array
+    expected: Array
+
+
+@dataclass(frozen=True)
+class SignalFilter:
+    """Level and slope of a channel, from several samples an epoch.
+
+    The slope is a random walk. Its intensity is chosen by `bandwidth`, and so are all gains: they
+    are the same for channels of any noise, and between them no phase arises. The
+    smoother's gain is ``1/(1 + (f/bandwidth)^4)`` (Wiener's, of a doubly integrated white noise
+    in white noise), its phase is zero; that of the filter alone is not.
+
+    Parameters
+    ----------
+    bandwidth : float, Hz
+        Where the smoother's gain is a half.
+    form : CovarianceForm
+    rule : UpdateRule
+    smooth : bool
+        Whether later samples count; else the filter alone.
+
+    Notes
+    -----
+    Each epoch is Eqs. (6) to (15) of Chernodarov (2009) with its samples as observations: of the
+    level less the slope times their age. What the slope wanders within an epoch is added to
+    their variance.
+    """
+
+    bandwidth: float
+    form: CovarianceForm = field(default_factory=Chernodarov)
+    rule: UpdateRule = field(default_factory=RobustUpdate)
+    smooth: bool = True
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.bandwidth) and self.bandwidth > 0.0):
+            raise ConfigError(
+                f"{self.bandwidth!r} Hz is no bandwidth",
+                quantity="bandwidth",
+                remedy="give Hz, as 20: motion below a third of it passes unchanged",
+            )
+
+    @property
+    def pole(self) -> float:
+        """Angular frequency at which the smoother's gain is a half, rad/s."""
+        return 2.0 * math.pi * self.bandwidth
+
+    def lag(self, epoch: float) -> int:
+        """Epochs of so many seconds that the smoother waits for."""
+        if not self.smooth:
+            return 0
+        return math.ceil(-math.log(FORGOTTEN) * math.sqrt(2.0) / (self.pole * epoch))
+
+    def noise_factor(self, step: float) -> float:
+        """Standard deviation of the level per that of white noise of samples `step` s apart.
+
+        The root mean square of the gain over the samples' band; the filter's is twice the
+        smoother's.
+        """
+        if self.smooth:
+            return math.sqrt(2.0 * step * self.bandwidth * MEAN_SQUARE_GAIN)
+        # The filter's transfer function is (sqrt 2 p s + p^2)/(s^2 + sqrt 2 p s + p^2), and the
+        # integral of its square over all frequencies 3 p/(2 sqrt 2).
+        return math.sqrt(step * 3.0 * self.pole / (2.0 * math.sqrt(2.0)))
+
+    def response(self, frequency: Array) -> Array:
+        """Complex gain at frequencies in Hz, of short steps and epochs."""
+        s = 1j * np.asarray(frequency, dtype=np.float64) / self.bandwidth
+        if self.smooth:
+            return np.asarray(1.0 / (1.0 + s**4))
+        return np.asarray((math.sqrt(2.0) * s + 1.0) / (s * s + math.sqrt(2.0) * s + 1.0))
+
+    def begin(self, samples: Array, noise: float, epoch: float) -> SignalState:
+        """Return the state before the first epoch, from its samples.
+
+        Parameters
+        ----------
+        samples : ndarray, (l,)
+            Those of the first epoch.
+        noise : float
+            Standard deviation of a sample.
+        epoch : float, s
+        """
+        middle = float(np.median(samples))
+        spread = float(np.median(np.abs(samples - middle))) * 3.0 + noise
+        P = np.diag([spread**2, (2.0 * spread / epoch) ** 2])
+        none = np.empty((0, 2))
+        return SignalState(self.form.begin(P), np.array([middle, 0.0]), none, np.empty((0, 3)))
+
+    def advance(
+        self, state: SignalState, samples: Array, ages: Array, noise: float, step: float, last: bool
+    ) -> tuple[SignalState, SignalEpochs]:
+        """Take whole epochs.
+
+        Parameters
+        ----------
+        state : SignalState
+        samples : ndarray, (k, l)
+            Of k epochs.
+        ages : ndarray, (l,), s
+            How long before the end of its epoch a sample belongs.
+        noise : float
+            Standard deviation of a sample.
+        step : float, s
+            Of the samples; an epoch has l.
+        last : bool
+            Whether what waits for later epochs is given without them.
+        """
+        from strapdown._kernels.signal_smoother import smooth_fixed_lag
+
+        count, size = samples.shape
+        T = size * step
+        intensity = self.pole**4 * noise**2 * step
+        Phi = np.array([[1.0, T], [0.0, 1.0]])
+        Q = intensity * np.array([[T**3 / 3.0, T**2 / 2.0], [T**2 / 2.0, T]])
+        H = np.column_stack([np.ones(size), -ages])
+        R = noise**2 + intensity * ages**3 / 3.0
+        form, x = state.form, state.x
+        new, P = np.empty((count, 2)), np.empty((count, 3))
+        weight, expected = np.empty((count, size)), np.empty((count, size))
+        for k in range(count):
+            form, x, told = self.form.epoch(form, Phi, Q, Phi @ x, samples[k], H, R, self.rule)
+            new[k], weight[k], expected[k] = x, told.weight, samples[k] - told.nu
+            full = self.form.matrix(form)
+            P[k] = full[0, 0], full[0, 1], full[1, 1]
+        all_x, all_P = np.vstack([state.level_slope, new]), np.vstack([state.P, P])
+        lag = self.lag(T)
+        final = len(all_x) if last else max(0, len(all_x) - lag)
+        out = np.empty((final, 2))
+        smooth_fixed_lag(all_x, all_P, Phi, Q, lag, final, out)
+        after = SignalState(form, x, all_x[final:].copy(), all_P[final:].copy())
+        return after, SignalEpochs(out[:, 0].copy(), weight, expected)

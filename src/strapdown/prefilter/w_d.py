@@ -1,0 +1,197 @@
+"""A robust W-D filter of each channel: the paper's own use of its filter at the primary level."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.dsp.outliers import REPLACED
+from strapdown.estimation.covariance import CovarianceForm
+from strapdown.estimation.robust_update import RobustUpdate
+from strapdown.estimation.signal_filter import SignalFilter, SignalState
+from strapdown.estimation.update_rule import UpdateRule
+from strapdown.estimation.wd import Chernodarov
+from strapdown.exceptions import DataError
+from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
+from strapdown.prefilter.report import Changed
+
+Array = NDArray[np.float64]
+
+__all__ = ["RobustWd", "RobustWdState"]
+
+# Samples at the start that tell the noise.
+SETTLE = 256
+# A sample with less weight was replaced: its residual is beyond 5.4 standard deviations of Huber's.
+BELIEVED = 0.25
+# Of a sixth difference over twenty, by white noise; and of a median of sizes, one over.
+RESIDUAL, TO_SIGMA = math.sqrt(924.0) / 20.0, 1.482602218505602
+
+
+@dataclass(frozen=True, eq=False)
+class RobustWdState:
+    """Between segments.
+
+    Attributes
+    ----------
+    grid : Grid
+    channels : int
+    noise : ndarray, (c,), or None
+        None until enough samples have told it.
+    waiting : ndarray, (k, c)
+        Samples after the last whole epoch.
+    taken, given : int
+        Epochs so far, filtered and handed out.
+    signals : tuple of SignalState
+    """
+
+    grid: Grid
+    channels: int
+    noise: Array | None
+    waiting: Array
+    taken: int
+    given: int
+    signals: tuple[SignalState, ...]
+
+
+@dataclass(frozen=True)
+class RobustWd(Prefilter):
+    """Level and slope of each channel by a robust Kalman filter in W-D form, smoothed.
+
+    An epoch is an interval of the output; its samples are its observations, with one
+    orthogonalisation. The gains are the same for all channels while no sample is
+    doubted. It knows of the motion that it is below `bandwidth` and as small as the noise: what is
+    faster or larger looks like outliers to it. For a vehicle at rest; see `RobustFir`.
+
+    Parameters
+    ----------
+    rate : float, Hz
+        Of the output: a whole part of that of the samples.
+    bandwidth : float, Hz
+        Where the smoother's gain is a half; `SignalFilter`.
+    noise : tuple of float, optional
+        Standard deviation of a sample of each channel. Not given, it is taken from the first
+        256 samples (median of the sixth difference).
+    smooth : bool
+        Whether later samples count; else the filter alone, which is not late and has phase.
+    form, rule : CovarianceForm, UpdateRule
+    """
+
+    name: ClassVar[str] = "w_d"
+    summary: ClassVar[str] = "robust W-D Kalman smoother of each channel"
+    source: ClassVar[str] = "Chernodarov 2009, Eqs. (6)-(15), 'primary processing'"
+
+    rate: float = 100.0
+    bandwidth: float = 20.0
+    noise: tuple[float, ...] | None = None
+    smooth: bool = True
+    form: CovarianceForm = field(default_factory=Chernodarov)
+    rule: UpdateRule = field(default_factory=RobustUpdate)
+
+    @property
+    def signal(self) -> SignalFilter:
+        """The filter of one channel."""
+        return SignalFilter(self.bandwidth, self.form, self.rule, self.smooth)
+
+    def begin(self, grid: Grid, channels: int = 6) -> RobustWdState:
+        """As `Prefilter.begin`."""
+        whole_factor(self.rate, grid, self.name)
+        noise = None if self.noise is None else np.asarray(self.noise, dtype=np.float64)
+        return RobustWdState(grid, channels, noise, np.empty((0, channels)), 0, 0, ())
+
+    def advance(
+        self, state: RobustWdState, values: Array, last: bool = False
+    ) -> tuple[RobustWdState, Portion]:
+        """As `Prefilter.advance`.
+
+        Raises
+        ------
+        DataError
+            A channel has no noise by which samples could be judged.
+        """
+        grid, signal = state.grid, self.signal
+        factor = whole_factor(self.rate, grid, self.name)
+        held = np.vstack([state.waiting, values])
+        noise = state.noise
+        if noise is None and (len(held) >= SETTLE or last):
+            noise = _noise(held[:SETTLE])
+        # The first sample stands at the start of the first epoch.
+        skip = 0 if state.taken else 1
+        count = 0 if noise is None else max(0, (len(held) - skip) // factor)
+        ages = grid.step * (np.arange(factor - 1, -1, -1.0) + 0.5 * grid.means)
+        signals, levels = list(state.signals), []
+        changed = [Changed.none()]
+        epochs = held[skip : skip + count * factor].reshape(count, factor, state.channels)
+        for c in range(state.channels if noise is not None else 0):
+            assert noise is not None
+            sd = float(noise[c])
+            if not signals and not count:
+                break
+            if len(signals) <= c:
+                signals.append(signal.begin(epochs[0, :, c], sd, factor * grid.step))
+            signals[c], out = signal.advance(signals[c], epochs[:, :, c], ages, sd, grid.step, last)
+            levels.append(out.level)
+            k, j = np.nonzero(out.weight < BELIEVED)
+            changed.append(
+                Changed(
+                    (state.taken + k) * factor + j + 1,
+                    np.full(len(k), c),
+                    epochs[k, j, c],
+                    out.expected[k, j],
+                    np.full(len(k), REPLACED, np.int8),
+                )
+            )
+        level = np.column_stack(levels) if levels else np.empty((0, state.channels))
+        given = state.given + len(level)
+        time = grid.time(factor * np.arange(state.given + 1, given + 1))
+        waiting = held[skip + count * factor :] if count else held
+        after = RobustWdState(
+            grid, state.channels, noise, waiting.copy(), state.taken + count, given, tuple(signals)
+        )
+        return after, Portion(time, level, np.empty((0, 10)), Changed.joined(changed))
+
+    def figures(self, grid: Grid) -> dict[str, float]:
+        """As `Prefilter.figures`; the passband ends where the gain is off by 0.1 dB."""
+        signal = self.signal
+        epoch = whole_factor(self.rate, grid, self.name) * grid.step
+        stop = 0.5 / epoch
+        late = signal.lag(epoch) * epoch
+        at_stop = float(np.abs(signal.response(np.array([stop])))[0])
+        return {
+            "delay": late,
+            "latency": late,
+            "noise_factor": signal.noise_factor(grid.step),
+            "passband": _within(signal),
+            "stopband": stop,
+            "attenuation": -20.0 * math.log10(at_stop),
+        }
+
+    def sampling(self, grid: Grid) -> str:
+        """Values at the stamps."""
+        return "instantaneous"
+
+
+def _noise(samples: Array) -> Array:
+    """Standard deviation of each channel from sample to sample."""
+    rough = np.abs(np.diff(samples, 6, axis=0)) / 20.0
+    sd = TO_SIGMA * np.median(rough, axis=0) / RESIDUAL if len(rough) else np.zeros(1)
+    if not (sd > 0.0).all():
+        c = int(np.argmin(sd))
+        raise DataError(
+            f"the first {len(samples)} samples of channel {c} show no noise by which others could "
+            "be judged",
+            quantity="noise",
+            remedy="give the standard deviation of a sample of each channel (noise), or use "
+            "'robust_fir'",
+        )
+    return np.asarray(sd)
+
+
+def _within(signal: SignalFilter) -> float:
+    """Frequency up to which the gain is within 0.1 dB of 1."""
+    f = signal.bandwidth * np.linspace(1e-3, 1.0, 4000)
+    off = np.abs(20.0 * np.log10(np.abs(signal.response(f)))) > 0.1
+    return float(f[int(np.argmax(off))])

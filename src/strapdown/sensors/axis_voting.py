@@ -1,0 +1,381 @@
+"""Redundant axes that measure one vector: least squares, mutual testing, voting."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.imu_uncertainty import BiasDrift
+from strapdown.sensors.parity import checked_directions
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.tables.checks import is_number
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+__all__ = ["AxisErrors", "AxisEvent", "AxisVote", "AxisVoting", "VotingRule", "VotingState"]
+
+HOUR = 3600.0  # s
+# Gyros and accelerometers are tested apart.
+TRIADS = 2
+
+
+@dataclass(frozen=True)
+class VotingRule:
+    """When axes are held to disagree, to have failed, and to be sound again.
+
+    Attributes
+    ----------
+    windows : tuple of float, s
+        Time constants of the means that are compared: a short one for what is large, a long one
+        for what is small. Each mean is that of all samples so far until it is as old.
+    persist : float
+        A window's chi-square must be beyond its limit for this part of its time constant.
+    learn : float, s
+        For so long the axes are compared within their stated biases; from then on, each within
+        what may have changed since.
+    readmit : float, s
+        An axis that failed is taken back after it has been within half of the limit for so long;
+        infinite is never. A disagreement of the same two is told again after so long without one.
+    false_alarm : float, 1/h
+        Expected number of samples an hour beyond a limit, of all windows and both triads, where all
+        is as stated.
+    confusion : float
+        Likelihood of the next axis over that of the one that is excluded.
+    apart : float, m
+        Largest distance between the accelerometers of two units. Lever arms are not corrected;
+        this allows for the centripetal acceleration between them, ``apart ω²``.
+
+    Raises
+    ------
+    ConfigError
+        A number is out of range.
+    """
+
+    windows: tuple[float, ...] = (0.1, 5.0)
+    persist: float = 0.5
+    learn: float = 30.0
+    readmit: float = 60.0
+    false_alarm: float = 1e-3
+    confusion: float = 1e-6
+    apart: float = 0.0
+
+    def __post_init__(self) -> None:
+        good = {
+            "windows": bool(self.windows)
+            and all(is_number(x) and 0.0 < x < math.inf for x in self.windows),
+            "persist": is_number(self.persist) and 0.0 < self.persist < math.inf,
+            "learn": is_number(self.learn) and 0.0 < self.learn < math.inf,
+            "readmit": is_number(self.readmit) and self.readmit > 0.0,
+            "false_alarm": is_number(self.false_alarm) and 0.0 < self.false_alarm < 1.0,
+            "confusion": is_number(self.confusion) and 0.0 < self.confusion < 1.0,
+            "apart": is_number(self.apart) and 0.0 <= self.apart < math.inf,
+        }
+        for name, fine in good.items():
+            if not fine:
+                raise ConfigError(
+                    f"{getattr(self, name)!r} will not do",
+                    quantity=name,
+                    remedy="give seconds, shares and metres that are positive and finite",
+                )
+
+
+@dataclass(frozen=True, eq=False)
+class AxisErrors:
+    """What is not known of m axes: arrays (m,), named as in `TriadUncertainty` and `BiasDrift`."""
+
+    noise_density: Array
+    bias: Array
+    scale: Array
+    misalignment: Array
+    g_sensitivity: Array
+    quantization: Array
+    drift: Array
+    correlation_time: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[tuple[TriadUncertainty, BiasDrift, int]]) -> AxisErrors:
+        """Take axis ``part[2]`` of each triad, one an axis."""
+        names = (
+            "noise_density",
+            "bias",
+            "scale",
+            "misalignment",
+            "g_sensitivity",
+            "quantization",
+        )
+        columns = [np.array([t.axis(n)[k] for t, _, k in parts]) for n in names]
+        drift = np.array([d.triad[k] for _, d, k in parts])
+        return cls(*columns, drift, np.array([d.correlation_time for _, d, _ in parts]))
+
+
+@dataclass(frozen=True, eq=False)
+class VotingState:
+    """Where a vote over a log stands; arrays of the kernel's, which no advance changes."""
+
+    arrays: tuple[NDArray[np.generic], ...]
+    samples: int
+
+    @property
+    def excluded(self) -> Mask:
+        """Axes that have failed, (m,)."""
+        return np.asarray(self.arrays[8] != 0)
+
+
+@dataclass(frozen=True)
+class AxisEvent:
+    """Something that the vote decided.
+
+    Attributes
+    ----------
+    kind : {'excluded', 'readmitted', 'disagree'}
+    row : int
+        Sample of the segment at which it was decided, from 0.
+    since : int
+        Sample from which the chi-square has been beyond its limit; before the segment's
+        beginning it is negative.
+    axes : tuple of int
+        That failed; of a disagreement, the two that are most likely.
+    size : float
+        How far the first is off what the others tell, in the unit of the readings.
+    chi_square, limit : float
+    """
+
+    kind: str
+    row: int
+    since: int
+    axes: tuple[int, ...]
+    size: float
+    chi_square: float
+    limit: float
+
+
+@dataclass(frozen=True, eq=False)
+class AxisVote:
+    """A segment of a vote.
+
+    Attributes
+    ----------
+    values : ndarray, (n, 3)
+        The vector in body axes, from the healthy axes.
+    used : ndarray of bool, (n, m)
+    events : tuple of AxisEvent
+    """
+
+    values: Array
+    used: Mask
+    events: tuple[AxisEvent, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class AxisVoting:
+    """Single-axis sensors of one kind on one body.
+
+    Attributes
+    ----------
+    directions : array_like, (m, 3)
+        Unit vectors in body axes along which they measure. Four show that one has failed, five
+        of which no three lie in a plane show which.
+    errors : AxisErrors
+    rate : float, Hz
+        Samples a second; noise of a sample follows from it.
+    rule : VotingRule
+    groups : sequence of int, optional
+        Unit of each axis, from 0: a unit may fail as a whole. Left out, each is its own.
+    apart : float, m
+        Of accelerometers: as `VotingRule.apart`.
+
+    Raises
+    ------
+    ConfigError
+        The directions are none, the errors are of another number, or nothing is stated of an axis.
+
+    Notes
+    -----
+    The vector is the weighted least-squares solution of the healthy axes. Over each window the
+    readings' means are tested: the chi-square of their residuals is that of the parity vector,
+    against noise, and what is stated of bias, scale factor, misalignment, g-sensitivity and drift.
+    Once compared for `learn`, each axis is taken less what it was off the mean of all, and only
+    what can have changed counts: so the vector does not step when an axis is excluded. An axis is
+    excluded where the others agree without it, and no other explains it as well; a unit, where no
+    single axis does. Axes are taken to share their stamps and their delay.
+    """
+
+    directions: ArrayLike
+    errors: AxisErrors
+    rate: float
+    rule: VotingRule = field(default_factory=VotingRule)
+    groups: Sequence[int] | None = None
+    apart: float = 0.0
+
+    def __post_init__(self) -> None:
+        h = checked_directions(self.directions)
+        object.__setattr__(self, "directions", h)
+        own = range(len(h)) if self.groups is None else self.groups
+        groups = np.asarray(list(own), dtype=np.int64)
+        if len(self.errors.bias) != len(h) or groups.size != len(h):
+            raise ConfigError(
+                f"{len(h)} directions, {len(self.errors.bias)} errors and {groups.size} groups",
+                quantity="errors",
+                remedy="give one of each for each axis",
+            )
+        if not (is_number(self.rate) and 0.0 < self.rate < math.inf):
+            raise ConfigError(
+                f"{self.rate!r} is no rate", quantity="rate", remedy="give hertz above zero"
+            )
+        if not (self._one_second() > 0.0).all():
+            k = int(np.argmin(self._one_second()))
+            raise ConfigError(
+                f"neither noise nor bias is stated of axis {k + 1}",
+                quantity="errors",
+                remedy="state them: axes are weighed and held against each other by these",
+            )
+        object.__setattr__(self, "groups", groups)
+
+    @property
+    def weights(self) -> Array:
+        """Of the axes: inverse variances of their means over a second, bias and drift with it."""
+        return np.asarray(1.0 / self._one_second())
+
+    def covariance(self, used: Mask, variance: Array) -> Array:
+        """Covariance of the vector, (3, 3), for independent errors of these variances, (m,)."""
+        h = np.asarray(self.directions)
+        w = self.weights * used
+        gain = np.linalg.solve((h.T * w) @ h, h.T * w)
+        return np.asarray((gain * variance) @ gain.T)
+
+    def begin(self) -> VotingState:
+        """Stand before the first sample."""
+        m, s = len(np.asarray(self.directions)), len(self.rule.windows)
+        ints = np.int64
+        arrays = (
+            np.zeros((s, m)),
+            np.zeros((s, 3)),
+            np.ones(s),
+            np.zeros(m),
+            np.zeros(m),
+            np.zeros(3),
+            np.zeros(2, dtype=ints),
+            np.zeros(m, dtype=ints),
+            np.zeros(m, dtype=ints),
+            np.zeros(m, dtype=ints),
+            np.zeros(s, dtype=ints),
+            np.zeros(m, dtype=ints),
+        )
+        return VotingState(arrays, 0)
+
+    def advance(
+        self, state: VotingState, readings: ArrayLike, other: ArrayLike | None = None
+    ) -> tuple[VotingState, AxisVote]:
+        """Go over a segment; one cut anywhere gives the same numbers.
+
+        Parameters
+        ----------
+        state : VotingState
+        readings : array_like, (n, m)
+            NaN where there is none.
+        other : array_like, (n, 3), optional
+            Of gyros the specific force, which their g-sensitivity feels; of accelerometers the
+            rate, which throws units apart (`VotingRule.apart`); in body axes.
+
+        Returns
+        -------
+        VotingState, AxisVote
+
+        Raises
+        ------
+        DataError
+            The shapes disagree, or at a sample too few healthy axes are left to span the space.
+        """
+        from strapdown._kernels import voting as kernel
+
+        h = np.asarray(self.directions)
+        z = np.ascontiguousarray(readings, dtype=np.float64)
+        aside = np.zeros((len(z), 3)) if other is None else np.nan_to_num(np.array(other, float))
+        if z.ndim != 2 or z.shape[1] != len(h) or aside.shape != (len(z), 3):
+            raise DataError(
+                f"readings of the shape {z.shape}, and {aside.shape} of the other triad",
+                quantity="readings",
+                remedy=f"give {len(h)} columns, one an axis, and three of the other triad",
+            )
+        arrays = tuple(a.copy() for a in state.arrays)
+        fused, used = np.empty((len(z), 3)), np.zeros((len(z), len(h)), dtype=bool)
+        limits = self._limits()
+        windows = np.asarray(self.rule.windows)
+        groups = np.asarray(self.groups)
+        raw = kernel.vote(
+            z,
+            np.ascontiguousarray(aside),
+            h,
+            groups,
+            self.weights,
+            self._facts(),
+            limits,
+            1.0 / self.rate,
+            -np.expm1(-1.0 / (windows * self.rate)),
+            np.maximum(np.ceil(self.rule.persist * windows * self.rate), 1.0).astype(np.int64),
+            max(math.ceil(self.rule.learn * self.rate), 1),
+            self.rule.readmit * self.rate,
+            math.ceil(min(self.rule.readmit, HOUR) * self.rate),
+            -2.0 * math.log(self.rule.confusion),
+            self.apart**2,
+            *arrays,
+            fused,
+            used,
+        )
+        if raw and int(raw[-1][1]) == kernel.TOO_FEW:
+            row = int(raw[-1][0])
+            raise DataError(
+                f"{int(used[row].sum())} healthy axes are left, and they do not span the space",
+                row=row + 1,
+                quantity="readings",
+                remedy="cut the log before, or state larger uncertainties if these axes are sound",
+            )
+        kinds = {kernel.EXCLUDED: "excluded", kernel.READMITTED: "readmitted"}
+        events = []
+        for row, kind, which, following, size, chi, limit, since in raw:
+            if which <= -2.0:
+                axes = tuple(np.flatnonzero(groups == -2 - int(which)).tolist())
+            elif int(kind) == kernel.DISAGREE:
+                axes = (int(which), int(following)) if following >= 0.0 else (int(which),)
+            else:
+                axes = (int(which),)
+            events.append(
+                AxisEvent(
+                    kinds.get(int(kind), "disagree"), int(row), int(since), axes, size, chi, limit
+                )
+            )
+        return VotingState(arrays, state.samples + len(z)), AxisVote(fused, used, tuple(events))
+
+    def _one_second(self) -> Array:
+        e = self.errors
+        return np.asarray(e.noise_density**2 + e.bias**2 + e.drift**2 + e.quantization**2 / 12.0)
+
+    def _limits(self) -> Array:
+        """Of chi-square by degrees of freedom, (m + 1,): the union over all samples of an hour."""
+        from scipy.special import chdtri
+
+        m = len(np.asarray(self.directions))
+        tests = HOUR * self.rate * len(self.rule.windows) * TRIADS
+        chance = self.rule.false_alarm / tests
+        return np.array([0.0] + [float(chdtri(k, chance)) for k in range(1, m + 1)])
+
+    def _facts(self) -> Array:
+        e = self.errors
+        return np.ascontiguousarray(
+            [
+                e.noise_density**2,
+                e.bias**2,
+                e.drift**2,
+                e.correlation_time,
+                e.scale**2,
+                e.misalignment**2,
+                e.g_sensitivity**2,
+                e.quantization**2 / 12.0,
+            ]
+        )

@@ -1,0 +1,434 @@
+"""Two or more inertial units on one body: mutual testing, voting, and one table of all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.sensors.axis_voting import (
+    AxisErrors,
+    AxisEvent,
+    AxisVote,
+    AxisVoting,
+    VotingRule,
+    VotingState,
+)
+from strapdown.sensors.health_log import WORDS
+from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.unit_checks import SAME_STAMP
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+__all__ = ["MountedUnit", "UnitVoting", "UnitVotingState", "VoteEvent", "VotedImu", "vote_units"]
+
+# Of a mounting: how far it may be from a rotation.
+ROTATION = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class MountedUnit:
+    """What is known of a unit before it is switched on.
+
+    Attributes
+    ----------
+    name : str
+    uncertainty : ImuUncertainty
+        Its noise, bias, scale factor and so on, of its own axes; the misalignment with that of its
+        mounting.
+    mounting : array_like, (3, 3)
+        ``C``, with which a vector in the unit's axes becomes one in body axes, ``C v``.
+
+    Raises
+    ------
+    ConfigError
+        The mounting is no rotation.
+    """
+
+    name: str
+    uncertainty: ImuUncertainty
+    mounting: ArrayLike = field(default_factory=lambda: np.eye(3))
+
+    def __post_init__(self) -> None:
+        c = np.asarray(self.mounting, dtype=np.float64)
+        good = c.shape == (3, 3) and np.isfinite(c).all()
+        if not good or np.abs(c @ c.T - np.eye(3)).max() > ROTATION or np.linalg.det(c) < 0.0:
+            raise ConfigError(
+                "its mounting is no rotation",
+                file=self.name,
+                quantity="mounting",
+                remedy="give three orthonormal columns, the unit's axes in body axes",
+            )
+        object.__setattr__(self, "mounting", c)
+
+
+@dataclass(frozen=True)
+class VoteEvent:
+    """Something that the vote decided.
+
+    Attributes
+    ----------
+    kind : {'excluded', 'readmitted', 'disagree'}
+    channels : tuple of str
+        As ``A.gyro_x``; of a disagreement the most likely.
+    time, since : float, s
+        When it was decided, and from when on the disagreement has lasted.
+    size : float, rad/s or m/s²
+        How far the first channel is off what the others tell.
+    chi_square, limit : float
+    finding : Finding
+    """
+
+    kind: str
+    channels: tuple[str, ...]
+    time: float
+    since: float
+    size: float
+    chi_square: float
+    limit: float
+    finding: Finding
+
+
+@dataclass(frozen=True, eq=False)
+class VotedImu:
+    """What the healthy channels of all units tell.
+
+    Attributes
+    ----------
+    imu : DataFrame
+        Imu table in body axes.
+    used : DataFrame of bool
+        A row a sample, a column a channel (``A.gyro_x``).
+    events : tuple of VoteEvent
+    noise_density : DataFrame
+        Of the fused channels at each sample, in u/√Hz: it grows where a channel is left out.
+    """
+
+    imu: pd.DataFrame
+    used: pd.DataFrame
+    events: tuple[VoteEvent, ...]
+    noise_density: pd.DataFrame
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """One for each event."""
+        return tuple(e.finding for e in self.events)
+
+
+@dataclass(frozen=True, eq=False)
+class UnitVotingState:
+    """Where a vote of units stands."""
+
+    gyro: VotingState
+    accel: VotingState
+    last: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class UnitVoting:
+    """Units that vote.
+
+    Attributes
+    ----------
+    units : sequence of MountedUnit
+        Two show that they disagree; three show which channel, or which unit, has failed.
+    rate : float, Hz
+    rule : VotingRule
+
+    Raises
+    ------
+    ConfigError
+        There are fewer than two, or two have one name.
+
+    Notes
+    -----
+    Gyros and accelerometers are voted on apart (`AxisVoting`). Where axes of units are parallel,
+    and only two measure along a direction, a disagreement along it is told, and which of the two
+    is wrong is not: both go on being used. Units that are skewed against each other tell more with
+    fewer. Lever arms are not corrected: accelerometers that are r apart differ by up to
+    ``r (ω² + |dω/dt|)``, which `VotingRule.apart` allows for as to ω²; move readings to one point
+    before (`sensors.lever_arm`) where that is more than their uncertainty.
+    """
+
+    units: Sequence[MountedUnit]
+    rate: float
+    rule: VotingRule = field(default_factory=VotingRule)
+    gyro: AxisVoting = field(init=False)
+    accel: AxisVoting = field(init=False)
+
+    def __post_init__(self) -> None:
+        names = [u.name for u in self.units]
+        if len(names) < 2 or len(set(names)) < len(names):
+            raise ConfigError(
+                f"units {', '.join(map(repr, names))} cannot test each other",
+                quantity="units",
+                remedy="give two or more, each with a name of its own",
+            )
+        directions = np.vstack([np.asarray(u.mounting).T for u in self.units])
+        groups = np.repeat(np.arange(len(names)), 3)
+        of_unit = [u.uncertainty for u in self.units]
+        gyro = [(u.gyro, u.gyro_drift, k) for u in of_unit for k in range(3)]
+        accel = [(u.accel, u.accel_drift, k) for u in of_unit for k in range(3)]
+        for name, parts, apart in (("gyro", gyro, 0.0), ("accel", accel, self.rule.apart)):
+            errors = AxisErrors.of(parts)
+            voting = AxisVoting(directions, errors, self.rate, self.rule, groups.tolist(), apart)
+            object.__setattr__(self, name, voting)
+
+    def begin(self) -> UnitVotingState:
+        """Stand before the first sample."""
+        return UnitVotingState(self.gyro.begin(), self.accel.begin())
+
+    def advance(
+        self, state: UnitVotingState, tables: Mapping[str, pd.DataFrame]
+    ) -> tuple[UnitVotingState, VotedImu]:
+        """Vote over a segment; a log cut anywhere gives the same numbers.
+
+        Parameters
+        ----------
+        state : UnitVotingState
+        tables : mapping of str to DataFrame
+            By name of the unit: Imu tables in the unit's own axes, with the same stamps; a value
+            may be NaN, and is left out there.
+
+        Returns
+        -------
+        UnitVotingState, VotedImu
+
+        Raises
+        ------
+        DataError
+            A table or a column is missing, stamps differ or do not advance, or too few healthy
+            channels are left.
+        """
+        time, gyro, accel, sampling = self._readings(state, tables)
+        turned = np.stack(
+            [
+                accel[:, 3 * k : 3 * k + 3] @ np.asarray(u.mounting).T
+                for k, u in enumerate(self.units)
+            ]
+        )
+        # The middle one: a unit that fails does not loosen the test of the gyros.
+        force = _middle(turned)
+        gyro_state, rates = self.gyro.advance(state.gyro, gyro, force)
+        accel_state, forces = self.accel.advance(state.accel, accel, rates.values)
+        names = [u.name for u in self.units]
+        # Not `imu_table`: a segment may be one sample, and the values are finite.
+        imu = pd.DataFrame(
+            np.hstack([rates.values, forces.values]),
+            index=pd.Index(time, name="time"),
+            columns=[*GYRO, *ACCEL],
+        )
+        imu.attrs = {
+            "sampling": sampling,
+            "source": f"the vote of {', '.join(names)}",
+            "axes": "forward-right-down",
+        }
+        columns = (
+            [f"{n}.{c}" for n in names for c in GYRO],
+            [f"{n}.{c}" for n in names for c in ACCEL],
+        )
+        used = pd.DataFrame(
+            np.hstack([rates.used, forces.used]), index=imu.index, columns=columns[0] + columns[1]
+        )
+        noise = np.hstack([_noise(self.gyro, rates.used), _noise(self.accel, forces.used)])
+        events = [
+            *_events(rates, time, columns[0], "rad/s", state.gyro.samples),
+            *_events(forces, time, columns[1], "m/s²", state.accel.samples),
+        ]
+        return UnitVotingState(gyro_state, accel_state, (float(time[-1]),)), VotedImu(
+            imu,
+            used,
+            tuple(sorted(events, key=lambda e: (e.time, e.channels))),
+            pd.DataFrame(noise, index=imu.index, columns=[*GYRO, *ACCEL]),
+        )
+
+    def uncertainty(self) -> ImuUncertainty:
+        """What is not known of the fused table while all channels are healthy.
+
+        Returns
+        -------
+        ImuUncertainty
+            Noise, bias, drift; scale factor and misalignment as of a mean of independent units.
+            Range, quantization and bandwidth have no place in a mean, and are left open.
+        """
+        return ImuUncertainty(
+            _fused(self.gyro),
+            _fused(self.accel),
+            _fused_drift(self.gyro),
+            _fused_drift(self.accel),
+        )
+
+    def _readings(
+        self, state: UnitVotingState, tables: Mapping[str, pd.DataFrame]
+    ) -> tuple[Array, Array, Array, str]:
+        time = None
+        samplings = set()
+        gyro, accel = [], []
+        for unit in self.units:
+            if unit.name not in tables:
+                raise DataError(
+                    f"there is no table of unit '{unit.name}'",
+                    quantity="tables",
+                    remedy="give one for each unit; NaN where it was silent",
+                )
+            table = tables[unit.name]
+            source = source_of(table) or unit.name
+            check_columns(table, [*GYRO, *ACCEL], source)
+            own = index_of(table)
+            check_time(own, source)
+            if time is None:
+                time = own
+                if state.last and not own[0] > state.last[0]:
+                    raise DataError(
+                        f"it begins at {own[0]:.9g} s, and the last segment ended at "
+                        f"{state.last[0]:.9g} s",
+                        file=source,
+                        row=1,
+                        quantity="time",
+                        remedy="give segments in order, without overlap",
+                    )
+            if own.size != time.size or np.abs(own - time).max() > SAME_STAMP / self.rate:
+                raise DataError(
+                    f"its {own.size} stamps are not the {time.size} of {self.units[0].name}",
+                    file=source,
+                    quantity="time",
+                    remedy="bring the units to one clock and the same stamps first",
+                )
+            samplings.add(str(table.attrs.get("sampling", "instantaneous")))
+            gyro.append(values_of(table, GYRO))
+            accel.append(values_of(table, ACCEL))
+        if len(samplings) > 1:
+            raise DataError(
+                "some units give instantaneous values and some means over their intervals",
+                quantity="sampling",
+                remedy="bring all to the same kind first",
+            )
+        assert time is not None  # two units at least
+        return time, np.hstack(gyro), np.hstack(accel), samplings.pop()
+
+
+def vote_units(
+    units: Sequence[MountedUnit],
+    tables: Mapping[str, pd.DataFrame],
+    rule: VotingRule | None = None,
+) -> VotedImu:
+    """Vote over a whole log.
+
+    Parameters
+    ----------
+    units : sequence of MountedUnit
+    tables : mapping of str to DataFrame
+        As of `UnitVoting.advance`; the rate is the mean one of the first.
+    rule : VotingRule, optional
+
+    Returns
+    -------
+    VotedImu
+
+    Raises
+    ------
+    ConfigError, DataError
+        As `UnitVoting`.
+    """
+    first = tables.get(units[0].name) if units else None
+    if first is None or len(first) < 2:
+        raise DataError(
+            "there is no table of two samples or more of the first unit",
+            quantity="tables",
+            remedy="give one for each unit, by its name",
+        )
+    time = index_of(first)
+    rate = float((time.size - 1) / (time[-1] - time[0]))
+    voting = UnitVoting(units, rate, VotingRule() if rule is None else rule)
+    return voting.advance(voting.begin(), tables)[1]
+
+
+def _middle(values: Array) -> Array:
+    """Median over the units of each axis, zero where none has a reading."""
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return np.nan_to_num(np.nanmedian(values, axis=0))
+
+
+def _noise(voting: AxisVoting, used: Mask) -> Array:
+    """Noise density of the fused axes at each sample, (n, 3)."""
+    out = np.empty((len(used), 3))
+    code = used @ (2 ** np.arange(used.shape[1], dtype=np.int64))
+    for value in np.unique(code):
+        at = code == value
+        mask = used[int(np.argmax(at))]
+        covariance = voting.covariance(mask, voting.errors.noise_density**2)
+        out[at] = np.sqrt(np.diagonal(covariance))
+    return out
+
+
+def _fused(voting: AxisVoting) -> TriadUncertainty:
+    e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
+    parts: dict[str, Any] = {}
+    for name in ("noise_density", "bias", "scale", "misalignment", "g_sensitivity"):
+        variance = np.asarray(getattr(e, name)) ** 2
+        x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, variance))).tolist()
+        parts[name] = (x, y, z)
+    return TriadUncertainty(**parts)
+
+
+def _fused_drift(voting: AxisVoting) -> BiasDrift:
+    e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
+    x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, e.drift**2))).tolist()
+    # The shortest: what the slower ones do is allowed for too early.
+    return BiasDrift((x, y, z), float(e.correlation_time.min()))
+
+
+def _events(
+    vote: AxisVote, time: Array, columns: Sequence[str], unit: str, before: int
+) -> list[VoteEvent]:
+    return [_event(e, time, columns, unit, before) for e in vote.events]
+
+
+def _event(
+    event: AxisEvent, time: Array, columns: Sequence[str], unit: str, before: int
+) -> VoteEvent:
+    channels = tuple(columns[k] for k in event.axes)
+    when = float(time[event.row])
+    step = float(time[1] - time[0]) if time.size > 1 else 0.0
+    since = float(time[event.since]) if event.since >= 0 else float(time[0] + event.since * step)
+    words = " and ".join(_words(c) for c in channels)
+    if event.kind == "readmitted":
+        what = f"{words} agrees with the others again, and is used from {when:.6g} s on"
+        remedy = "look into why it failed before"
+    else:
+        off = (
+            f"{abs(event.size):.3g} {unit} apart since {since:.6g} s (chi-square "
+            f"{event.chi_square:.3g}, limit {event.limit:.3g})"
+        )
+        if event.kind == "excluded" and len(channels) > 1:
+            what = f"unit {channels[0].split('.')[0]} disagrees with the others, {off}: excluded"
+        elif event.kind == "excluded":
+            what = f"{words} is off what the others tell, {off}: excluded"
+        else:
+            what = f"{words} disagree, {off}, and nothing tells which is wrong: both go on"
+        remedy = (
+            "a third unit would tell which; until then end the run there, or state larger errors"
+            if event.kind == "disagree"
+            else "look at its cable, its power and its mounting; the others go on without it"
+        )
+    finding = Finding(what, row=before + event.row + 1, quantity=channels[0], remedy=remedy)
+    return VoteEvent(
+        event.kind, channels, when, since, event.size, event.chi_square, event.limit, finding
+    )
+
+
+def _words(channel: str) -> str:
+    name, column = channel.rsplit(".", 1)
+    return f"{WORDS[column]} of unit {name}"

@@ -1,0 +1,153 @@
+"""Alignment of a vehicle that drives."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
+
+from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.path_motion import PathMotion
+from strapdown.tables import POSITION_SD, VELOCITY_SD
+
+# Speeds up, brakes, turns both ways, climbs; leans on its springs.
+DRIVE = PathMotion(
+    60.0,
+    ORIGIN,
+    heading_deg=30.0,
+    speed=Track((0.0, 20.0, 30.0, 50.0, 58.0), (12.0, 18.0, 10.0, 16.0, 8.0)),
+    turn_rate=Track((0.0, 10.0, 20.0, 35.0, 50.0, 55.0), (0.0, 8.0, -5.0, 6.0, 3.0, 5.0)),
+    climb=Track((0.0, 30.0, 60.0), (0.0, 3.0, -2.0)),
+    roll_deg=1.5,
+    sway_roll=0.5,
+    sway_pitch=0.3,
+)
+NO_SLIP = GnssCourse(sideslip_sd_deg=0.001)
+RUNS = 24
+
+
+def fixes(seed=0, motion=DRIVE, noise=0.05, rate=5.0):
+    receiver = GnssReceiver(rate=rate, velocity_noise=noise, position_noise=1.0)
+    return simulate_gnss(motion, receiver, seed=seed, source="gnss.csv")
+
+
+def test_without_errors():
+    imu, truth = ideal(DRIVE, 100.0)
+    exact = simulate_gnss(DRIVE, GnssReceiver(rate=10.0, velocity_noise=1e-5, position_noise=0.01))
+    none = ImuUncertainty(TriadUncertainty(bias=1e-9), TriadUncertainty(bias=1e-9))
+    for end in (1001, 2501, 6001):
+        found = GnssCourse().align(imu.iloc[:end], SITE, none, exact)
+        # Between fixes 0.1 s apart the velocity is taken for a line: a jerk of 3 m/s³ leaves
+        # 4 mm/s at a sample between two, over a window of 10 s and more 4e-4 m/s², 4e-5 rad;
+        # of the course 4 mm/s over 8 m/s.
+        error = np.abs(phi(found, truth[end - 1]))
+        assert error[:2].max() < 1e-4
+        assert error[2] < 5e-4
+
+
+@pytest.mark.parametrize("sensor", ["fog-1000", "icm-42688-p", "adis16495-1"])
+def test_units_in_a_drive(sensor):
+    found = []
+    for seed in range(RUNS):
+        imu, truth, sensors = unit(DRIVE, 100.0, seed, sensor)
+        end = (2501, 4001, 6001)[seed % 3]
+        result = NO_SLIP.align(imu.iloc[:end], SITE, sensors, fixes(seed))
+        assert not result.findings
+        found.append(chi_square(result, truth[end - 1]))
+    assert max(found) < chi2.isf(1e-6, 3)
+    low, high = chi2.isf([1 - 1e-4, 1e-4], 3 * RUNS)
+    assert low < sum(found) < high
+
+
+def test_the_sd_of_a_course_falls_with_the_speed():
+    sensors = unit(DRIVE, 100.0, 0)[2]
+    sd = []
+    for speed in (5.0, 20.0):
+        motion = PathMotion(10.0, ORIGIN, heading_deg=30.0, speed=Track((0.0,), (speed,)))
+        imu, _ = ideal(motion, 100.0)
+        found = NO_SLIP.align(imu, SITE, sensors, fixes(0, motion))
+        sd.append(np.sqrt(found.covariance[2, 2]))
+    # 51 fixes of 0.05 m/s.
+    assert sd[0] == pytest.approx(0.05 / 5.0 / np.sqrt(51.0), rel=0.05)
+    assert sd[0] / sd[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_mounting_and_its_uncertainty():
+    imu, truth = ideal(DRIVE, 100.0)
+    sensors = unit(DRIVE, 100.0, 0)[2]
+    plain = NO_SLIP.align(imu, SITE, sensors, fixes())
+    turned = GnssCourse(mounting_yaw_deg=5.0, mounting_yaw_sd_deg=0.5, sideslip_sd_deg=1.2)
+    other = turned.align(imu, SITE, sensors, fixes())
+    assert (other.roll_pitch_heading - plain.roll_pitch_heading)[2] == pytest.approx(5.0, abs=0.02)
+    assert other.sd_deg[2] == pytest.approx(1.3, rel=0.01)
+    assert abs(phi(plain, truth[-1])[2]) < np.radians(0.1)
+
+
+def test_reverse():
+    imu, _ = ideal(DRIVE, 100.0)
+    sensors = unit(DRIVE, 100.0, 0)[2]
+    ahead = GnssCourse().align(imu, SITE, sensors, fixes())
+    back = GnssCourse(reverse=True).align(imu, SITE, sensors, fixes())
+    assert abs((ahead.roll_pitch_heading - back.roll_pitch_heading)[2]) == pytest.approx(180, abs=5)
+    assert not ahead.findings
+    assert "it drives the other way round than taken" in str(back.findings[0])
+
+
+def test_what_it_refuses():
+    imu, _ = ideal(DRIVE, 100.0)
+    sensors = unit(DRIVE, 100.0, 0)[2]
+    with pytest.raises(DataError, match=r"log.csv, gnss: there are no fixes"):
+        GnssCourse().align(imu, SITE, sensors)
+    with pytest.raises(DataError, match=r"gnss.csv, VN, VE: 1 fixes fall between 0 and 0.19"):
+        GnssCourse().align(imu.iloc[:20], SITE, sensors, fixes())
+    other_clock = fixes()
+    other_clock.index = other_clock.index + 1e6
+    with pytest.raises(DataError, match=r"(?s)0 fixes fall.*both clocks"):
+        GnssCourse().align(imu, SITE, sensors, other_clock)
+    unmeasured = fixes()
+    unmeasured[VELOCITY_SD] = np.inf
+    with pytest.raises(DataError, match=r"(?s)0 of them have a velocity.*measures velocity"):
+        GnssCourse().align(imu, SITE, sensors, unmeasured)
+    with pytest.raises(DataError, match=r"(?s)gnss.csv, row 301, VN, VE: .* m/s at 60 s.*at least"):
+        GnssCourse(least_speed=9.0).align(imu, SITE, sensors, fixes())
+    with pytest.raises(DataError, match=r"(?s)its course is known to.*10 deg are needed"):
+        GnssCourse().align(imu, SITE, sensors, fixes(noise=2.0))
+    rest, _ = ideal(still(20.0), 50.0)
+    with pytest.raises(DataError, match=r"the vehicle moves at 0\.\d+ m/s"):
+        GnssCourse().align(rest, SITE, sensors, fixes(motion=still(20.0)))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("mounting_yaw_deg", np.inf),
+        ("mounting_yaw_sd_deg", -1.0),
+        ("sideslip_sd_deg", np.nan),
+        ("least_speed", -1.0),
+        ("largest_sd_deg", "a"),
+    ],
+)
+def test_options_out_of_range(name, value):
+    with pytest.raises(ConfigError, match=name):
+        GnssCourse(**{name: value})
+
+
+def test_places_need_no_precision():
+    imu, truth = ideal(DRIVE, 100.0)
+    sensors = unit(DRIVE, 100.0, 0)[2]
+    placeless = fixes()
+    placeless[POSITION_SD] = np.inf
+    found = GnssCourse().align(imu, SITE, sensors, placeless)
+    assert chi_square(found, truth[-1]) < chi2.isf(1e-6, 3)

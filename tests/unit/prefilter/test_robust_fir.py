@@ -1,0 +1,229 @@
+"""The robust digital filter: phase between the channels, aliases, integrals, coning, sculling."""
+
+import numpy as np
+import pytest
+from scipy.signal import csd, welch
+
+from strapdown import rotation
+from strapdown.prefilter import RobustFir, Summed
+from strapdown.sensors.triad_errors import ImuErrors
+from strapdown.simulation import Coning, Sculling
+from strapdown.simulation.imu import simulate_imu
+from strapdown.tables import ACCEL, DV, GYRO, PHI, imu_table
+
+STEP = 1e-3
+N = 120_000
+
+
+def coloured(seed, n=N, band=22.0):
+    """Motion within the passband of the filter: white below `band` Hz, unit variance."""
+    spectrum = np.zeros(n // 2 + 1, dtype=complex)
+    f = np.fft.rfftfreq(n, STEP)
+    at = (f > 0.0) & (f < band)
+    rng = np.random.default_rng(seed)
+    spectrum[at] = rng.standard_normal(at.sum()) + 1j * rng.standard_normal(at.sum())
+    signal = np.fft.irfft(spectrum, n)
+    return signal / signal.std()
+
+
+@pytest.fixture(scope="module", params=["instantaneous", "mean"])
+def vehicle(request):
+    """One motion that all six channels see, and outliers of each alone."""
+    motion, rng = coloured(1), np.random.default_rng(2)
+    if request.param == "mean":
+        # Mean over the step: of a sum of tones, by its integral.
+        f = np.fft.rfftfreq(N, STEP)
+        late = np.sinc(f * STEP) * np.exp(-1j * np.pi * f * STEP)
+        motion = np.fft.irfft(np.fft.rfft(motion) * late, N)
+    scale = np.array([0.1] * 3 + [2.0] * 3)
+    sd = 1e-3 * scale
+    values = motion[:, None] * scale + sd * rng.standard_normal((N, 6))
+    for c in range(6):
+        rows = np.arange(300 + 71 * c, N - 300, 1000)
+        values[rows, c] += 30.0 * scale[c] * rng.choice([-1.0, 1.0], len(rows))
+    imu = imu_table(STEP * np.arange(N), values[:, :3], values[:, 3:], sampling=request.param)
+    return imu, RobustFir().apply(imu)
+
+
+def test_gyros_and_accelerometers_have_one_phase(vehicle):
+    """Cross-spectrum of gyro and accelerometer, where the motion is: coherent, without phase.
+
+    Noise is 1e-3 of the motion, times the motion's share of the band (22 of 500 Hz): at each
+    frequency the noise is 1e-6 * 22/500 of the motion in power. An interpolated outlier leaves
+    noise of 1.2 samples in one of a thousand. The phase of one of K segments' mean has the sd
+    sqrt((1 - c)/(2 K c)), c the coherence.
+    """
+    _, done = vehicle
+    out = done.imu.to_numpy()
+    size = 256
+    f, p01 = csd(out[:, 0], out[:, 3], 100.0, nperseg=size)
+    _, p00 = welch(out[:, 0], 100.0, nperseg=size)
+    _, p11 = welch(out[:, 3], 100.0, nperseg=size)
+    inside = (f > 1.0) & (f < 21.0)
+    coherence = np.abs(p01[inside]) ** 2 / (p00 * p11)[inside]
+    lost = 2.0 * 1e-6 * 22.0 / 500.0
+    # Leakage of the window at the edges and the chance of one frequency: ten times.
+    assert (1.0 - coherence).max() < 10.0 * lost
+    segments = 2 * len(out) / size - 1
+    phase = np.angle(p01[inside])
+    assert np.abs(phase).max() < 5.0 * np.sqrt(10.0 * lost / (2.0 * segments))
+    # A delay of a microsecond at 20 Hz would be 1.3e-4 rad: it would be seen.
+    assert np.abs(phase).max() < 1e-4
+    gain = np.abs(p01[inside]) / p00[inside]
+    np.testing.assert_allclose(gain, 20.0, rtol=1e-4)
+
+
+def test_stamps_hold_the_motion_of_their_time(vehicle):
+    """The outputs are the motion at their stamps, in all channels: the delay is taken off."""
+    imu, done = vehicle
+    truth = coloured(1)
+    number = np.round(done.imu.index.to_numpy() / STEP).astype(int)
+    scale = np.array([0.1] * 3 + [2.0] * 3)
+    out = done.imu.to_numpy() / scale
+    # Noise of 1e-3 by the factor 0.265; means lose (pi f STEP)²/6 at most, 8e-4 at 22 Hz; one
+    # sample in a thousand is interpolated, off by 1.2e-3 times its weight of a tenth.
+    off = out - truth[number][:, None]
+    assert off.std(axis=0).max() < 1e-3 * 0.265 * 1.2 + (
+        8e-4 if imu.attrs["sampling"] == "mean" else 0.0
+    )
+    # By least squares on the slope: a shift of the stamps by 10 µs would be seen.
+    slope = np.gradient(truth, STEP)[number]
+    shift = (off * slope[:, None]).sum(axis=0) / (slope**2).sum()
+    sd = 1e-3 * 0.3 / np.sqrt((slope**2).sum())
+    assert np.abs(shift).max() < 6.0 * sd
+    assert done.report.findings == ()
+    # Every outlier was found, and nothing else.
+    assert len(done.report.replaced) == sum(
+        len(np.arange(300 + 71 * c, N - 300, 1000)) for c in range(6)
+    )
+
+
+@pytest.mark.parametrize("attenuation", [60.0, 80.0, 100.0])
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+def test_no_tone_above_the_new_nyquist_comes_down(sampling, attenuation):
+    """Tones from 50 to 500 Hz on all channels, one after the other: none is an outlier, and what
+    is left of each is within the attenuation."""
+    t = STEP * np.arange(3000)
+    for low in (50.0, 75.0, 97.0, 100.0, 123.0, 200.0, 301.0, 400.0, 499.0):
+        f = low + np.array([0.0, 0.01, 0.1, 0.2, 0.4, 0.9])
+        tones = np.cos(2.0 * np.pi * f * t[:, None] + np.arange(6.0))
+        imu = imu_table(t, tones[:, :3], tones[:, 3:], sampling=sampling)
+        done = RobustFir(attenuation=attenuation).apply(imu)
+        assert done.report.replaced.empty
+        assert np.abs(done.imu.to_numpy()).max() <= 10.0 ** (-attenuation / 20.0)
+
+
+def test_increments_sum_to_the_same_angle():
+    """A turn of 90° about one axis within the record, by a sudden rate: nothing of it is lost.
+
+    About one axis increments add up: each sample counts once, to rounding of 3000 and to the
+    ripple's square at the two ends of the trapezoids, where the rate is zero.
+    """
+    t = STEP * np.arange(4000)
+    rate = np.where((t > 1.0) & (t <= 2.0), 0.5 * np.pi, 0.0)
+    gyro = np.column_stack([rate, 0.0 * rate, 0.0 * rate])
+    imu = imu_table(t, gyro, gyro)
+    for prefilter in (RobustFir(), Summed()):
+        done = prefilter.apply(imu)
+        assert done.increments["phi_x"].sum() == pytest.approx(0.5 * np.pi, abs=1e-12)
+        assert done.increments["dv_x"].sum() == pytest.approx(0.5 * np.pi, abs=1e-12)
+
+
+def held(frequency, step):
+    """Part of a rectified vibration that lines between samples hold.
+
+    Of a vector that turns by x = 2 pi f T a step, the polygon of its integrals and the share
+    within the steps, T²/12 w0 x w1, over the circle: x sin x (cot²(x/2)/4 + 1/6).
+    """
+    x = 2.0 * np.pi * frequency * step
+    return x * np.sin(x) * (0.25 / np.tan(0.5 * x) ** 2 + 1.0 / 6.0)
+
+
+def turned(increments):
+    q = np.array([1.0, 0.0, 0.0, 0.0])
+    for phi in increments[PHI].to_numpy():
+        q = rotation.compose(q, rotation.quaternion_from_rotation_vector(phi))
+    return rotation.rotation_vector_from_quaternion(q)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "passes"), [(5.0, True), (10.0, True), (20.0, True), (60.0, False)]
+)
+def test_coning_that_is_left_and_lost(frequency, passes):
+    """After whole cycles the body is back. What is not held of the coning is seen as a turn."""
+    half = 0.1
+    imu, _ = simulate_imu(Coning(half, frequency, 2.5), ImuErrors(), rate=1000.0)
+    drift = 4.0 * np.pi * frequency * np.sin(np.radians(0.5 * half)) ** 2  # rad/s
+    fir = RobustFir()
+    for prefilter, step in ((fir, 0.01), (Summed(), STEP)):
+        done = prefilter.apply(imu)
+        assert done.report.replaced.empty
+        part = done.increments.iloc[:200]  # two seconds
+        kept = held(frequency, step)
+        if prefilter is fir:
+            gain = 1.0 if passes else 0.0
+            kept = kept * gain if gain else 0.0
+        # Ripple, twice, and the angle's square.
+        slack = 3e-4 if prefilter is fir else 1e-5
+        assert turned(part)[2] / (-2.0 * drift) == pytest.approx(1.0 - kept, abs=slack)
+
+
+@pytest.mark.parametrize(("frequency", "passes"), [(5.0, True), (20.0, True), (60.0, False)])
+def test_sculling_that_is_left_and_lost(frequency, passes):
+    """In phase, swing and push drive the body; in body axes the velocity is what is joined."""
+    swing, push = 0.1, 10.0
+    imu, _ = simulate_imu(Sculling(swing, push, frequency, 2.5), ImuErrors(), rate=1000.0)
+    weight = imu[ACCEL].to_numpy().mean(axis=0)
+    imu[ACCEL] -= [0.0, 0.0, weight[2]]
+    expected = 0.5 * push * np.radians(swing)  # m/s²; J1 = half, to its square
+    for prefilter, step in ((RobustFir(), 0.01), (Summed(), STEP)):
+        done = prefilter.apply(imu)
+        v, q = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        first = done.increments.index[0] - done.increments["dt"].iloc[0]
+        # The start of a cycle of the swing, so that the axes are those of the middle.
+        skip = (
+            0 if np.isclose(first * frequency % 1.0, 0.0) else int(np.ceil(10 - first * 100 % 10))
+        )
+        for row in done.increments.iloc[skip : skip + 200].to_dict("records"):
+            v += rotation.rotate(q, np.array([row[k] for k in DV]))
+            phi = np.array([row[k] for k in PHI])
+            q = rotation.compose(q, rotation.quaternion_from_rotation_vector(phi))
+        kept = held(frequency, step) if passes or step == STEP else 0.0
+        assert np.abs(v).max() / (2.0 * expected) == pytest.approx(abs(kept), abs=2e-3)
+
+
+@pytest.mark.parametrize("columns", [GYRO])
+def test_a_burst_is_told_and_left(columns):
+    rng = np.random.default_rng(3)
+    values = rng.standard_normal((5000, 6))
+    values[2000:2012, 1] += 300.0
+    imu = imu_table(STEP * np.arange(5000), values[:, :3], values[:, 3:], source="bench.csv")
+    report = RobustFir().apply(imu).report
+    assert len(report.findings) == 1
+    finding = report.findings[0]
+    assert (finding.file, finding.quantity) == ("bench.csv", columns[1])
+    assert finding.row is not None
+    assert 1997 <= finding.row <= 2001
+    assert "rows" in finding.what
+    assert finding.remedy
+    assert report.replaced.empty
+    assert not report.kept.empty
+
+
+def test_a_channel_full_of_outliers_is_told():
+    rng = np.random.default_rng(4)
+    values = rng.standard_normal((5000, 6))
+    values[200:-200:50, 5] += 100.0
+    imu = imu_table(STEP * np.arange(5000), values[:, :3], values[:, 3:], source="bench.csv")
+    report = RobustFir().apply(imu).report
+    assert report.share["accel_z"] == pytest.approx(92 / 5000)
+    assert [f.quantity for f in report.findings] == ["accel_z"]
+
+
+def test_what_it_says_of_time():
+    """Ten output steps at 0.5 and 85 dB: (85 - 7.95)/(2.285 · 2 pi · 25 Hz · 1 ms) = 214.6."""
+    imu = imu_table(STEP * np.arange(1000), np.ones((1000, 3)), np.ones((1000, 3)))
+    report = RobustFir().apply(imu).report
+    assert report.delay == pytest.approx(0.107, abs=1e-12)
+    assert report.latency == pytest.approx(0.107 + RobustFir().outliers.latency * STEP)
+    assert (report.passband, report.stopband) == (25.0, 50.0)

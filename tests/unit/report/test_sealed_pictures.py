@@ -1,0 +1,33 @@
+"""The pictures of a sealed bench are drawn again to the same bytes, whoever draws them."""
+
+from __future__ import annotations
+
+from strapdown import bench_attitude, verify, write_attitude
+
+FEW = ("euler", "quaternion")
+
+
+def test_pictures_of_the_second_form_verify_too(tmp_path):
+    seal = write_attitude(
+        bench_attitude("alexiev-fig2a", algorithms=FEW), tmp_path / "out", png=True
+    )
+    figures = seal.path / "figures"
+    assert {p.stem for p in figures.glob("*.png")} == {p.stem for p in figures.glob("*.svg")}
+    png = (figures / "gyro.png").read_bytes()
+    assert png.startswith(b"\x89PNG")
+    assert b"matplotlib" not in png.lower()
+    assert verify(seal.path).verdict == "identical"
+
+
+def test_the_pictures_do_not_follow_the_style_of_whoever_runs_it(tmp_path, monkeypatch):
+    import matplotlib as mpl
+
+    seals = []
+    for size in (9.0, 30.0):
+        with mpl.rc_context({"font.size": size, "lines.linewidth": size}):
+            seals.append(
+                write_attitude(
+                    bench_attitude("alexiev-fig2a", algorithms=FEW), tmp_path / str(size)
+                )
+            )
+    assert seals[0].digest == seals[1].digest
