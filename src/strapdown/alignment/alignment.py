@@ -34,6 +34,8 @@ class Alignment:
     gyro_bias_sd, accel_bias_sd : ndarray, (3,), optional
     heading_given : bool
         Whether the heading owes nothing to the gyros: it was stated, or is that of a course.
+    measured_latitude_deg, measured_latitude_sd_deg : float, deg, optional
+        Where the method tells it without the site's: from gravity and the Earth's rate.
     findings : tuple of Finding
         Assumptions that do not hold, and what the sensors cannot tell.
     """
@@ -47,6 +49,8 @@ class Alignment:
     gyro_bias_sd: Array | None = None
     accel_bias_sd: Array | None = None
     heading_given: bool = False
+    measured_latitude_deg: float | None = None
+    measured_latitude_sd_deg: float | None = None
     findings: tuple[Finding, ...] = field(default=())
 
     @property

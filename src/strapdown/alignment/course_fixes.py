@@ -94,9 +94,9 @@ def course_fixes(
     good &= np.isfinite(sd)
     if good.sum() < 2:
         raise DataError(
-            f"{timely} fixes fall between {stamps[0]:.6g} and {stamps[-1]:.6g} s of the inertial "
-            f"record, and {int(good.sum())} of them have a velocity with a standard deviation: "
-            "two are needed",
+            f"fixes between {stamps[0]:.6g} and {stamps[-1]:.6g} s of the inertial "
+            f"record: {timely}, and with a velocity that has a standard deviation: "
+            f"{int(good.sum())}; two are needed",
             file=source,
             quantity="VN, VE",
             remedy="check that both clocks are the same, align over a stretch with fixes, and "

@@ -16,14 +16,13 @@ from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.inertial_fit import InertialFit, fit_inertially
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
 from strapdown.alignment.north import (
-    CONTRADICTION,
     LARGEST_SD,
     latitude_findings,
     north_findings,
     unit_remedy,
 )
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
-from strapdown.alignment.record_checks import check_gravity, check_record
+from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.residual_noise import ResidualNoise, residual_noise
 from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
@@ -100,9 +99,10 @@ class InertialFrame(CoarseAlignment):
             findings.append(_left_over(noise, sd[2], sums.length, source))
         findings += still_by_gnss(gnss, imu, site, float(sd[2]))
         findings += turn_findings(sums, fit.C_nb, site, sensors, source)
-        findings += _gravity_findings(fit, float(sd[4]), source)
+        findings += gravity_findings(fit.gravity_change, float(sd[4]), source)
         measured = site.lat_deg + float(np.degrees(fit.latitude_change))
-        findings += latitude_findings(site, measured, float(np.degrees(sd[3])), source)
+        measured_sd = float(np.degrees(sd[3]))
+        findings += latitude_findings(site, measured, measured_sd, source)
         C_nb, covariance = fit.C_nb, whole[:3, :3]
         if self.at == "end":
             level = rotation.dcm_from_rotation_vector(-site.earth_rate * sums.length)
@@ -116,6 +116,8 @@ class InertialFrame(CoarseAlignment):
             sums.start + (sums.length if self.at == "end" else 0.0),
             rotation.quaternion_from_dcm(C_nb),
             covariance,
+            measured_latitude_deg=measured,
+            measured_latitude_sd_deg=measured_sd,
             findings=tuple(findings),
         )
 
@@ -171,20 +173,4 @@ def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | Non
         quantity="accel",
         remedy="align for longer, while the vehicle does not drive; where it stood, state noisier "
         "sensors",
-    )
-
-
-def _gravity_findings(fit: InertialFit, sd: float, source: str | None) -> tuple[Finding, ...]:
-    off = fit.gravity_change
-    if not abs(off) > CONTRADICTION * sd:
-        return ()
-    return (
-        Finding(
-            f"gravity is measured {1e6 * off:+.4g} ppm off that of the site, "
-            f"{abs(off) / max(sd, 1e-300):.1f} standard deviations of the accelerometers",
-            file=source,
-            quantity="accel",
-            remedy="check the height and the latitude of the site, the scale of the "
-            "accelerometers and their stated bias, and that the vehicle did not drive",
-        ),
     )

@@ -12,7 +12,7 @@ from strapdown.sensors.triad_errors import Triad
 
 Array = NDArray[np.float64]
 
-__all__ = ["force_covariance", "mean_of_drift", "rate_covariance"]
+__all__ = ["force_covariance", "gravity_change", "mean_of_drift", "rate_covariance"]
 
 
 def rate_covariance(sensors: ImuUncertainty, length: float, rate: Array, force: Array) -> Array:
@@ -43,6 +43,25 @@ def force_covariance(sensors: ImuUncertainty, length: float, force: Array) -> Ar
     variance = _of_input(accel.axis("scale"), accel.axis("misalignment"), force)
     variance += _own(accel.axis("bias"), accel.axis("noise_density"), sensors.accel_drift, length)
     return np.diag(variance)
+
+
+def gravity_change(force: Array, covariance: Array, gravity: Array) -> tuple[float, float]:
+    """Size of a mean specific force against gravity, relative, and its standard deviation.
+
+    Parameters
+    ----------
+    force : ndarray, (3,), m/s²
+    covariance : ndarray, (3, 3), (m/s²)²
+        In the same axes.
+    gravity : ndarray, (3,), m/s²
+        In any.
+
+    Returns
+    -------
+    change, sd : float
+    """
+    size, g = (float(np.sqrt(x @ x)) for x in (force, gravity))
+    return size / g - 1.0, float(np.sqrt(force @ covariance @ force)) / (size * g)
 
 
 def mean_of_drift(drift: BiasDrift, length: float) -> Array:

@@ -6,13 +6,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.alignment.north import CONTRADICTION
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError, Finding
 from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
 
 Array = NDArray[np.float64]
 
-__all__ = ["LEAST_SAMPLES", "check_gravity", "check_record"]
+__all__ = ["LEAST_SAMPLES", "check_gravity", "check_record", "gravity_findings"]
 
 # As levelling has it: what no bias, scale or rocking makes of gravity.
 NEAR_GRAVITY = 0.2
@@ -111,6 +112,36 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
             quantity="accel_z",
             remedy="if it stands upright, mend the signs or the axes when the log is read: at "
             "rest and level the down axis reads -9.8",
+        ),
+    )
+
+
+def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Finding, ...]:
+    """Compare the size of a mean specific force with the gravity of the site.
+
+    Parameters
+    ----------
+    change : float
+        Measured less the site's, relative.
+    sd : float
+        Of it.
+    source : str, optional
+
+    Returns
+    -------
+    tuple of Finding
+        One, where it is more than five standard deviations.
+    """
+    if not abs(change) > CONTRADICTION * sd:
+        return ()
+    return (
+        Finding(
+            f"gravity is measured {1e6 * change:+.4g} ppm off that of the site, "
+            f"{abs(change) / max(sd, 1e-300):.1f} standard deviations of the accelerometers",
+            file=source,
+            quantity="accel",
+            remedy="check the height and the latitude of the site, the scale of the "
+            "accelerometers and their stated bias, and that the vehicle did not drive",
         ),
     )
 

@@ -10,8 +10,8 @@ from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.block_means import block_means, excursion, of_mean, unexplained
 from strapdown.alignment.levelling import level
-from strapdown.alignment.mean_errors import force_covariance
-from strapdown.alignment.record_checks import check_gravity, check_record
+from strapdown.alignment.mean_errors import force_covariance, gravity_change
+from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.site import Site
 from strapdown.alignment.tilt_and_heading import error_of_force_and_heading
 from strapdown.exceptions import Finding
@@ -81,6 +81,8 @@ def level_at_rest(
         force = force + (of_mean(means.force) if loud > 1.0 else 0.0)
         swing = excursion(imu, sensors.gyro.axis("noise_density"))
         findings.append(_disturbed(means.length, loud, turning, swing, source))
+    change = gravity_change(means.whole_force, force, site.gravity)
+    findings += gravity_findings(*change, source)
     by_force, by_heading = error_of_force_and_heading(-site.gravity, pitch, heading_deg, source)
     # A stated heading is that of the last sample: a swing about the vertical is not in it.
     by_swing = by_force @ rotation.cross_matrix(site.gravity) @ C_nb

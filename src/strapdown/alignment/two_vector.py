@@ -19,7 +19,7 @@ from strapdown.alignment.block_means import (
     unexplained,
 )
 from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.mean_errors import force_covariance, rate_covariance
+from strapdown.alignment.mean_errors import force_covariance, gravity_change, rate_covariance
 from strapdown.alignment.north import (
     CONTRADICTION,
     DEG_PER_H,
@@ -28,7 +28,7 @@ from strapdown.alignment.north import (
     north_findings,
     unit_remedy,
 )
-from strapdown.alignment.record_checks import check_gravity, check_record
+from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
 from strapdown.exceptions import ConfigError, DataError, Finding
@@ -115,12 +115,17 @@ class TwoVector(CoarseAlignment):
             _refuse_motion(findings[-1], heading_sd, source)
         findings += north_findings(site, heading_sd, sensors, source)
         findings += still_by_gnss(gnss, imu, site, heading_sd)
-        findings += latitude_findings(site, *_latitude(means, site, rate, force), source)
+        turned = C_nb @ means.whole_force
+        findings += gravity_findings(*gravity_change(turned, force, site.gravity), source)
+        latitude, latitude_sd = _latitude(means, site, rate, force)
+        findings += latitude_findings(site, latitude, latitude_sd, source)
         return Alignment(
             self.name,
             float(imu.index[-1]),
             rotation.quaternion_from_dcm(C_nb),
             covariance,
+            measured_latitude_deg=latitude,
+            measured_latitude_sd_deg=latitude_sd,
             findings=tuple(findings),
         )
 

@@ -111,6 +111,14 @@ def test_another_latitude(method, stood):
     assert "the sensors tell 5" in words(method.align(imu, Site(50.0, 37.0, 150.0), sensors))
 
 
+@each
+def test_another_height(method, stood):
+    """Gravity falls by 0.31 ppm a metre: 5 km are 1570 ppm, the accelerometers' are 70."""
+    imu, _, sensors = stood
+    found = words(method.align(imu, Site(55.0, 37.0, 5150.0), sensors))
+    assert "log.csv, accel: gravity is measured +15" in found
+
+
 def test_a_latitude_of_the_wrong_sign_is_called_that(stood):
     imu, _, sensors = stood
     found = words(InertialFrame().align(imu, Site(-55.0, 37.0, 150.0), sensors))

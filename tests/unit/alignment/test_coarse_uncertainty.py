@@ -161,3 +161,19 @@ def test_an_ideal_sensor_states_next_to_nothing():
     imu, _ = ideal(still(120.0), 10.0)
     for method in STATIC:
         assert np.sqrt(np.diagonal(method.align(imu, SITE, IDEAL).covariance)).max() < 1e-6
+
+
+@pytest.mark.parametrize("method", [TwoVector(), InertialFrame()], ids=str)
+def test_the_latitude_is_told_by_the_sensors(method):
+    ratios = []
+    for seed in range(RUNS):
+        imu, _, sensors = unit(still(600.0), 20.0, seed)
+        found = method.align(imu, SITE, sensors)
+        ratios.append((found.measured_latitude_deg - 55.0) / found.measured_latitude_sd_deg)
+    low, high = chi2.isf([1 - 1e-4, 1e-4], RUNS)
+    assert low < np.sum(np.square(ratios)) < high
+    # The bias along the meridian, against the rate: 0.0104 of 15 deg/h; across the vertical
+    # alone, against 15 sin(lat). The noise of gyros and accelerometers adds a fifth at the most.
+    part = 1.0 if method.name == "two_vector" else np.sin(np.radians(55.0))
+    least = np.degrees(0.0104 / 15.04) / part
+    assert 0.99 * least < found.measured_latitude_sd_deg < 1.25 * least

@@ -110,15 +110,17 @@ def test_what_it_refuses():
     sensors = unit(DRIVE, 100.0, 0)[2]
     with pytest.raises(DataError, match=r"log.csv, gnss: there are no fixes"):
         GnssCourse().align(imu, SITE, sensors)
-    with pytest.raises(DataError, match=r"gnss.csv, VN, VE: 1 fixes fall between 0 and 0.19"):
+    with pytest.raises(
+        DataError, match=r"gnss.csv, VN, VE: fixes between 0 and 0.19 s of the inertial record: 1,"
+    ):
         GnssCourse().align(imu.iloc[:20], SITE, sensors, fixes())
     other_clock = fixes()
     other_clock.index = other_clock.index + 1e6
-    with pytest.raises(DataError, match=r"(?s)0 fixes fall.*both clocks"):
+    with pytest.raises(DataError, match=r"(?s)inertial record: 0,.*both clocks"):
         GnssCourse().align(imu, SITE, sensors, other_clock)
     unmeasured = fixes()
     unmeasured[VELOCITY_SD] = np.inf
-    with pytest.raises(DataError, match=r"(?s)0 of them have a velocity.*measures velocity"):
+    with pytest.raises(DataError, match=r"(?s)standard deviation: 0; two.*measures velocity"):
         GnssCourse().align(imu, SITE, sensors, unmeasured)
     with pytest.raises(DataError, match=r"(?s)gnss.csv, row 301, VN, VE: .* m/s at 60 s.*at least"):
         GnssCourse(least_speed=9.0).align(imu, SITE, sensors, fixes())
