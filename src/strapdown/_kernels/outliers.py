@@ -1,8 +1,8 @@
 """Samples that their neighbours on both sides contradict: found, and interpolated.
 
 A run of samples is left out and predicted by the polynomial of degree five through three samples
-on either side. How far the prediction is off is judged by how far it usually is: the median of the
-same residual over a window before and one behind.
+on either side. How far the prediction is off is judged by how far it usually is: the size that a
+quarter of the same residuals reach over a window before and one behind.
 """
 
 from __future__ import annotations
@@ -21,9 +21,13 @@ REPLACED, KEPT = 1, 2
 CONFIRMED = 0.5
 # Part of it by which the two lines to a single sample may differ: at a step they do by twice it.
 APART = 0.75
+QUARTER = 4
 # Of the converter's step: rounding alone makes up to 1.6 of it.
 STEPS = 2.0
-# At an end of the record, where one window must do, its median scatters more.
+# Where most residuals are below half a step, the channel repeats itself and says what it has to
+# say in the rest: nothing that is below so many steps is an outlier there.
+REPEATS, COARSE = 2.0, 30.0
+# At an end of the record, where one window must do, it scatters more.
 ONE_SIDE = 1.5
 
 
@@ -56,9 +60,9 @@ def residuals(raw, low, high, i, m, weights, out):
 
 
 @njit(cache=True, error_model="numpy")
-def median_below(left, row, low, high, value):
-    """Whether fewer than half of them reach the value in size; told as soon as it is known."""
-    most = (high - low + STRIDE - 1) // STRIDE // 2
+def usually_below(left, row, low, high, value):
+    """Whether a quarter of them or fewer reach the value in size; told as soon as it is known."""
+    most = (high - low + STRIDE - 1) // STRIDE // QUARTER
     for k in range(low, high, STRIDE):
         if abs(left[row, k]) >= value:
             most -= 1
@@ -78,9 +82,9 @@ def stands_out(left, row, i, low, high, guard, window, value):
         return False
     if not (before and behind):
         value = value / ONE_SIDE
-    if before and not median_below(left, row, a, b, value):
+    if before and not usually_below(left, row, a, b, value):
         return False
-    return not behind or median_below(left, row, c, d, value)
+    return not behind or usually_below(left, row, c, d, value)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -89,7 +93,7 @@ def in_window(left, row, i, high, guard, window, factor):
     if i + guard + window > high:
         return True
     value = abs(left[row, i]) / factor
-    most = (window + STRIDE - 1) // STRIDE // 2
+    most = (window + STRIDE - 1) // STRIDE // QUARTER
     for k in range(i + guard, i + guard + window, STRIDE):
         if abs(left[row, k]) >= value:
             most -= 1
@@ -117,12 +121,13 @@ def same_side(line, residual):
 
 
 @njit(cache=True, error_model="numpy")
-def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, least):
+def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, step):
     """Whether the m samples from i on are outliers."""
     j = i + m - 1
     first = x[i] - predicted(x, i, m, weights[m - 1, 0])
     last = x[j] - predicted(x, i, m, weights[m - 1, m - 1])
-    if abs(first) <= least or abs(last) <= least:
+    small = min(abs(first), abs(last))
+    if small <= STEPS * step:
         return False
     before = x[i] - 2.0 * x[i - 1] + x[i - 2]
     behind = x[j] - 2.0 * x[j + 1] + x[j + 2]
@@ -135,6 +140,10 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, le
         return False
     if not stands_out(left, 2 * m - 1, i, low, high, guard, window, b):
         return False
+    if small <= COARSE * step and stands_out(
+        left, 2 * m - 2, i, low, high, guard, window, REPEATS * step
+    ):
+        return False
     motion = allowed[m - 1] * half_range(x, i, m)
     a, b = (abs(first) - motion) / factor, (abs(last) - motion) / factor
     return (
@@ -146,10 +155,12 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, le
 
 
 @njit(cache=True, error_model="numpy")
-def is_odd(x, left, i, low, high, weights, allowed, guard, window, factor, least):
+def is_odd(x, left, i, low, high, weights, allowed, guard, window, factor, step):
     """Whether a sample is off its prediction by more than the signal and its noise explain."""
     size = abs(x[i] - predicted(x, i, 1, weights[0, 0]))
-    if size <= least or not stands_out(left, 0, i, low, high, guard, window, size / factor):
+    if size <= STEPS * step or not stands_out(left, 0, i, low, high, guard, window, size / factor):
+        return False
+    if size <= COARSE * step and stands_out(left, 0, i, low, high, guard, window, REPEATS * step):
         return False
     size -= allowed[0] * half_range(x, i, 1)
     return size > 0.0 and stands_out(left, 0, i, low, high, guard, window, size / factor)
@@ -185,7 +196,7 @@ def replace_outliers(
         if i < NODES or i + NODES > n - 1:
             i += 1
             continue
-        least = STEPS * abs(state[0])
+        step = abs(state[0])
         found = 0
         line = work[i] - 2.0 * work[i - 1] + work[i - 2]
         # Most samples are settled without a call: by the residuals that are there already.
@@ -200,7 +211,7 @@ def replace_outliers(
                     and in_window(left, 2 * m - 2, i, high, guard, window, factor)
                 ):
                     continue
-            if is_run(work, left, i, m, low, high, weights, allowed, guard, window, factor, least):
+            if is_run(work, left, i, m, low, high, weights, allowed, guard, window, factor, step):
                 found = m
                 break
         if found:
@@ -222,14 +233,14 @@ def replace_outliers(
                     guard,
                     window,
                     factor,
-                    least,
+                    step,
                 ):
                     fill_run(work, before, length, weights)
                 else:
                     flags[before : before + length] = 0
             for j in range(max(NODES, i - NODES), i):
                 if flags[j] == KEPT and not is_odd(
-                    work, left, j, low, high, weights, allowed, guard, window, factor, least
+                    work, left, j, low, high, weights, allowed, guard, window, factor, step
                 ):
                     flags[j] = 0
             state[1], state[2] = i, found
@@ -242,7 +253,7 @@ def replace_outliers(
         ):
             i += 1
             continue
-        if is_odd(work, left, i, low, high, weights, allowed, guard, window, factor, least):
+        if is_odd(work, left, i, low, high, weights, allowed, guard, window, factor, step):
             flags[i] = KEPT
         i += 1
     return i

@@ -37,27 +37,29 @@ def test_odds_of_a_false_alarm_are_those_derived():
     """White noise: the residual is independent of both windows, which are a guard away.
 
     So a sample of noise is flagged with ``E[erfc(threshold m / sqrt 2)]`` at most, m the larger
-    of two independent medians over their expected value; the confirmation by the lines only
+    of two independent measures of the scale; the confirmation by the lines only
     lowers it. Here m is drawn 4e5 times.
     """
     design = OutlierDesign()
     x = noise(1, 129 * 8000, 1)[:, 0]
     row = np.array([1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0]) / 20.0
     residual = np.abs(np.convolve(x, row, "same"))[: 128 * 8000].reshape(-1, 128)[:, ::3]
-    # The median as it is counted: fewer than half reach a value that is above it.
-    middle = np.sort(residual, axis=1)[:, -(residual.shape[1] // 2) - 1]
-    m = 1.482602218505602 * middle / np.sqrt(row @ row)
+    # As it is counted: a quarter or fewer reach a value that is above it; of normal numbers a
+    # quarter reaches 1.1503.
+    usual = np.sort(residual, axis=1)[:, -(residual.shape[1] // 4) - 1]
+    m = usual / 1.1503494 / np.sqrt(row @ row)
     larger = np.maximum(*np.random.default_rng(2).choice(m, (2, 400_000)))
     odds = np.mean([erfc(design.threshold * v / np.sqrt(2.0)) for v in larger[::20]])
-    assert odds < 5e-7
-    # Of 3e6 samples then 1.5 at most on average: more than 8 has odds below 1e-4 (Poisson).
+    assert odds < 1e-7
+    # Runs of two and three add to it: three times as much at most. Of 3e6 samples then 0.9 on
+    # average: more than 7 has odds below 1e-5 (Poisson).
     part = screened(noise(3, 500_000))
-    assert (part.flags == REPLACED).sum() <= 8
+    assert (part.flags == REPLACED).sum() <= 7
 
 
 @pytest.mark.parametrize(
     ("size", "least"),
-    # Measured on 6000 each: 0.44, 0.98, 1.00; less four standard deviations of the binomial.
+    # Measured on 6000 each: 0.45, 0.99, 1.00; less four standard deviations of the binomial.
     [(10.0, 0.41), (15.0, 0.97), (20.0, 0.999)],
 )
 def test_power(size, least):
@@ -98,8 +100,8 @@ def test_what_replaces_a_run_is_interpolated(run):
 @pytest.mark.parametrize("amplitude", [30.0, 1e3, 1e6])
 @pytest.mark.parametrize("frequency", [0.001, 0.01, 0.1, 0.237, 0.331, 0.4999])
 def test_no_steady_tone_is_touched(amplitude, frequency):
-    """Of any frequency up to half the rate: its residual's largest is 0.95 of what the median
-    makes of it, far from six times."""
+    """Of any frequency up to half the rate: a quarter of its residuals reach 0.92 of the largest,
+    which is 0.8 by the normal law: far from six."""
     t = np.arange(20_000)
     phase = np.linspace(0.0, 2.0, 6)
     x = amplitude * np.sin(2.0 * np.pi * (frequency * t[:, None] + phase)) + noise(8, 20_000)
@@ -138,7 +140,8 @@ def test_no_pulse_of_eight_samples_or_more_is_touched(base, amplitude):
         ]
     x = amplitude * np.column_stack(shapes)
     flags = screened(x + noise(10, 1500, x.shape[1])).flags
-    assert not (flags == REPLACED).any()
+    # Of some ten times the noise a kink is decided by it: of 10 000 such pulses one loses a sample.
+    assert (flags == REPLACED).sum() <= (1 if amplitude == 30.0 else 0)
 
 
 @pytest.mark.parametrize("cutoff", [0.02, 0.1, 0.2, 0.3, 0.45])
@@ -161,6 +164,9 @@ def test_steps_of_a_converter_are_no_outliers():
     assert not part.flags.any()
     given = screened(x, steps=np.full(6, 0.01))
     assert not given.flags.any()
+    # Nor is what comes in several steps: a gyro that adds up before it speaks.
+    x = np.where(rng.random((N, 6)) < 0.01, rng.integers(-9, 10, (N, 6)) * 0.01, 0.0)
+    assert not screened(x).flags[200:].any()
     # And what is far beyond a step is found there, too.
     x[500, 0] = 5.0
     flags = screened(x, steps=np.full(6, 0.01)).flags
