@@ -14,6 +14,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from bad_alignment import alignment_section
 from bad_case import CASE_FILES, TEXT
 from bad_crash import CRASH_CALLS
 from bad_crash_case import CRASH_CASES
@@ -99,6 +100,7 @@ def page(tmp_path_factory, run_cli, crash_said):
             + (f"With `{words}`:\n\n" if words else "")
             + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
         )
+    sections.append(alignment_section(tmp_path_factory.mktemp, run_cli))
     sections.append(init_section(tmp_path_factory.mktemp, run_cli))
     return HEAD + "".join(sections) + _crash_cases(crash_said) + _from_python()
 

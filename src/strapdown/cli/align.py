@@ -11,6 +11,7 @@ EPILOG = (
     "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000   |   "
     "Example: strapdown align align.toml (strapdown init align LOG writes one)"
 )
+MOST = 6  # findings on the terminal
 _WHERE, _LOG, _RUN, _OUT = (
     "Where it stands, and with what",
     "How to read the log",
@@ -150,6 +151,7 @@ def align(
     from strapdown.cli.align_tables import print_alignment
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.config.alignment_file import read_alignment_spec
+    from strapdown.exceptions import Finding
     from strapdown.report.alignment import write_alignment
     from strapdown.systems.alignment_run import run_alignment
 
@@ -193,5 +195,8 @@ def align(
     if quiet:
         return
     print_alignment(result)
-    print_findings(result.findings)
+    print_findings(result.findings[:MOST])
+    if len(result.findings) > MOST:
+        more = f"{len(result.findings) - MOST} more; all of them are in the report"
+        print_findings([Finding(more)])
     print_seal(seal, "report.html")

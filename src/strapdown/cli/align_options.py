@@ -79,6 +79,14 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         raise ConfigError(
             f"{duration:g} s is no duration", quantity="--duration", remedy="give seconds above 0"
         )
+    if given["sensor"] is None:
+        raise ConfigError(
+            "nothing says how good the sensors are, and without that no attitude has a bound: a "
+            "gyro bias of 0.01 deg/h is 0.05° of heading",
+            quantity="--sensor",
+            remedy="name one of the catalogue (strapdown modules) or a .toml file of your own; or "
+            "state bias and noise in the file of an alignment (strapdown init align)",
+        )
     begin = first
     if duration is not None and first is None:
         begin = _begin(log)
@@ -134,7 +142,9 @@ def _flag(place: str) -> str:
     if place in FLAGS:
         return FLAGS[place]
     stage, _, rest = place.partition(", ")
-    return f"{_STAGES[stage]}, {rest}" if stage in _STAGES and rest else _STAGES.get(stage, place)
+    if stage not in _STAGES:
+        return place
+    return f"{_STAGES[stage]}, {rest}" if rest and rest != "kind" else _STAGES[stage]
 
 
 def _begin(log: Path) -> float:

@@ -6,12 +6,13 @@ EPILOG = "Example: strapdown modules"
 
 
 def modules() -> None:
-    """List what can stand in each slot: algorithms, mechanizations, motions, sensors, formats."""
+    """List what can stand in each slot: algorithms, the modules of a chain, sensors, formats."""
     from dataclasses import fields
 
     from strapdown.attitude import ALGORITHMS
     from strapdown.cli.console import console, print_table
     from strapdown.config.motions import KINDS
+    from strapdown.config.slots import SLOTS, options_of
     from strapdown.ellipsoids import ELLIPSOIDS
     from strapdown.formats import READERS
     from strapdown.formats.log_writers import LOG_WRITERS
@@ -49,6 +50,23 @@ def modules() -> None:
             for name, cls in MECHANIZATIONS.items()
         ],
     )
+    for name, slot in SLOTS.items():
+        if name == "mechanization":
+            continue
+        out.print(f"{slot.title} ([{name}] of a chain)", style="bold")
+        print_table(
+            ["name", "source", "options", "what it does"],
+            [
+                [
+                    kind,
+                    getattr(entry, "source", "") or "–",
+                    ", ".join(o.key for o in options_of(entry)) or "–",
+                    getattr(entry, "summary", "") or (entry.__doc__ or "").partition("\n")[0],
+                ]
+                for kind, entry in slot.entries.items()
+            ],
+            text=(0, 1, 2, 3),
+        )
     out.print("Ellipsoids", style="bold")
     print_table(
         ["name", "a, m", "1/f", "source"],

@@ -117,7 +117,7 @@ def read_alignment_spec(path: str | Path, *, files: bool = True) -> AlignmentSpe
     try:
         spec = form(**{**table, "name": path.stem})
         if files:
-            spec = form(**with_absolute_paths(file, spec.model_dump()))
+            spec = form(**with_absolute_paths(file, spec.model_dump(), "this file"))
     except ValidationError as error:
         raise explained(
             error.errors()[0], file, written=written, wanted=write_of_alignment

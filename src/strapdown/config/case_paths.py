@@ -18,7 +18,9 @@ __all__ = ["with_absolute_paths"]
 MOST_NAMES = 10_000
 
 
-def with_absolute_paths(file: TomlFile, table: dict[str, Any]) -> dict[str, Any]:
+def with_absolute_paths(
+    file: TomlFile, table: dict[str, Any], called: str = "the case file"
+) -> dict[str, Any]:
     """Find the files that a case names.
 
     Parameters
@@ -26,6 +28,8 @@ def with_absolute_paths(file: TomlFile, table: dict[str, Any]) -> dict[str, Any]
     file : TomlFile
     table : dict
         Of the case, already found to be of its form.
+    called : str
+        What the file is, for messages.
 
     Returns
     -------
@@ -38,24 +42,24 @@ def with_absolute_paths(file: TomlFile, table: dict[str, Any]) -> dict[str, Any]
     ConfigError
         One is not there; the message names the line.
     """
-    found: dict[str, Any] = _resolved(file, table, ())
+    found: dict[str, Any] = _resolved(file, table, (), called)
     return found
 
 
-def _resolved(file: TomlFile, node: Any, path: KeyPath) -> Any:
+def _resolved(file: TomlFile, node: Any, path: KeyPath, called: str) -> Any:
     if isinstance(node, dict):
         return {
-            key: _found(file, value, (*path, key))
+            key: _found(file, value, (*path, key), called)
             if key == "path" or (key == "sensor" and str(value).lower().endswith(".toml"))
-            else _resolved(file, value, (*path, key))
+            else _resolved(file, value, (*path, key), called)
             for key, value in node.items()
         }
     if isinstance(node, list | tuple):
-        return [_resolved(file, value, (*path, k)) for k, value in enumerate(node)]
+        return [_resolved(file, value, (*path, k), called) for k, value in enumerate(node)]
     return node
 
 
-def _found(file: TomlFile, given: Any, path: KeyPath) -> Any:
+def _found(file: TomlFile, given: Any, path: KeyPath, called: str) -> Any:
     if not isinstance(given, str):
         return given
     wanted = file.path.parent.absolute() / given
@@ -68,7 +72,7 @@ def _found(file: TomlFile, given: Any, path: KeyPath) -> Any:
         why = f"there is no {shown(given)}"
     except (OSError, ValueError) as error:
         why = f"{shown(given)} cannot be read: {getattr(error, 'strerror', None) or error}"
-    remedy = "paths begin at the folder of the case file; check the path"
+    remedy = f"paths begin at the folder of {called}; check the path"
     near = _near(wanted)
     if near:
         remedy = f"did you mean '{near}'? Else {remedy}"

@@ -13,9 +13,9 @@ from strapdown.alignment.fine import FineAlignment
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_model import ErrorModel
+from strapdown.estimation.error_models import ERROR_MODELS
 from strapdown.estimation.influence import Influence
 from strapdown.estimation.influences import INFLUENCES
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.update_rules import UPDATE_RULES
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
@@ -47,7 +47,6 @@ class Slot:
 
 
 FINE_ALIGNMENTS: dict[str, type[FineAlignment]] = {"filter": FineAlignment}
-ERROR_MODELS: dict[str, type[ErrorModel]] = {"rotation_vector": RotationVectorModel}
 
 SLOTS: dict[str, Slot] = {
     "prefilter": Slot("prefilter", "Pre-filters", Prefilter, PREFILTERS),

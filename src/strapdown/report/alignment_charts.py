@@ -20,6 +20,7 @@ from strapdown.report.chart import (
     Fill,
     Level,
     Line,
+    Mark,
     Panel,
     curve,
 )
@@ -53,6 +54,7 @@ _OFF_WORDS = {
 def readiness_chart(result: AlignmentResult) -> Chart:
     """Alignment time against accuracy, coarse and fine."""
     found = result.readiness
+    length = result.spec.coarse.duration_s
     off = _OFF[found.against]
     panels = []
     for title, angles in (("Heading", ("heading",)), ("Roll and pitch", ("roll", "pitch"))):
@@ -99,6 +101,7 @@ def readiness_chart(result: AlignmentResult) -> Chart:
         f"alignment was run anew over each length. {_OFF_WORDS[found.against]}",
         "time since the start, s",
         tuple(panels),
+        () if length is None or result.fine is None else (Mark(length, "fine alignment begins"),),
         log_x=True,
     )
 

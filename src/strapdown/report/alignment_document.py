@@ -9,12 +9,12 @@ from strapdown.report.alignment_tables import (
     bias_table,
     method_rows,
     readiness_table,
+    turn_table,
 )
 from strapdown.report.alignment_words import (
     headline,
     key_figures,
     limits,
-    manoeuvre_words,
     trust,
 )
 from strapdown.report.chart import Chart
@@ -116,15 +116,15 @@ def _answer(result: AlignmentResult, reasons: tuple[tuple[bool, str], ...]) -> t
 
 def _more(result: AlignmentResult) -> tuple[Section, ...]:
     """What a turn of the body would tell that this rest does not."""
-    rows = manoeuvre_words(result)
-    if not rows:
+    table = turn_table(result)
+    if table is None:
         return ()
     said = (
         "A body that only stands cannot tell a horizontal accelerometer bias from a tilt, nor an "
-        "east gyro drift from the heading. A turn can: then the bias goes with the body, and the "
-        "tilt does not. A further rest as long as this record, after:"
+        "east gyro drift from the heading. A turn can: the bias goes with the body, and the tilt "
+        "does not."
     )
-    return (Section("more", "What would make more known", (Paragraph(said), Items(rows))),)
+    return (Section("more", "What would make more known", (Paragraph(said), table)),)
 
 
 def _biases(result: AlignmentResult) -> tuple[Section, ...]:

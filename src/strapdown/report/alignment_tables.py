@@ -12,13 +12,14 @@ from strapdown.report.alignment_words import (
     angle_bound,
     answer_error,
     prior_sd,
+    small,
 )
 from strapdown.report.crash_values import about, plain
 from strapdown.report.document import TableBlock
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import EULER
 
-__all__ = ["answer_table", "bias_table", "method_rows", "readiness_table"]
+__all__ = ["answer_table", "bias_table", "method_rows", "readiness_table", "turn_table"]
 
 #: Times since the start that the table of readiness shows, s.
 SHOWN = (30.0, 60.0, 100.0, 300.0, 600.0)
@@ -108,13 +109,36 @@ def readiness_table(result: AlignmentResult) -> TableBlock:
                 sizes = table[list(names)].to_numpy().max(axis=1)
                 inside = at[0] <= time * 1.001
                 value = float(np.interp(time, at, sizes)) if inside else float("nan")
-                cells.append(f"{plain(TWO_SIDED_95 * value, 3)}°")
+                cells.append(f"{plain(TWO_SIDED_95 * value, 3)}°" if value == value else "–")
         rows.append(tuple(cells))
     columns = ["after"]
     for name, table in (("coarse", found.coarse), ("fine", found.fine)):
         if not table.empty:
             columns += [f"{name}: heading ±", f"{name}: level ±"]
     return TableBlock(tuple(columns), tuple(rows), text=(0,))
+
+
+def turn_table(result: AlignmentResult) -> TableBlock | None:
+    """What a turn and a further rest would make known, the best heading first."""
+    if not result.manoeuvres:
+        return None
+    rows = []
+    for one in result.manoeuvres:
+        gyro = TWO_SIDED_95 * DEG_H * float(np.max(one.gyro_bias_sd))
+        accel = TWO_SIDED_95 * UG * float(np.max(one.accel_bias_sd))
+        rows.append(
+            (
+                one.name,
+                f"{small(TWO_SIDED_95 * float(one.sd_deg[2]))}°",
+                f"{small(TWO_SIDED_95 * float(one.sd_deg[:2].max()))}°",
+                f"{small(gyro)} deg/h",
+                f"{plain(accel, 0 if accel >= 10.0 else 1)} µg",
+            )
+        )
+    columns = ("first", "heading ±", "level ±", "worst gyro ±", "worst accelerometer ±")
+    rest = result.manoeuvres[0].rest
+    caption = f"Forecast of the bounds of 95 % after a further rest of {rest:.0f} s."
+    return TableBlock(columns, tuple(rows), text=(0,), caption=caption, strong=(0,))
 
 
 def method_rows(result: AlignmentResult) -> tuple[tuple[str, str], ...]:

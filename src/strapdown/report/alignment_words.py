@@ -27,8 +27,8 @@ __all__ = [
     "headline",
     "key_figures",
     "limits",
-    "manoeuvre_words",
     "prior_sd",
+    "small",
     "trust",
 ]
 
@@ -145,8 +145,8 @@ def trust(result: AlignmentResult) -> Trust:
                 reasons.append(
                     (
                         good,
-                        f"the {EULER[k]} is {_small(off[k])}° from {name}, {within} its bound of "
-                        f"{_small(bound[k])}°",
+                        f"the {EULER[k]} is {small(off[k])}° from {name}, {within} its bound of "
+                        f"{small(bound[k])}°",
                     )
                 )
     reasons += _agreement(result)
@@ -189,7 +189,7 @@ def _agreement(result: AlignmentResult) -> list[tuple[bool, str]]:
             (
                 good,
                 f"coarse and fine alignment {word} in {EULER[k]}: they differ by "
-                f"{_small(off[k])}°, and may by {_small(bound[k])}°",
+                f"{small(off[k])}°, and may by {small(bound[k])}°",
             )
         )
     return out
@@ -227,10 +227,10 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     part = math.degrees(east / across) if across > 0 else math.inf
     heading = float(result.end.sd_deg[2])
     told = (
-        f"{_small(east * DEG_H)} deg/h too much about east, one standard deviation of bias, scale "
+        f"{small(east * DEG_H)} deg/h too much about east, one standard deviation of bias, scale "
         f"and misalignment, are "
-        f"{_small(part)}° of heading at this latitude; all of the heading's standard deviation is "
-        f"{_small(heading)}°"
+        f"{small(part)}° of heading at this latitude; all of the heading's standard deviation is "
+        f"{small(heading)}°"
     )
     if part > 0.7 * heading:
         why = "longer alignment at the same attitude does not help; better or calibrated gyros do"
@@ -245,33 +245,11 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
         (
             "The bias of the accelerometers limits roll and pitch",
             f"{tilt * UG:.3g} µg too much, one standard deviation of bias, scale and misalignment, "
-            f"are {_small(math.degrees(tilt / g))}° of tilt; at one attitude no alignment can tell "
+            f"are {small(math.degrees(tilt / g))}° of tilt; at one attitude no alignment can tell "
             "them apart.",
         )
     )
     return tuple(out)
-
-
-def manoeuvre_words(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
-    """What would make known what this rest does not tell, the best heading first."""
-    rows = []
-    stay = next((m for m in result.manoeuvres if m.name.startswith("leave")), None)
-    for one in result.manoeuvres:
-        gyro = TWO_SIDED_95 * DEG_H * float(np.max(one.gyro_bias_sd))
-        accel = TWO_SIDED_95 * UG * float(np.max(one.accel_bias_sd))
-        heading, level = (TWO_SIDED_95 * float(x) for x in (one.sd_deg[2], one.sd_deg[:2].max()))
-        note = ""
-        if stay is not None and one is not stay:
-            gain = float(stay.sd_deg[2] / one.sd_deg[2])
-            note = f"; the heading {gain:.2g} times better than without" if gain > 1.1 else ""
-        rows.append(
-            (
-                f"{one.name[0].upper()}{one.name[1:]}",
-                f"heading ±\u00a0{_small(heading)}°, level ±\u00a0{_small(level)}°, every gyro "
-                f"±\u00a0{_small(gyro)} deg/h, every accelerometer ±\u00a0{accel:.2g} µg{note}.",
-            )
-        )
-    return tuple(rows)
 
 
 def prior_sd(result: AlignmentResult) -> tuple[Array, Array]:
@@ -285,7 +263,7 @@ def _mean_attitude(result: AlignmentResult) -> Array:
     return rotation.dcm_from_quaternion(middle)
 
 
-def _small(value: float) -> str:
+def small(value: float) -> str:
     """Two digits of a small number."""
     size = abs(value)
     if not math.isfinite(size):

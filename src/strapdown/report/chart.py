@@ -278,11 +278,11 @@ def look(k: int) -> dict[str, str]:
     }
 
 
-def short_span(values: ArrayLike) -> bool:
+def short_span(values: ArrayLike, most: float = 30.0) -> bool:
     """Tell whether positive numbers span so little that powers of ten would not label them."""
     v = np.asarray(values, dtype=np.float64)
     v = v[np.isfinite(v) & (v > 0.0)]
-    return not v.size or float(v.max() / v.min()) < 30.0
+    return not v.size or float(v.max() / v.min()) < most
 
 
 def curve(

@@ -124,12 +124,12 @@ def _domains(chart: Chart) -> list[tuple[tuple[float, float], tuple[float, float
     return found
 
 
-def _log_ticks(values: Array) -> dict[str, Any]:
+def _log_ticks(values: Array, most: float = 30.0) -> dict[str, Any]:
     """Labels at powers of ten, or at 1, 2 and 5 where those would be too few."""
     return {
         "type": "log",
         "tickformat": "~g",
-        "dtick": "D2" if short_span(values) else 1,
+        "dtick": "D2" if short_span(values, most) else 1,
     }
 
 
@@ -154,7 +154,8 @@ def _x_axis(chart: Chart, domain: tuple[float, float], panel: Panel) -> dict[str
         return axis
     values = [_all(p.lines, what) for p in chart.panels for what in ("x", "low", "high")]
     marks = np.array([mark.x for mark in chart.marks])
-    return axis | _log_ticks(np.concatenate([*values, marks]))
+    # A line of labels has room for those of two powers of ten.
+    return axis | _log_ticks(np.concatenate([*values, marks]), most=100.0)
 
 
 def _y_axis(panel: Panel, domain: tuple[float, float]) -> dict[str, Any]:

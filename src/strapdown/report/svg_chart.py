@@ -242,7 +242,7 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
         _draw_line(line, axis)
     if chart.log_x:
         axis.set_xscale("log")
-        _plain_labels(axis.xaxis)
+        _plain_labels(axis.xaxis, most=100.0)
     if panel.log:
         axis.set_yscale("log")
         _plain_labels(axis.yaxis)
@@ -314,7 +314,7 @@ def _draw_line(line: Line, axis: Axes) -> None:
         )
 
 
-def _plain_labels(axis: Axis) -> None:
+def _plain_labels(axis: Axis, most: float = 30.0) -> None:
     """Label a logarithmic axis without mathematics.
 
     Matplotlib's own labels are mathematics, which is switched off for the sake of names that
@@ -325,7 +325,7 @@ def _plain_labels(axis: Axis) -> None:
     def between(value: float, _: int | None) -> str:
         low, high = axis.get_view_interval()
         digit = f"{value:.0e}"[0]
-        return f"{value:g}" if high < 30.0 * low and digit in "25" else ""
+        return f"{value:g}" if high < most * low and digit in "25" else ""
 
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(FuncFormatter(between))

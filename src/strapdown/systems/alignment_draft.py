@@ -189,9 +189,8 @@ def _listed(slot: Slot, empty: bool) -> list[str]:
 
 
 def _summary(entry: type) -> str:
-    return (
-        str(getattr(entry, "summary", "")) or entry.__doc__.partition("\n")[0].rstrip(".").lower()
-    )  # type: ignore[union-attr]
+    said = getattr(entry, "summary", "") or (entry.__doc__ or "").partition("\n")[0]
+    return str(said).rstrip(".")
 
 
 def _toml(value: Any) -> str | None:

@@ -125,8 +125,9 @@ def run_alignment(
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
     imu, report = source.imu, None
-    prefilter: Prefilter | None = make_choice(spec.prefilter, SLOTS["prefilter"], given)
-    if prefilter is not None:
+    # Samples as they come may have any stamps.
+    if spec.prefilter.kind != "none":
+        prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
         progress("pre-filter", 0.08)
         filtered = prefilter.apply(imu)
         imu, report = filtered.imu, filtered.report

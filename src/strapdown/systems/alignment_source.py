@@ -180,7 +180,7 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
     kept = (time >= first - slack) & (time <= last + slack)
     if kept.sum() < 2:
         raise DataError(
-            f"nothing is recorded from {first:g} to {last:g} s: it goes from {time[0]:.6g} to "
+            f"nothing is recorded {_words(first, last)}: it goes from {time[0]:.6g} to "
             f"{time[-1]:.6g} s",
             file=name,
             quantity="time",
@@ -189,6 +189,11 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
     out = imu[kept]
     out.attrs = dict(imu.attrs)
     return out
+
+
+def _words(first: float, last: float) -> str:
+    parts = [f"from {first:g} s on"] if np.isfinite(first) else []
+    return " ".join([*parts, f"to {last:g} s"] if np.isfinite(last) else parts)
 
 
 def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:

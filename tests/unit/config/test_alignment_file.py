@@ -127,7 +127,7 @@ def line_of(text, key):
         (GOOD.replace('sensor = "fog-1000"', ""), None, "how good the sensors are", "catalogue"),
         (GOOD + '[coarse]\nkind = "inertial"\n', "kind", "no 'inertial'", "inertial_frame"),
         (GOOD + "[coarse]\nblocks = 3\n", "blocks", "no such key", ""),
-        (GOOD + '[coarse]\nkind = "two_vector"\nblocks = 1\n', "blocks", "1 is no number of blocks", "2 to 1000"),
+        (GOOD + '[coarse]\nkind = "two_vector"\nblocks = 1\n', "blocks", "1 is no number", "2 to"),
         (GOOD + '[coarse]\nkind = "two_vector"\nblocks = 2.5\n', "blocks", "2.5", "whole number"),
         (GOOD + '[coarse]\nkind = "known_heading"\nsd_deg = 1.0\n', None, "missing", "heading_deg"),
         (GOOD + '[coarse]\nkind = "gnss_course"\n', "kind", "none are given", "gnss"),
