@@ -261,8 +261,10 @@ def means_of_steps(levels, rows, at, longest, matrix):
         c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
         # Velocity increments are in the axes of the start of their step: to those of its middle.
         x, y, z = rows[end, 4], rows[end, 5], rows[end, 6]
-        tx, ty, tz = cross(rows[end, 1], rows[end, 2], rows[end, 3], x, y, z)
-        x, y, z = x - 0.5 * tx, y - 0.5 * ty, z - 0.5 * tz
+        px, py, pz = 0.5 * rows[end, 1], 0.5 * rows[end, 2], 0.5 * rows[end, 3]
+        tx, ty, tz = cross(px, py, pz, x, y, z)
+        sx, sy, sz = cross(px, py, pz, tx, ty, tz)
+        x, y, z = x - tx + 0.5 * sx, y - ty + 0.5 * sy, z - tz + 0.5 * sz
         for i in range(3):
             for j in range(3):
                 matrix[i, j] += h * c[3 * i + j]

@@ -52,7 +52,7 @@ def by_vectors(segment, step):
     earth, levels = find_ellipsoid(used.ellipsoid).parameters(), used.levels(segment.history)
     Phi, Q, matrix, at = np.eye(n), np.zeros((n, n)), np.empty((6, 3)), 0
     while at < len(rows):
-        end, dt = psi_model.means_of_steps(levels, rows, at, step, earth[4], matrix)
+        end, dt = psi_model.means_of_steps(levels, rows, at, step, matrix)
         F = np.zeros((n, n))
         psi_model.psi_dynamics(
             F[:9],

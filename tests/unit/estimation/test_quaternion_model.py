@@ -332,7 +332,7 @@ def test_norms_stay_and_the_turn_about_zeta_is_nothing():
         for at in (0, -1)
     )
     lost = []
-    for step in (0.4, 0.2, 0.1):
+    for step in (0.8, 0.4, 0.2):
         Phi, _ = model.transition(segment, step)
         # Rounding: velocities of g t, 300 m/s, cancel.
         np.testing.assert_allclose(Phi @ before[0], after[0], atol=1e-13)
@@ -340,8 +340,8 @@ def test_norms_stay_and_the_turn_about_zeta_is_nothing():
         # Velocities of 150 m/s that turn by 1 rad would change by 150 m/s.
         T = model.to_physical(mechanization, segment.time[-1], segment.history[-1])
         lost.append(np.abs(T @ Phi @ before[2])[3:6].max())
-    assert lost[-1] < 2e-3
-    # All that is left is what the means of a group lose.
+    assert lost[-1] < 8e-3
+    # All that is left is what the means of a group lose, while it is more than increments do.
     np.testing.assert_allclose(np.array(lost[:-1]) / lost[1:], 4.0, rtol=0.1)
 
 
