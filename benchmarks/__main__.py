@@ -5,7 +5,16 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks import answer, attitude, crash, memory, navigation, prefilter, start_up
+from benchmarks import (
+    answer,
+    attitude,
+    crash,
+    estimation,
+    memory,
+    navigation,
+    prefilter,
+    start_up,
+)
 
 
 def main() -> None:
@@ -14,7 +23,16 @@ def main() -> None:
         table.add_column(
             name, justify="right" if name in ("ours", "theirs", "ratio", "limit") else "left"
         )
-    for module in (attitude, navigation, prefilter, crash, answer, start_up, memory):
+    for module in (
+        attitude,
+        navigation,
+        prefilter,
+        estimation,
+        crash,
+        answer,
+        start_up,
+        memory,
+    ):
         for row in module.ratios():
             verdict = "" if row.limit is None else "within" if row.value <= row.limit else "OVER"
             table.add_row(

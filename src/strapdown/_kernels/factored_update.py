@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from strapdown._kernels.factors import mwgs, noise_rank, not_finite, stacked
+from strapdown._kernels.factors import mwgs, not_finite, stacked
 from strapdown._kernels.observation import expected, moved_state
 
 
@@ -84,24 +84,16 @@ def wd_begin(ud, Phi, Q, predicted, observations):
 
     ``[Phi U, G]`` if `predicted` (Chernodarov 2009, Eqs. 7 and 8), else U.
     """
+    if predicted:
+        W, d, rank = stacked(ud, Phi, Q, observations)
+        return W, d, -1 - rank if rank < 0 else -1
     n = ud.shape[0]
-    rank, noise = 0, np.zeros((n, n))
-    if predicted:
-        rank = noise_rank(Q, noise)
-        if rank < 0:
-            return np.empty((0, 0)), np.empty(0), -1 - rank
-    size = n + rank + observations
-    W, d = np.empty((n, size)), np.empty(size)
-    if predicted:
-        stacked(ud, Phi, noise, W, d)
-    else:
-        W[:] = 0.0
-        d[:] = 0.0
-        for i in range(n):
-            W[i, i] = 1.0
-            d[i] = ud[i, i]
-            for k in range(i + 1, n):
-                W[i, k] = ud[i, k]
+    W, d = np.zeros((n, n + observations)), np.zeros(n + observations)
+    for i in range(n):
+        W[i, i] = 1.0
+        d[i] = ud[i, i]
+        for k in range(i + 1, n):
+            W[i, k] = ud[i, k]
     return W, d, -1
 
 

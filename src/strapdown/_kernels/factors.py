@@ -11,45 +11,77 @@ import math
 import numpy as np
 from numba import njit
 
-# A pivot that is this share of its variance, in n roundings, is what rounding left of zero.
-NOTHING = 8.0
-# Below zero it may be more: who made the matrix rounded as well.
-BELOW = 1e3
 EPSILON = 2.0**-52
+# What rounding leaves of a variance of one that is fully explained, in n roundings.
+NOTHING = 8.0
+# Further from semidefinite, as a correlation, is no rounding of who made the matrix.
+INDEFINITE = 1e-9
+
+
+@njit(cache=True, error_model="numpy")
+def semidefinite_factor(P, G, d):
+    """Write columns G, (n, n), and weights d, (n,), of ``P = G diag(d) G'``; return their number.
+
+    Cholesky's factors with the largest remaining correlation as the pivot, which is stable for a
+    matrix of any rank: without pivoting a small pivot that is mostly rounding would spoil
+    all that follow. Where P is not finite or indefinite, return -1 - state. P is symmetric.
+    """
+    n = P.shape[0]
+    C, sd, per_sd = np.zeros((n, n)), np.empty(n), np.zeros(n)
+    left = np.ones(n, dtype=np.bool_)
+    for i in range(n):
+        if not 0.0 <= P[i, i] < math.inf:
+            return -1 - i
+        sd[i] = math.sqrt(P[i, i])
+        if sd[i] > 0.0:
+            per_sd[i] = 1.0 / sd[i]
+    for i in range(n):
+        d[i] = 0.0
+        for j in range(n):
+            G[i, j] = 0.0
+            if P[i, j] != 0.0:
+                C[i, j] = P[i, j] * per_sd[i] * per_sd[j]
+                if not abs(C[i, j]) <= 1.0 + INDEFINITE:
+                    return -1 - i
+                if sd[i] == 0.0 or sd[j] == 0.0:
+                    return -1 - (i if sd[i] == 0.0 else j)
+        if sd[i] > 0.0:
+            C[i, i] = 1.0
+    rank = 0
+    while rank < n:
+        p, pivot = -1, NOTHING * n * EPSILON
+        for i in range(n):
+            if left[i] and C[i, i] > pivot:
+                p, pivot = i, C[i, i]
+        if p < 0:
+            break
+        left[p] = False
+        d[rank] = pivot * P[p, p]
+        G[p, rank] = 1.0
+        for i in range(n):
+            if left[i] and C[p, i] != 0.0:
+                share = C[p, i] / pivot
+                G[i, rank] = share * sd[i] * per_sd[p]
+                for j in range(n):
+                    C[i, j] -= share * C[p, j]
+        rank += 1
+    for i in range(n):
+        if left[i]:
+            for j in range(n):
+                if left[j] and not abs(C[i, j]) <= INDEFINITE:
+                    return -1 - i
+    return rank
 
 
 @njit(cache=True, error_model="numpy")
 def udu_factor(P, out):
-    """Factor a positive semidefinite P, (n, n), of which the upper half is read.
-
-    A state without variance gets zeros. Return -1, or the state at which P is seen to be
-    indefinite or not finite.
-    """
+    """Write the U and D of a positive semidefinite P; return -1, or the state where it is not."""
     n = P.shape[0]
-    column = np.empty(n)
-    for i in range(n):
-        for j in range(i):
-            out[i, j] = 0.0
-        for j in range(i, n):
-            out[i, j] = P[i, j]
-    for j in range(n - 1, -1, -1):
-        pivot, variance = out[j, j], P[j, j]
-        if not (-BELOW * n * EPSILON * variance <= pivot < math.inf):
-            return j
-        if pivot <= NOTHING * n * EPSILON * variance:
-            for i in range(j):
-                if not abs(out[i, j]) <= math.sqrt(max(0.0, variance * P[i, i])):
-                    return j
-                out[i, j] = 0.0
-            out[j, j] = 0.0
-            continue
-        for i in range(j):
-            column[i] = out[i, j]
-        for i in range(j):
-            share = column[i] / pivot
-            out[i, j] = share
-            for k in range(i, j):
-                out[i, k] -= share * column[k]
+    G, d = np.empty((n, n)), np.empty(n)
+    rank = semidefinite_factor(P, G, d)
+    if rank < 0:
+        return -1 - rank
+    mwgs(G, d, out)
     return -1
 
 
@@ -71,9 +103,16 @@ def mwgs(W, d, out):
     """Turn ``W diag(d) W'``, W (n, N), into U and D: modified weighted Gram-Schmidt.
 
     W is spoiled. D is a sum of squares times d: not negative where d is not (Bierman, VI.4).
+    What is left of a row that others explain to rounding is nothing: D is 0, and no direction.
     """
     n, size = W.shape
-    weighted = np.empty(size)
+    weighted, whole = np.empty(size), np.empty(n)
+    for i in range(n):
+        row = W[i]
+        total = 0.0
+        for k in range(size):
+            total += abs(d[k]) * row[k] * row[k]
+        whole[i] = total
     for j in range(n - 1, -1, -1):
         row = W[j]
         total = 0.0
@@ -82,8 +121,13 @@ def mwgs(W, d, out):
             total += weighted[k] * row[k]
         for i in range(j):
             out[j, i] = 0.0
+        if abs(total) <= size * EPSILON * EPSILON * whole[j]:
+            for i in range(j):
+                out[i, j] = 0.0
+            out[j, j] = 0.0
+            continue
         out[j, j] = total
-        inverse = 1.0 / total if total != 0.0 else 0.0
+        inverse = 1.0 / total
         for i in range(j):
             other = W[i]
             share = 0.0
@@ -97,24 +141,18 @@ def mwgs(W, d, out):
 
 
 @njit(cache=True, error_model="numpy")
-def noise_rank(Q, noise):
-    """Factor Q into `noise` and return how many of its pivots are not zero, or -1 - state."""
-    bad = udu_factor(Q, noise)
-    if bad >= 0:
-        return -1 - bad
-    rank = 0
-    for k in range(Q.shape[0]):
-        if noise[k, k] > 0.0:
-            rank += 1
-    return rank
+def stacked(ud, Phi, Q, observations):
+    """Return ``[Phi U, G]``, its weights, and the rank of Q (or -1 - state where it is indefinite).
 
-
-@njit(cache=True, error_model="numpy")
-def stacked(ud, Phi, noise, W, d):
-    """Write ``[Phi U, G]`` to the first columns of W and its weights to d; the rest is zero."""
-    n = W.shape[0]
-    W[:] = 0.0
-    d[:] = 0.0
+    There is room for the columns of observations at the end, which are zero.
+    """
+    n = ud.shape[0]
+    G, noise = np.empty((n, n)), np.empty(n)
+    rank = semidefinite_factor(Q, G, noise)
+    size = n + max(rank, 0) + observations
+    W, d = np.zeros((n, size)), np.zeros(size)
+    if rank < 0:
+        return W, d, rank
     for i in range(n):
         row = W[i]
         for k in range(n):
@@ -123,15 +161,12 @@ def stacked(ud, Phi, noise, W, d):
                 row[k] += factor
                 for j in range(k + 1, n):
                     row[j] += factor * ud[k, j]
+        for k in range(rank):
+            row[n + k] = G[i, k]
         d[i] = ud[i, i]
-    at = n
-    for k in range(n):
-        if noise[k, k] > 0.0:
-            for i in range(k):
-                W[i, at] = noise[i, k]
-            W[k, at] = 1.0
-            d[at] = noise[k, k]
-            at += 1
+    for k in range(rank):
+        d[n + k] = noise[k]
+    return W, d, rank
 
 
 @njit(cache=True, error_model="numpy")
@@ -140,12 +175,9 @@ def udu_predict(ud, Phi, Q, out):
 
     Return -1, or the state at which Q is indefinite, or whose variance is not finite.
     """
-    n = ud.shape[0]
-    rank = noise_rank(Q, out)
+    W, d, rank = stacked(ud, Phi, Q, 0)
     if rank < 0:
         return -1 - rank
-    W, d = np.empty((n, n + rank)), np.empty(n + rank)
-    stacked(ud, Phi, out, W, d)
     mwgs(W, d, out)
     return not_finite(out)
 

@@ -67,6 +67,14 @@ def checked_covariance(P: Array) -> Array:
     return P
 
 
+def indefinite(row: int) -> DataError:
+    """Return what to raise where a factorisation finds a covariance indefinite."""
+    return _bad(
+        f"has a negative eigenvalue, seen in row {row + 1}",
+        "no errors have such a covariance: look for a wrong sign or unit",
+    )
+
+
 def _bad(what: str, remedy: str) -> DataError:
     return DataError(f"the covariance {what}", quantity="P", remedy=remedy)
 

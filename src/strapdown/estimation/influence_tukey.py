@@ -45,9 +45,8 @@ class Tukey(Influence):
 
     def rho(self, u: float) -> float:
         """From half the square to ``c^2 / 6``."""
-        left = 1.0 - min(1.0, (u / self.c) ** 2)
-        # 1 - left^3 without cancellation near zero.
-        return self.c * self.c / 6.0 * (1.0 - left) * (1.0 + left + left * left)
+        t = min(1.0, (u / self.c) ** 2)
+        return self.c * self.c / 6.0 * t * (3.0 - 3.0 * t + t * t)
 
     def psi(self, u: float) -> float:
         """The residual times its weight."""

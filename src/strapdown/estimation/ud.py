@@ -18,6 +18,7 @@ from strapdown.estimation.covariance_input import (
     check_observations,
     check_prediction,
     checked_covariance,
+    indefinite,
 )
 from strapdown.estimation.sequential import contiguous, own, take_by_rule
 from strapdown.estimation.update_rule import UpdateRule
@@ -49,11 +50,8 @@ class BiermanThornton(CovarianceForm):
         factors, _ = _kernels()
         P = checked_covariance(P)
         out = np.empty_like(P)
-        # Rounding that the check has passed may still show as a pivot; it is a zero then.
-        if factors.udu_factor(P, out) >= 0:
-            sd = np.sqrt(np.diagonal(P))
-            lowest = -np.linalg.eigvalsh(P / np.outer(np.where(sd, sd, 1), np.where(sd, sd, 1)))[0]
-            factors.udu_factor(P + np.diag((2.0 * abs(lowest) + 1e-15) * sd * sd), out)
+        if (row := factors.udu_factor(P, out)) >= 0:
+            raise indefinite(row)
         return out
 
     def predict(self, state: Array, Phi: Array, Q: Array) -> Array:
