@@ -26,8 +26,8 @@ def main() -> None:
     for module in (
         attitude,
         navigation,
-        estimation,
         prefilter,
+        estimation,
         crash,
         answer,
         start_up,

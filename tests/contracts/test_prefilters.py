@@ -164,6 +164,19 @@ def test_what_is_refused(name):
     assert error.value.finding.remedy
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_value_of_a_later_segment_that_is_none(name):
+    values = bench(700).to_numpy().copy()
+    values[555, 3] = np.inf
+    state = VARIANTS[name].begin(Grid(0.0, 1.0 / RATE, False))
+    with pytest.raises(DataError) as error:
+        for k in range(0, 700, 50):
+            state, _ = VARIANTS[name].advance(state, values[k : k + 50])
+    assert error.value.finding.row == 556
+    assert "channel 3" in error.value.finding.what
+    assert error.value.finding.remedy
+
+
 @pytest.mark.parametrize("name", [n for n in NAMES if n != "none"])
 def test_rates_that_are_no_part(name):
     kind = PREFILTERS[name.split(",")[0]]

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.samples import check_segment
 from strapdown.exceptions import ConfigError
 
 Array = NDArray[np.float64]
@@ -218,9 +219,15 @@ class OutlierDesign:
         state : OutlierState
         screened : Screened
             The same numbers however the record is cut.
+
+        Raises
+        ------
+        DataError
+            A value is not finite.
         """
         from strapdown._kernels.outliers import replace_outliers
 
+        check_segment(values, state.first + state.raw.shape[1])
         new = np.ascontiguousarray(values.T)
         raw = np.hstack([state.raw, new])
         work = np.hstack([state.work, new])

@@ -11,7 +11,7 @@ from strapdown.exceptions import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
-__all__ = ["as_channels", "even_step", "positive_step"]
+__all__ = ["as_channels", "check_segment", "even_step", "positive_step"]
 
 # Stamps that were printed to a tenth of a step still name an even grid.
 JITTER = 0.1
@@ -53,6 +53,34 @@ def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
             remedy="cut the record before it, or fill it with what is known",
         )
     return array
+
+
+def check_segment(values: Array, first: int) -> None:
+    """Every value of a further segment is finite.
+
+    Parameters
+    ----------
+    values : ndarray, (k, c)
+    first : int
+        Number of its first sample since the record began.
+
+    Raises
+    ------
+    DataError
+        One is not: the row, counted from 1 over the whole record, and the channel are named.
+    """
+    # A sum is finite only where everything in it is.
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = values.sum()
+    if np.isfinite(total) or np.isfinite(values).all():
+        return
+    row, channel = (int(i) for i in np.argwhere(~np.isfinite(values))[0])
+    raise DataError(
+        f"channel {channel} has {values[row, channel]}",
+        row=first + row + 1,
+        quantity="values",
+        remedy="end the record before it and begin another, or fill it with what is known",
+    )
 
 
 def positive_step(step: float) -> float:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.samples import check_segment
 from strapdown.prefilter.prefilter import Grid, Portion, Prefilter
 from strapdown.prefilter.report import Changed
 
@@ -33,6 +34,7 @@ class NoPrefilter(Prefilter):
     ) -> tuple[tuple[Grid, int], Portion]:
         """As `Prefilter.advance`."""
         grid, given = state
+        check_segment(values, given)
         after = given + len(values)
         time = grid.time(np.arange(given, after))
         return (grid, after), Portion(time, values.copy(), np.empty((0, 10)), Changed.none())

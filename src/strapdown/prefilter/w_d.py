@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.outliers import REPLACED
+from strapdown.dsp.samples import check_segment
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.signal_filter import SignalFilter, SignalState
@@ -110,10 +111,12 @@ class RobustWd(Prefilter):
         Raises
         ------
         DataError
-            A channel has no noise by which samples could be judged.
+            A value is not finite, or a channel has no noise by which samples could be judged.
         """
         grid, signal = state.grid, self.signal
         factor = whole_factor(self.rate, grid, self.name)
+        seen = state.taken * factor + len(state.waiting) + int(state.taken > 0)
+        check_segment(values, seen)
         held = np.vstack([state.waiting, values])
         noise = state.noise
         if noise is None and (len(held) >= SETTLE or last):

@@ -7,8 +7,10 @@ from scipy.signal import csd, welch
 from strapdown import rotation
 from strapdown.increments import motion_increments
 from strapdown.prefilter import RobustFir, Summed
+from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Coning, Sculling
+from strapdown.simulation.crash_scenarios import find_crash
 from strapdown.simulation.imu import simulate_imu
 from strapdown.tables import DV, GYRO, PHI, imu_table
 
@@ -246,3 +248,13 @@ def test_what_it_says_of_time():
     assert report.delay == pytest.approx(0.107, abs=1e-12)
     assert report.latency == pytest.approx(0.107 + RobustFir().outliers.latency * STEP)
     assert (report.passband, report.stopband) == (25.0, 50.0)
+
+
+@pytest.mark.parametrize("name", ["pole", "two-impacts", "kerb", "door-slam"])
+def test_nothing_of_a_crash_or_a_blow_is_an_outlier(name):
+    """What a vehicle does, by a sensor whose noise is a thousandth of it and whose range ends."""
+    errors = load_sensor("fog-1000").imu_errors
+    imu, _ = simulate_imu(find_crash(name).motion, errors, rate=1000.0, sampling="mean", seed=2)
+    report = Summed().apply(imu).report
+    assert report.replaced.empty
+    assert report.findings == ()
