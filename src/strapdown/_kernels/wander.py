@@ -13,6 +13,9 @@ components in w, which are regular everywhere. The turn of the level in a step i
 axis; what azimuth that leaves after many steps is nothing physical, as place, velocity and attitude
 have it alike.
 
+The error of a run is of the fourth order of the step, but for what the gradients of gravity lack, a
+part in 1e3 of them, of the first: some 1e-11 m/s² for steps of a second in an aircraft.
+
 What is summed over a run, the two quaternions and the Earth's angle, is summed with what rounding
 left of the step before (Kahan 1965), so that a day of steps of a millisecond loses nothing.
 """
