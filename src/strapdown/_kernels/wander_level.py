@@ -28,13 +28,9 @@ from strapdown._kernels.wander import (
     Q_WB,
     SPIN,
     V,
-    curving,
-    earth_axis,
-    level_with,
     put,
-    shift,
-    tilt,
 )
+from strapdown._kernels.wander_geometry import curving, earth_axis, level_with, shift, tilt
 
 # Nearer to a pole than this, in rad, a quaternion does not know the longitude.
 AT_POLE = 4e-16
