@@ -135,6 +135,7 @@ def line_of(text, key):
         (GOOD + "[coarse]\nduration_s = 100.0\n", "duration_s", "longer than the record", "less"),
         (GOOD + "[fine]\ninterval_s = 0\n", "interval_s", "no interval", "1 s"),
         (GOOD + '[fine]\nmechanization = "nde"\n', "mechanization", "no 'nde'", "ned"),
+        (GOOD + '[fine]\nerror_model = "quaternions"\n', None, "wander azimuth", "wander_azimuth"),
         (GOOD + '[fine]\nobserve = ["rate"]\n', "observe", "not what a rest tells", "velocity"),
         (GOOD + '[fine.mechanization]\nheight = "up"\n', "height", "up", "free"),
         (
