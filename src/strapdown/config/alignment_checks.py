@@ -6,10 +6,17 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+import numpy as np
+
+from strapdown.alignment.fine import FineAlignment
+from strapdown.alignment.site import Site
+from strapdown.alignment.stationary import home_of
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.choice import make_choice
 from strapdown.config.crash_checks import Written
 from strapdown.config.slots import SLOTS
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.columns import parse_axes, parse_unit
 from strapdown.sensors.axes_matrix import NAMED_AXES, check_axes_matrix
@@ -69,8 +76,6 @@ class _Checks:
         return self._written is None or self._written.has(*path)
 
     def site(self, spec: AlignmentSpec) -> None:
-        from strapdown.ellipsoids import find_ellipsoid
-
         site = spec.site
         if abs(site.lat_deg) > 90.0:
             remedy = "give degrees from -90 to 90, north positive"
@@ -187,6 +192,21 @@ class _Checks:
                 f"{NOT_BEFORE_FINE[kind]}, and a fine alignment follows",
                 'write kind = "none" in [fine], or take another coarse alignment',
             )
+        if spec.fine.kind != "none":
+            self.told(("fine",), partial(_begun, spec))
+
+
+def _begun(spec: AlignmentSpec) -> None:
+    """Begin the filter of a fine alignment, which refuses parts that do not go together."""
+    site = Site(
+        spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m, find_ellipsoid(spec.site.ellipsoid)
+    )
+    way: FineAlignment = make_choice(spec.fine, SLOTS["fine"], {"ellipsoid": spec.site.ellipsoid})
+    if abs(spec.site.lat_deg) > way.mechanization.latitude_limit_deg:
+        # Whether north can be found there is told by the alignments themselves.
+        return
+    filter_ = ErrorFilter(way.mechanization, way.model(), way.form, way.rule)
+    filter_.begin(home_of(site, 0.0), np.zeros((filter_.model.physical_size,) * 2))
 
 
 #: Coarse alignments that need satellite fixes.

@@ -65,6 +65,7 @@ _PLAIN = (float, int, bool, str)
 #: Units of options whose names do not have them, as the endings of keys; another module's option
 #: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
 UNITS = {
+    "RobustWd.bandwidth": "hz",
     "attenuation": "db",
     "gravity": "m_per_s2",
     "height_limits": "m",
@@ -131,10 +132,16 @@ def options_of(module: type) -> tuple[Option, ...]:
         elif is_dataclass(hint) and isinstance(hint, type) and _all_plain(hint):
             found.append(Option(one.name, one.name, hint, _default(one), group=hint))
         elif _plain(hint):
-            unit = one.metadata.get("unit") or UNITS.get(one.name)
+            unit = _unit(module, one)
             key = f"{one.name}_{unit}" if unit else one.name
             found.append(Option(one.name, key, hint, _default(one)))
     return tuple(found)
+
+
+def _unit(module: type, one: Field[Any]) -> str | None:
+    """The unit of an option whose name does not have it."""
+    own = UNITS.get(f"{module.__name__}.{one.name}")
+    return one.metadata.get("unit") or own or UNITS.get(one.name)
 
 
 def _parts(hint: Any) -> tuple[Any, ...]:

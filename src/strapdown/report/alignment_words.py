@@ -140,8 +140,8 @@ def trust(result: AlignmentResult) -> Trust:
         bound = TWO_SIDED_95 * np.hypot(sd, own)
         for k in ORDER:
             if math.isfinite(off[k]):
-                good = bool(abs(off[k]) <= 1.5 * bound[k])
-                within = "within" if abs(off[k]) <= bound[k] else "outside"
+                good = bool(abs(off[k]) <= 3.0 / TWO_SIDED_95 * bound[k])
+                within = "within" if abs(off[k]) <= bound[k] else "beyond"
                 reasons.append(
                     (
                         good,
@@ -163,7 +163,7 @@ def trust(result: AlignmentResult) -> Trust:
 def _short(result: AlignmentResult, known: bool) -> str:
     parts = []
     if known:
-        parts.append("it is as near to what is known from elsewhere as its bounds say")
+        parts.append("it is within three standard deviations of what is known from elsewhere")
     if result.fine is not None:
         parts.append("coarse and fine alignment agree")
         parts.append("at rest the sensors showed what was expected of them")

@@ -204,9 +204,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
     """The first part of a record, from its first stamp."""
     time = imu.index.to_numpy(dtype=np.float64)
     step = float(np.median(np.diff(time)))
-    # A mean belongs to the interval before its stamp.
-    begin = time[0] - (step if imu.attrs["sampling"] == "mean" else 0.0)
-    kept = time <= begin + duration + 1e-6 * step
+    kept = time <= time[0] + duration + 1e-6 * step
     if kept.sum() < 2:
         raise DataError(
             f"{duration:g} s hold no two samples",

@@ -105,7 +105,9 @@ def test_every_option_that_is_documented_with_a_unit_has_it_in_its_key(slot):
 
 
 def test_what_the_tables_of_units_and_given_fields_name_is_there():
-    names = {f.name for s in SLOTS.values() for e in s.entries.values() for f in fields(e)}
+    entries = [e for s in SLOTS.values() for e in s.entries.values()]
+    names = {f.name for e in entries for f in fields(e)}
+    names |= {f"{e.__name__}.{f.name}" for e in entries for f in fields(e)}
     assert set(UNITS) <= names
     assert set(GIVEN) <= names
     assert set(STAGES) <= set(SLOTS)
@@ -135,6 +137,7 @@ def line_of(text, key):
         (GOOD + "[coarse]\nduration_s = 100.0\n", "duration_s", "longer than the record", "less"),
         (GOOD + "[fine]\ninterval_s = 0\n", "interval_s", "no interval", "1 s"),
         (GOOD + '[fine]\nmechanization = "nde"\n', "mechanization", "no 'nde'", "ned"),
+        (GOOD + '[fine]\nerror_model = "quaternions"\n', None, "wander azimuth", "wander_azimuth"),
         (GOOD + '[fine]\nobserve = ["rate"]\n', "observe", "not what a rest tells", "velocity"),
         (GOOD + '[fine.mechanization]\nheight = "up"\n', "height", "up", "free"),
         (
