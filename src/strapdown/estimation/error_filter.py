@@ -23,7 +23,7 @@ from strapdown.nav_state import NavState
 Array = NDArray[np.float64]
 
 # Part by which noise is larger than what is known of it, so that what is left is no less than zero.
-ROUNDING = 1e-9
+ROUNDING = 1e-6
 # Place of the rotation among the physical errors.
 ROTATION = slice(6, 9)
 
