@@ -153,10 +153,7 @@ class FineAlignment:
             know the heading.
         """
         _check_coarse(coarse, imu)
-        if increments is None:
-            increments = motion_increments(imu)
-        else:
-            increments = _within(increments, imu)
+        increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         start = self._start(increments, site, coarse, begin)
         force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
