@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +21,10 @@ from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 from strapdown.tables import EULER
 
 __all__ = ["rerun_alignment", "write_alignment"]
-
-Progress = Callable[[str, float], None]
-
-
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
 
 
 def rerun_alignment(configuration: dict[str, Any], out: Path) -> Seal:
@@ -50,7 +44,7 @@ def write_alignment(
     *,
     name: str | None = None,
     force: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Seal:
     """Write an alignment as a sealed bundle.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.carried import carried_attitude
-from strapdown.alignment.carry import carry
+from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
@@ -31,10 +29,9 @@ from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 
 __all__ = ["AlignmentResult", "run_alignment"]
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +79,9 @@ class AlignmentResult:
     findings: tuple[Finding, ...]
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
 @one_thread()
 def run_alignment(
-    spec: AlignmentSpec, file: Path | None = None, progress: Progress = _silent
+    spec: AlignmentSpec, file: Path | None = None, progress: Progress = silent
 ) -> AlignmentResult:
     """Read a record and align it.
 
