@@ -124,6 +124,7 @@ class FineAlignment:
         sensors: ImuUncertainty,
         coarse: Alignment,
         progress: Progress | None = None,
+        increments: pd.DataFrame | None = None,
     ) -> FineResult:
         """Align.
 
@@ -137,6 +138,9 @@ class FineAlignment:
             The attitude at the first or at the last sample, within 20 deg of the truth.
         progress : callable, optional
             Told the share that is done.
+        increments : DataFrame, optional
+            A MotionIncrements table that covers the record, as a pre-filter makes it; formed of
+            `imu`, if not given.
 
         Returns
         -------
@@ -149,7 +153,10 @@ class FineAlignment:
             know the heading.
         """
         _check_coarse(coarse, imu)
-        increments = motion_increments(imu)
+        if increments is None:
+            increments = motion_increments(imu)
+        else:
+            increments = _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         start = self._start(increments, site, coarse, begin)
         force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
@@ -258,3 +265,20 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
             quantity="heading",
             remedy="state the heading, or align longer, or use gyros of a better grade",
         )
+
+
+def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
+    """The steps that end after the first sample and no later than the last one."""
+    half = 0.5 * float(increments["dt"].median())
+    ends = increments.index.to_numpy(dtype=np.float64)
+    first, last = float(imu.index[0]), float(imu.index[-1])
+    part: pd.DataFrame = increments[(ends > first + half) & (ends < last + half)]
+    part.attrs = dict(imu.attrs)
+    if part.empty:
+        raise DataError(
+            f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
+            file=imu.attrs.get("source"),
+            quantity="increments",
+            remedy="give those of the same record, or leave them out",
+        )
+    return part
