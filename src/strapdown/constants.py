@@ -11,9 +11,11 @@ __all__ = [
     "ACCEL_SUMS",
     "ACCEL_UNITS",
     "CORTEX_M4F_CYCLES",
+    "DEG_PER_HOUR",
     "GYRO_SUMS",
     "GYRO_UNITS",
     "MAG_UNITS",
+    "MICRO_G",
     "STANDARD_GRAVITY",
     "TIME_UNITS",
     "TWO_SIDED_95",
@@ -21,6 +23,10 @@ __all__ = [
 
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665
+
+#: Factors from rad/s to deg/h and from m/s² to µg, for what is shown to people.
+DEG_PER_HOUR = math.degrees(3600.0)
+MICRO_G = 1e6 / STANDARD_GRAVITY
 
 #: 95 % of a normal distribution lie within so many standard deviations.
 TWO_SIDED_95 = 1.959963984540054

@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 
 # A heading less sure than this is no north.
@@ -22,8 +22,6 @@ MOST_TURN = 0.5  # deg from epoch to epoch
 BEYOND = 4.0
 # Mean square of the innovations over what was expected; by epochs that are not all independent.
 INCONSISTENT = 3.0
-
-DEG_PER_HOUR = np.degrees(1.0) * 3600.0
 
 
 def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:

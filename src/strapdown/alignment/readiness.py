@@ -185,6 +185,6 @@ def _row(
     if reference is not None:
         row = int(np.argmin(np.abs(reference.index.to_numpy() - found.time)))
         true = rotation.euler_from_quaternion(reference[QUATERNION].to_numpy()[row])
-        errors = (found.roll_pitch_heading - true + 180.0) % 360.0 - 180.0
+        errors = rotation.within_half_turn(found.roll_pitch_heading - true)
     numbers = [found.time, *found.roll_pitch_heading, *found.sd_deg, *errors]
     return [*numbers, len(found.findings), ""]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.estimation.resting_sensors import resting_sd
 from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import KeyFigure
@@ -34,8 +34,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-DEG_H = math.degrees(3600.0)
-UG = 1e6 / 9.80665
 ORDER = (2, 1, 0)  # heading first: it is the one that is hard
 MOST_SAID = 2  # of what speaks against an answer, in one sentence
 WORDS = {
@@ -227,8 +225,8 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     part = math.degrees(east / across) if across > 0 else math.inf
     heading = float(result.end.sd_deg[2])
     told = (
-        f"{small(east * DEG_H)} deg/h too much about east, one standard deviation of bias, scale "
-        f"and misalignment, are "
+        f"{small(east * DEG_PER_HOUR)} deg/h too much about east, one standard deviation of bias, "
+        f"scale and misalignment, are "
         f"{small(part)}° of heading at this latitude; all of the heading's standard deviation is "
         f"{small(heading)}°"
     )
@@ -244,9 +242,9 @@ def limits(result: AlignmentResult) -> tuple[tuple[str, str], ...]:
     out.append(
         (
             "The bias of the accelerometers limits roll and pitch",
-            f"{tilt * UG:.3g} µg too much, one standard deviation of bias, scale and misalignment, "
-            f"are {small(math.degrees(tilt / g))}° of tilt; at one attitude no alignment can tell "
-            "them apart.",
+            f"{tilt * MICRO_G:.3g} µg too much, one standard deviation of bias, scale and "
+            f"misalignment, are {small(math.degrees(tilt / g))}° of tilt; at one attitude no "
+            "alignment can tell them apart.",
         )
     )
     return tuple(out)

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.carried import carried_attitude
-from strapdown.alignment.carry import carry
+from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
