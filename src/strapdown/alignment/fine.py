@@ -24,6 +24,7 @@ from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
     Standing,
+    attitude_of_rest,
     home_of,
     measured_standing,
 )
@@ -163,6 +164,7 @@ class FineAlignment:
             ),
             self.form,
             self.rule,
+            rests=True,
         )
         rows = values_of(increments, MOTION)
         time = increments.index.to_numpy(dtype=np.float64)
@@ -176,12 +178,12 @@ class FineAlignment:
                 remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
                 "usual",
             )
+        state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
+        whole = filter_.predict(state, time, rows)[1]
+        home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
-            state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-            whole = filter_.predict(state, time, rows)[1]
-            standing = measured_standing(whole, int(ends[0]), LEAST, filter_.model.gyro_noise)
-        home = home_of(site, begin)
+            standing = measured_standing(whole, home, int(ends[0]), LEAST, filter_.model.gyro_noise)
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = Epochs(filter_)
         epochs.add(state, {})
