@@ -16,6 +16,7 @@ from strapdown import rotation
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L
 from strapdown.alignment.site import Site
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL, Segment
@@ -260,6 +261,36 @@ def _as_independent(values: Array, order: int) -> Array:
         found = np.maximum(found, spread * math.sqrt(length))
         length *= 2
     return found
+
+
+def velocity_of_noise(gyro: Triad, accel: Triad, interval: float, epochs: int) -> float:
+    """Velocity that `measured_standing` finds where a body stands still, by the noise of sensors.
+
+    Parameters
+    ----------
+    gyro, accel : triad, rad/√s and m/s/√s
+    interval : float, s
+        From epoch to epoch.
+    epochs : int
+        How many there are.
+
+    Returns
+    -------
+    float, m/s
+        Of a horizontal axis, with the largest noise of the three.
+    """
+    order, length, most = 3, 1, 0.0
+    signs = [(-1) ** k * math.comb(order, k) for k in range(order + 1)]
+    while epochs // length >= order + LEAST_STRETCHES:
+        # What an impulse at each epoch does to the difference: on velocity, and through tilt.
+        weights = np.repeat(signs, length) / length
+        velocity = np.cumsum(weights[::-1])[::-1]
+        tilt = np.cumsum(velocity[::-1])[::-1] * interval * STANDARD_GRAVITY
+        density = max(accel) ** 2 * velocity @ velocity + max(gyro) ** 2 * tilt @ tilt
+        spread = density * interval / math.comb(2 * order, order) * length
+        most = max(most, math.sqrt(spread))
+        length *= 2
+    return most
 
 
 def _stretches(values: Array, length: int) -> Array:

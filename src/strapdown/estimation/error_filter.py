@@ -26,7 +26,7 @@ from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
 
-# Part by which noise is larger than what is known of it. What is left is a difference of two numbers
+# Part by which noise is larger than what is known of it. What is left is a difference of numbers
 # that are alike to this part, and its correlations must still be right to 1e-9.
 ROUNDING = 1e-5
 # Place of the rotation among the physical errors.

@@ -17,6 +17,7 @@ from stands import with_errors
 from strapdown import rotation
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.site import Site
+from strapdown.exceptions import DataError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, simulate_imu
@@ -97,3 +98,26 @@ def test_a_heading_that_rests_cannot_tell_is_not_learnt_by_correcting_it(lat, se
     # And the tilt from a horizontal bias.
     tilt = np.degrees(unsure.accel.axis("bias")[0] / 9.81)
     assert np.all(found.alignment.sd_deg[:2] > 0.9 * min(tilt, 10.0))
+
+
+def test_noise_of_poor_gyros_is_not_taken_for_a_body_that_moves():
+    made = load_sensor("hg1700")
+    motion = StationaryMotion(500.0, Origin(55.0, 37.0, 200.0), 0.0, 0.0, 60.0)
+    imu, _ = simulate_imu(motion, made.draw(1), rate=20.0, sampling="mean", seed=1)
+    rest = Rest(imu, rotation.quaternion_from_euler([0.0, 0.0, 60.0]), np.zeros(3), np.zeros(3))
+    unsure = ImuUncertainty.of_sensor(made)
+    found = FineAlignment().align(imu, Site(55.0, 37.0, 200.0), unsure, roughly(rest))
+    # Tilt by the noise of the gyros, and velocity by it: in half a minute 0.05 m/s and more.
+    assert found.standing.velocity.max() > 0.05
+    assert not any("does not stand" in one.what for one in found.findings)
+
+
+def test_a_burst_that_a_free_run_does_not_survive_is_named():
+    motion = StationaryMotion(400.0, Origin(55.0, 37.0, 200.0), 0.0, 0.0, 60.0)
+    imu, _ = simulate_imu(motion, SENSOR.draw(1), rate=20.0, sampling="mean", seed=1)
+    rest = Rest(imu, rotation.quaternion_from_euler([0.0, 0.0, 60.0]), np.zeros(3), np.zeros(3))
+    imu.iloc[1000:1010, 1] += 4.0
+    with pytest.raises(DataError, match=r"largest turn is 229.* deg/s at 50") as raised:
+        FineAlignment().align(imu, Site(55.0, 37.0, 200.0), UNCERTAINTY, roughly(rest))
+    assert "gyro_y" in str(raised.value)
+    assert "outliers" in str(raised.value)
