@@ -165,9 +165,7 @@ ALIGNMENT_CASES = (
         options=(*PLACE, "--sensor", "icm-20602"),
     ),
     AlignmentCase("One dead gyro", record(dead)),
-    AlignmentCase(
-        "Outliers in a gyro", record(outliers), "60 samples of gyro x, of 3 deg/s.", code=0
-    ),
+    AlignmentCase("Outliers in a gyro", record(outliers), "60 samples of gyro x, of 3 deg/s."),
     AlignmentCase(
         "Outliers in a gyro, and a pre-filter",
         record(outliers),
@@ -180,9 +178,8 @@ ALIGNMENT_CASES = (
         record(burst),
         "Two seconds of accelerometer y.",
         (*USUAL, "--prefilter", "robust_fir:rate_hz=25"),
-        code=0,
     ),
-    AlignmentCase("Gyros in degrees, named as radians", record(degrees), code=0),
+    AlignmentCase("Gyros in degrees, named as radians", record(degrees)),
     AlignmentCase("Acceleration without gravity", record(no_gravity)),
     AlignmentCase("Gravity upside down", record(upside_down), code=0),
     AlignmentCase("Another place", record(), options=("--lat", "35", *USUAL[2:]), code=0),

@@ -27,6 +27,7 @@ from strapdown.results import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu
+from strapdown.systems.alignment_outliers import saying_outliers
 from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
@@ -133,19 +134,20 @@ def run_alignment(
         imu, report = filtered.imu, filtered.report
     progress("coarse alignment", 0.15)
     part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
-    coarse = coarse_way.align(part, site, sensors, source.gnss)
     fine: FineResult | None = None
-    if fine_way is not None:
-        rest = imu if spec.coarse.duration_s is None else _after(imu, part)
-        if spec.fine.duration_s is not None:
-            rest = _first(rest, spec.fine.duration_s)
-        fine = fine_way.align(
-            rest,
-            site,
-            sensors,
-            coarse,
-            lambda share: progress("fine alignment", 0.25 + 0.3 * share),
-        )
+    with saying_outliers(imu, report):
+        coarse = coarse_way.align(part, site, sensors, source.gnss)
+        if fine_way is not None:
+            rest = imu if spec.coarse.duration_s is None else _after(imu, part)
+            if spec.fine.duration_s is not None:
+                rest = _first(rest, spec.fine.duration_s)
+            fine = fine_way.align(
+                rest,
+                site,
+                sensors,
+                coarse,
+                lambda share: progress("fine alignment", 0.25 + 0.3 * share),
+            )
     progress("carrying the attitude over the record", 0.55)
     answer = coarse if fine is None else fine.alignment
     attitude = carried_attitude(answer, imu, site)
