@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,10 +31,9 @@ from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 
 __all__ = ["AlignmentResult", "run_alignment"]
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,13 +81,9 @@ class AlignmentResult:
     findings: tuple[Finding, ...]
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
 @one_thread()
 def run_alignment(
-    spec: AlignmentSpec, file: Path | None = None, progress: Progress = _silent
+    spec: AlignmentSpec, file: Path | None = None, progress: Progress = silent
 ) -> AlignmentResult:
     """Read a record and align it.
 
