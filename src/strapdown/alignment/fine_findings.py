@@ -11,6 +11,8 @@ from strapdown.alignment.site import Site
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 
+#: Quantity of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+ROCKS = "rocking"
 # A heading less sure than this is no north.
 NO_NORTH = 5.0  # deg
 # Of what it was before, where a filter has found nothing.
@@ -64,7 +66,16 @@ def _north(result: FineResult, site: Site) -> Iterator[Finding]:
 def _stands(result: FineResult) -> Iterator[Finding]:
     velocity = float(result.standing.velocity.max())
     turn = float(np.degrees(result.standing.turn.max()))
-    if velocity > MOST_VELOCITY or turn > MOST_TURN:
+    if velocity <= MOST_VELOCITY and turn > MOST_TURN:
+        yield Finding(
+            f"the body rocks: from epoch to epoch it turns by {turn:.3g} deg, and stays at its "
+            f"place within {velocity:.2g} m/s (one standard deviation): this is in the stated "
+            "uncertainty",
+            file=result.source,
+            quantity=ROCKS,
+            remedy="nothing, where it is known to rock; a body that stands is aligned sooner",
+        )
+    elif velocity > MOST_VELOCITY:
         yield Finding(
             f"the body does not stand: from epoch to epoch it moves by {velocity:.3g} m/s and "
             f"turns by {turn:.3g} deg (one standard deviation)",

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.report.alignment_words import (
-    DEG_H,
-    ORDER,
-    UG,
-    angle_bound,
-    answer_error,
-    prior_sd,
-    small,
-)
+from strapdown.report.alignment_trust import ORDER, answer_error
+from strapdown.report.alignment_values import DEG_H, NOT_KNOWN, UG, angle_bound, instant, small
+from strapdown.report.alignment_words import prior_sd
 from strapdown.report.crash_values import about, plain
 from strapdown.report.document import TableBlock
 from strapdown.systems.alignment_run import AlignmentResult
@@ -46,7 +42,7 @@ def answer_table(result: AlignmentResult) -> TableBlock:
                 else f"{plain(float(known[1][k]), 4)}°"
             )
         rows.append(tuple(row))
-    time = ("time", *(f"{a.time:.6g} s" for a in (result.start, result.end, result.coarse)))
+    time = ("time", *(instant(a.time) for a in (result.start, result.end, result.coarse)))
     rows.append((*time, "") if known is not None else time)
     return TableBlock(tuple(columns), tuple(rows), text=(0,), strong=(0,))
 
@@ -108,14 +104,22 @@ def readiness_table(result: AlignmentResult) -> TableBlock:
                 at = table.index.to_numpy(dtype=np.float64)
                 sizes = table[list(names)].to_numpy().max(axis=1)
                 inside = at[0] <= time * 1.001
-                value = float(np.interp(time, at, sizes)) if inside else float("nan")
-                cells.append(f"{plain(TWO_SIDED_95 * value, 3)}°" if value == value else "–")
+                # Lengths that were tried are evenly apart in their logarithm.
+                where = np.log(np.maximum(at, 1e-9))
+                value = np.exp(np.interp(np.log(time), where, np.log(sizes))) if inside else np.nan
+                cells.append(_bound(TWO_SIDED_95 * value, names[0]))
         rows.append(tuple(cells))
     columns = ["after"]
     for name, table in (("coarse", found.coarse), ("fine", found.fine)):
         if not table.empty:
             columns += [f"{name}: heading ±", f"{name}: level ±"]
     return TableBlock(tuple(columns), tuple(rows), text=(0,))
+
+
+def _bound(half: float, name: str) -> str:
+    if math.isnan(half):
+        return "–"
+    return f"{small(half)}°" if half < (180.0 if name == "heading_sd" else 90.0) else NOT_KNOWN
 
 
 def turn_table(result: AlignmentResult) -> TableBlock | None:
