@@ -88,13 +88,18 @@ def psins(text: str) -> Callable[[Path], None]:
     return lambda folder: (folder / "rest.imu").write_text(text)  # type: ignore[return-value]
 
 
+def _swell(time):
+    """From 50 to 60 s, without a step: its integral is 5 s."""
+    return np.where((time > 50) & (time < 60), np.sin(np.pi * (time - 50) / 10) ** 2, 0.0)
+
+
 def turned(time, values):
-    values[(time > 50) & (time < 55), 2] += np.radians(10.0)
+    values[:, 2] += np.radians(10.0) * _swell(time)
     return values
 
 
 def driven(time, values):
-    values[(time > 50) & (time < 60), 3] += 1.5
+    values[:, 3] += 1.5 * _swell(time)
     return values
 
 

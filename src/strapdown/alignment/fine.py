@@ -126,6 +126,7 @@ class FineAlignment:
         sensors: ImuUncertainty,
         coarse: Alignment,
         progress: Progress | None = None,
+        increments: pd.DataFrame | None = None,
     ) -> FineResult:
         """Align.
 
@@ -139,6 +140,9 @@ class FineAlignment:
             The attitude at the first or at the last sample, within 20 deg of the truth.
         progress : callable, optional
             Told the share that is done.
+        increments : DataFrame, optional
+            A MotionIncrements table that covers the record, as a pre-filter makes it; formed of
+            `imu`, if not given.
 
         Returns
         -------
@@ -153,7 +157,10 @@ class FineAlignment:
             The mechanization has left the range in which it means anything.
         """
         _check_coarse(coarse, imu)
-        increments = motion_increments(imu)
+        if increments is None:
+            increments = motion_increments(imu)
+        else:
+            increments = _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         with telling_record(imu):
             return self._run(imu, increments, begin, site, sensors, coarse, progress)
@@ -276,3 +283,20 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
             quantity="heading",
             remedy="state the heading, or align longer, or use gyros of a better grade",
         )
+
+
+def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
+    """The steps that end after the first sample and no later than the last one."""
+    half = 0.5 * float(increments["dt"].median())
+    ends = increments.index.to_numpy(dtype=np.float64)
+    first, last = float(imu.index[0]), float(imu.index[-1])
+    part: pd.DataFrame = increments[(ends > first + half) & (ends < last + half)]
+    part.attrs = dict(imu.attrs)
+    if part.empty:
+        raise DataError(
+            f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
+            file=imu.attrs.get("source"),
+            quantity="increments",
+            remedy="give those of the same record, or leave them out",
+        )
+    return part

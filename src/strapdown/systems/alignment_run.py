@@ -123,14 +123,14 @@ def run_alignment(
     given = {"ellipsoid": spec.site.ellipsoid}
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
-    imu, report = source.imu, None
+    imu, report, increments = source.imu, None, None
     unread = channel_findings(imu, sensors) if source.truth is None else ()
     # Samples as they come may have any stamps.
     if spec.prefilter.kind != "none":
         prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
         progress("pre-filter", 0.08)
         filtered = prefilter.apply(imu)
-        imu, report = filtered.imu, filtered.report
+        imu, report, increments = filtered.imu, filtered.report, filtered.increments
     progress("coarse alignment", 0.15)
     part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
     fine: FineResult | None = None
@@ -146,6 +146,7 @@ def run_alignment(
                 sensors,
                 coarse,
                 lambda share: progress("fine alignment", 0.25 + 0.3 * share),
+                increments,
             )
     progress("carrying the attitude over the record", 0.55)
     answer = coarse if fine is None else fine.alignment
