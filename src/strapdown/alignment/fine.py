@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.claims import refuse_false_claims
 from strapdown.alignment.fine_epochs import (
     MOST_HEADING,
     epoch_ends,
@@ -19,6 +20,7 @@ from strapdown.alignment.fine_epochs import (
     settled,
 )
 from strapdown.alignment.fine_findings import fine_findings
+from strapdown.alignment.fine_record import telling_record
 from strapdown.alignment.fine_result import Epochs, FineResult
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
@@ -150,12 +152,27 @@ class FineAlignment:
         Raises
         ------
         DataError
-            The record is too short, or the coarse alignment belongs to another instant or does not
-            know the heading.
+            The record is too short or has gaps, the coarse alignment belongs to another instant or
+            does not know the heading, or the sensors' errors are beyond a linear filter.
+        DivergenceError
+            The mechanization has left the range in which it means anything.
         """
         _check_coarse(coarse, imu)
         increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
+        with telling_record(imu):
+            return self._run(imu, increments, begin, site, sensors, coarse, progress)
+
+    def _run(
+        self,
+        imu: pd.DataFrame,
+        increments: pd.DataFrame,
+        begin: float,
+        site: Site,
+        sensors: ImuUncertainty,
+        coarse: Alignment,
+        progress: Progress | None,
+    ) -> FineResult:
         start = self._start(increments, site, coarse, begin)
         force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
         rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
@@ -211,6 +228,7 @@ class FineAlignment:
             state=state,
             source=imu.attrs.get("source"),
         )
+        refuse_false_claims(result, site)
         return replace(result, findings=fine_findings(result, site))
 
     def _start(

@@ -12,6 +12,8 @@ from strapdown.alignment.stationary import velocity_of_noise
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 
+#: Quantity of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+ROCKS = "rocking"
 # A heading less sure than this is no north.
 NO_NORTH = 5.0  # deg
 # Of what it was before, where a filter has found nothing.
@@ -69,7 +71,17 @@ def _stands(result: FineResult) -> Iterator[Finding]:
     noise = velocity_of_noise(
         model.gyro_noise, model.accel_noise, result.interval, len(result.history) - 1
     )
-    if velocity > max(MOST_VELOCITY, OVER_NOISE * noise) or turn > MOST_TURN:
+    moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
+    if not moves and turn > MOST_TURN:
+        yield Finding(
+            f"the body rocks: from epoch to epoch it turns by {turn:.3g} deg, and stays at its "
+            f"place within {velocity:.2g} m/s (one standard deviation): this is in the stated "
+            "uncertainty",
+            file=result.source,
+            quantity=ROCKS,
+            remedy="nothing, where it is known to rock; a body that stands is aligned sooner",
+        )
+    elif moves:
         yield Finding(
             f"the body does not stand: from epoch to epoch it moves by {velocity:.3g} m/s and "
             f"turns by {turn:.3g} deg (one standard deviation)",

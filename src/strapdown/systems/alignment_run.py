@@ -25,6 +25,7 @@ from strapdown.results import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu
+from strapdown.systems.alignment_health import channel_findings
 from strapdown.systems.alignment_outliers import saying_outliers
 from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
@@ -59,8 +60,10 @@ class AlignmentResult:
     manoeuvres : tuple of Manoeuvre
         What a turn and a further rest would make known; empty without a fine alignment.
     inputs : tuple of InputFiles
+    unread : tuple of Finding
+        Of channels that read nothing for a while.
     findings : tuple of Finding
-        Of reading, pre-filter, coarse and fine alignment, in this order.
+        Of reading, channels, pre-filter, coarse and fine alignment, in this order.
     """
 
     spec: AlignmentSpec
@@ -77,6 +80,7 @@ class AlignmentResult:
     readiness: AlignmentReadiness
     manoeuvres: tuple[Manoeuvre, ...]
     inputs: tuple[InputFiles, ...]
+    unread: tuple[Finding, ...]
     findings: tuple[Finding, ...]
 
 
@@ -119,6 +123,7 @@ def run_alignment(
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
     imu, report, increments = source.imu, None, None
+    unread = channel_findings(imu, sensors) if source.truth is None else ()
     # Samples as they come may have any stamps.
     if spec.prefilter.kind != "none":
         prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
@@ -166,6 +171,7 @@ def run_alignment(
     of_filter = () if report is None else report.findings
     findings = [
         *source.findings,
+        *unread,
         *of_filter,
         *coarse.findings,
         *(() if fine is None else fine.findings),
@@ -185,6 +191,7 @@ def run_alignment(
         readiness=readiness,
         manoeuvres=manoeuvres,
         inputs=(*files, *source.inputs),
+        unread=unread,
         findings=tuple(dict.fromkeys(findings)),
     )
 

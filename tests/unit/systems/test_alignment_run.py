@@ -11,7 +11,7 @@ from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.site import Site
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.exceptions import DataError
-from strapdown.report.alignment_words import answer_error, trust
+from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
