@@ -55,8 +55,8 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
     rows = []
     gyro, accel = prior_sd(result)
     for name, bias, sd, prior, factor, unit in (
-        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, "deg/h"),
-        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, "µg"),
+        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_PER_HOUR, "deg/h"),
+        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, MICRO_G, "µg"),
     ):
         assert bias is not None and sd is not None
         for k, axis in enumerate(("x, forward", "y, right", "z, down")):

@@ -114,8 +114,8 @@ def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
     part = math.degrees(east / across) if across > 0 else math.inf
     told = (
         f"{small(east * DEG_PER_HOUR)} deg/h too much about east, one standard deviation of bias, "
-        f"scale and misalignment, are {small(part)}° of heading at this latitude; all of the heading's standard deviation is "
-        f"{small(heading)}°"
+        f"scale and misalignment, are {small(part)}° of heading at this latitude; all of the "
+        f"heading's standard deviation is {small(heading)}°"
     )
     if coarse.heading_given and heading < 0.7 * part:
         return ("What was stated of the heading limits it", f"{told}: state it better.")
