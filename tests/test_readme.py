@@ -13,12 +13,13 @@ RUNS = re.findall(r"```text\n\$ strapdown (.*?)\n…\n(.*?)```", README, re.S)
 
 
 def test_there_are_runs_to_hold():
-    assert len(RUNS) == 2
+    assert len(RUNS) == 3
 
 
-@pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash"])
+@pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash", "align"])
 def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch, sketched):
     words = shlex.split(command.replace("\\\n", " "))
+    (tmp_path / "docs").symlink_to(Path(__file__).parent.parent / "docs")
     monkeypatch.chdir(tmp_path)
     if words[0] == "crash":
         assert "    strapdown simulate pole --out records" in README

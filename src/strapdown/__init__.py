@@ -28,6 +28,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from strapdown.alignment.fine import FineAlignment
+    from strapdown.alignment.site import Site
     from strapdown.crash.entry import Entry
     from strapdown.crash.monte_carlo import sample_paths
     from strapdown.evaluation.trajectory_differences import trajectory_differences
@@ -38,8 +40,14 @@ if TYPE_CHECKING:
     from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.formats.trajectory_writers import write_trajectory
     from strapdown.increments import motion_increments
-    from strapdown.mechanization import NavTracker, NorthEastDown, run_mechanization
+    from strapdown.mechanization import (
+        NavTracker,
+        NorthEastDown,
+        WanderAzimuth,
+        run_mechanization,
+    )
     from strapdown.nav_state import NavState
+    from strapdown.report.alignment import align
     from strapdown.report.attitude import write_attitude
     from strapdown.report.crash_case import reconstruct_case
     from strapdown.report.reproduction import reproduce
@@ -47,6 +55,9 @@ if TYPE_CHECKING:
     from strapdown.report.verify import verify
     from strapdown.sensors.assumed import Assumed
     from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
+    from strapdown.sensors.imu_health import check_imu_channels
+    from strapdown.sensors.imu_uncertainty import ImuUncertainty
+    from strapdown.sensors.redundant_units import vote_units
     from strapdown.sensors.triad_uncertainty import TriadUncertainty
     from strapdown.systems.attitude_bench import bench_attitude
     from strapdown.systems.crash_reconstruction import reconstruct_crash
@@ -57,14 +68,20 @@ __all__ = [
     "Assumed",
     "CrashUnit",
     "Entry",
+    "FineAlignment",
+    "ImuUncertainty",
     "Mounting",
     "NavState",
     "NavTracker",
     "NorthEastDown",
     "RecordedTriad",
+    "Site",
     "TriadUncertainty",
+    "WanderAzimuth",
     "__version__",
+    "align",
     "bench_attitude",
+    "check_imu_channels",
     "motion_increments",
     "read_crash_record",
     "read_log",
@@ -79,12 +96,20 @@ __all__ = [
     "summarise_differences",
     "trajectory_differences",
     "verify",
+    "vote_units",
     "write_attitude",
     "write_trajectory",
 ]
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
+    "vote_units": "strapdown.sensors.redundant_units",
+    "ImuUncertainty": "strapdown.sensors.imu_uncertainty",
+    "check_imu_channels": "strapdown.sensors.imu_health",
+    "align": "strapdown.report.alignment",
+    "WanderAzimuth": "strapdown.mechanization",
+    "Site": "strapdown.alignment.site",
+    "FineAlignment": "strapdown.alignment.fine",
     "Assumed": "strapdown.sensors.assumed",
     "CrashUnit": "strapdown.sensors.crash_unit",
     "Entry": "strapdown.crash.entry",

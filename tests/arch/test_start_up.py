@@ -33,9 +33,11 @@ def test_dir_and_an_unknown_name_load_nothing_either():
     "arguments",
     [
         ["--help"],
+        ["align", "--help"],
         ["attitude", "--help"],
         ["reproduce", "--help"],
         ["crash", "--help"],
+        ["init", "align", "--help"],
         ["init", "crash", "--help"],
         ["verify", "--help"],
         ["--version"],

@@ -132,17 +132,20 @@ def exponential(f, decay, dt, phi, work):
     for i in range(n):
         for j in range(n):
             phi[i, j] = 1.0 if i == j else 0.0
-    # Of Horner's scheme 1 + F dt (1 + F dt/2 (1 + F dt/3)) the inner brackets.
+    # Of Horner's scheme 1 + F dt (1 + F dt/2 (1 + F dt/3)) the inner brackets. Rows are added to
+    # rows, which a processor does several numbers at a time.
     for order in range(3, 0, -1):
         part = dt / order
         for i in range(CORE):
-            for j in range(n):
-                total = 0.0
-                for m in range(CORE):
-                    total += f[i, m] * phi[m, j]
-                if j >= CORE:
-                    total += f[i, j] * phi[j, j]
-                work[i, j] = part * total
+            for j in range(CORE):
+                work[i, j] = 0.0
+            for j in range(CORE, n):
+                work[i, j] = part * f[i, j] * phi[j, j]
+            for m in range(CORE):
+                weight = part * f[i, m]
+                if weight != 0.0:
+                    for j in range(n):
+                        work[i, j] += weight * phi[m, j]
         for i in range(CORE):
             for j in range(n):
                 phi[i, j] = work[i, j]
@@ -162,25 +165,27 @@ def compose_transition(step, added, phi, q, work):
     n = phi.shape[0]
     for i in range(CORE):
         for j in range(n):
-            total = 0.0
-            for m in range(n):
-                total += step[i, m] * phi[m, j]
-            work[i, j] = total
+            work[i, j] = 0.0
+        for m in range(n):
+            weight = step[i, m]
+            if weight != 0.0:
+                for j in range(n):
+                    work[i, j] += weight * phi[m, j]
     for i in range(CORE):
         for j in range(n):
             phi[i, j] = work[i, j]
     for i in range(CORE, n):
         for j in range(n):
             phi[i, j] *= step[i, i]
+            work[i, j] = step[i, i] * q[i, j]
     for i in range(CORE):
         for j in range(n):
-            total = 0.0
-            for m in range(n):
-                total += step[i, m] * q[m, j]
-            work[i, j] = total
-    for i in range(CORE, n):
-        for j in range(n):
-            work[i, j] = step[i, i] * q[i, j]
+            work[i, j] = 0.0
+        for m in range(n):
+            weight = step[i, m]
+            if weight != 0.0:
+                for j in range(n):
+                    work[i, j] += weight * q[m, j]
     for i in range(n):
         for j in range(i, n):
             total = added[i, j]

@@ -87,6 +87,7 @@ def carry(
         accel_bias=alignment.accel_bias,
         gyro_bias_sd=alignment.gyro_bias_sd,
         accel_bias_sd=alignment.accel_bias_sd,
+        heading_given=alignment.heading_given,
         measured_latitude_deg=alignment.measured_latitude_deg,
         measured_latitude_sd_deg=alignment.measured_latitude_sd_deg,
         findings=alignment.findings,

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine_epochs import (
     MOST_HEADING,
@@ -27,6 +28,7 @@ from strapdown.alignment.stationary import (
     attitude_of_rest,
     home_of,
     measured_standing,
+    without_steady_turn,
 )
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
@@ -125,6 +127,7 @@ class FineAlignment:
         sensors: ImuUncertainty,
         coarse: Alignment,
         progress: Progress | None = None,
+        increments: pd.DataFrame | None = None,
     ) -> FineResult:
         """Align.
 
@@ -138,6 +141,9 @@ class FineAlignment:
             The attitude at the first or at the last sample, within 20 deg of the truth.
         progress : callable, optional
             Told the share that is done.
+        increments : DataFrame, optional
+            A MotionIncrements table that covers the record, as a pre-filter makes it; formed of
+            `imu`, if not given.
 
         Returns
         -------
@@ -150,7 +156,7 @@ class FineAlignment:
             know the heading.
         """
         _check_coarse(coarse, imu)
-        increments = motion_increments(imu)
+        increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         start = self._start(increments, site, coarse, begin)
         force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
@@ -179,7 +185,9 @@ class FineAlignment:
                 "usual",
             )
         state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-        whole = _free_run(filter_, state, time, rows, imu.attrs.get("source"))
+        earth = rotation.rotate(rotation.conjugate(start.q_nb), site.earth_rate)
+        steady = without_steady_turn(rows, earth)
+        whole = _free_run(filter_, state, time, steady, imu.attrs.get("source"))
         home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
@@ -282,3 +290,20 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
             quantity="heading",
             remedy="state the heading, or align longer, or use gyros of a better grade",
         )
+
+
+def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
+    """The steps that end after the first sample and no later than the last one."""
+    half = 0.5 * float(increments["dt"].median())
+    ends = increments.index.to_numpy(dtype=np.float64)
+    first, last = float(imu.index[0]), float(imu.index[-1])
+    part: pd.DataFrame = increments[(ends > first + half) & (ends < last + half)]
+    part.attrs = dict(imu.attrs)
+    if part.empty:
+        raise DataError(
+            f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
+            file=imu.attrs.get("source"),
+            quantity="increments",
+            remedy="give those of the same record, or leave them out",
+        )
+    return part

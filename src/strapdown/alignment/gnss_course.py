@@ -145,6 +145,7 @@ class GnssCourse(CoarseAlignment):
             float(imu.index[-1]),
             rotation.quaternion_from_dcm(C_end),
             covariance,
+            heading_given=True,
             findings=findings,
         )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import pandas as pd
@@ -72,6 +72,7 @@ class KnownHeading(CoarseAlignment):
         DataError
             As `rest_level.level_at_rest`.
         """
-        return level_at_rest(
+        found = level_at_rest(
             self.name, imu, site, sensors, self.heading_deg, math.radians(self.sd_deg)
         )
+        return replace(found, heading_given=True)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import Seal, to_json, write_bundle
-from strapdown.config.alignment_file import alignment_spec
+from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.config.alignment_file import alignment_spec, read_alignment_spec
 from strapdown.report.alignment_document import (
     CONVENTIONS,
     alignment_charts,
@@ -22,15 +21,42 @@ from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 from strapdown.tables import EULER
 
-__all__ = ["rerun_alignment", "write_alignment"]
-
-Progress = Callable[[str, float], None]
+__all__ = ["align", "rerun_alignment", "write_alignment"]
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
+def align(
+    file: str | Path, out: str | Path, *, force: bool = False, progress: Progress = silent
+) -> Seal:
+    """Align a body as the file of an alignment says, and write the report as a sealed bundle.
+
+    Parameters
+    ----------
+    file : str or Path
+        The alignment, in TOML.
+    out : str or Path
+        Folder to make.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        The file does not hold together, or `out` may not be written.
+    DataError
+        The record cannot be aligned.
+    """
+    check_destination(Path(out), force)
+    result = run_alignment(read_alignment_spec(file), Path(file), progress)
+    return write_alignment(result, out, force=force, progress=progress)
 
 
 def rerun_alignment(configuration: dict[str, Any], out: Path) -> Seal:
@@ -50,7 +76,7 @@ def write_alignment(
     *,
     name: str | None = None,
     force: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> Seal:
     """Write an alignment as a sealed bundle.
 

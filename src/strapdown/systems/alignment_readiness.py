@@ -126,9 +126,11 @@ def _fine(
 ) -> pd.DataFrame:
     if fine is None:
         return _table(np.empty(0), np.empty((0, 6)))
-    time = fine.history.index.to_numpy(dtype=np.float64)
-    sd = fine.history[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
-    off = _off(fine.history[EULER].to_numpy(dtype=np.float64), time, known) + offset
+    # The first row is what was assumed before the first epoch.
+    history = fine.history.iloc[1:]
+    time = history.index.to_numpy(dtype=np.float64)
+    sd = history[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
+    off = _off(history[EULER].to_numpy(dtype=np.float64), time, known) + offset
     return _table(time - begin, np.hstack([sd, off]))
 
 

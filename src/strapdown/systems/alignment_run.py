@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -27,14 +26,14 @@ from strapdown.results import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu
+from strapdown.systems.alignment_outliers import saying_outliers
 from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
 
 __all__ = ["AlignmentResult", "run_alignment"]
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +81,9 @@ class AlignmentResult:
     findings: tuple[Finding, ...]
 
 
-def _silent(stage: str, share: float) -> None:
-    """Report progress to nobody."""
-
-
 @one_thread()
 def run_alignment(
-    spec: AlignmentSpec, file: Path | None = None, progress: Progress = _silent
+    spec: AlignmentSpec, file: Path | None = None, progress: Progress = silent
 ) -> AlignmentResult:
     """Read a record and align it.
 
@@ -124,28 +119,30 @@ def run_alignment(
     given = {"ellipsoid": spec.site.ellipsoid}
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
-    imu, report = source.imu, None
+    imu, report, increments = source.imu, None, None
     # Samples as they come may have any stamps.
     if spec.prefilter.kind != "none":
         prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
         progress("pre-filter", 0.08)
         filtered = prefilter.apply(imu)
-        imu, report = filtered.imu, filtered.report
+        imu, report, increments = filtered.imu, filtered.report, filtered.increments
     progress("coarse alignment", 0.15)
     part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
-    coarse = coarse_way.align(part, site, sensors, source.gnss)
     fine: FineResult | None = None
-    if fine_way is not None:
-        rest = imu if spec.coarse.duration_s is None else _after(imu, part)
-        if spec.fine.duration_s is not None:
-            rest = _first(rest, spec.fine.duration_s)
-        fine = fine_way.align(
-            rest,
-            site,
-            sensors,
-            coarse,
-            lambda share: progress("fine alignment", 0.25 + 0.3 * share),
-        )
+    with saying_outliers(imu, report):
+        coarse = coarse_way.align(part, site, sensors, source.gnss)
+        if fine_way is not None:
+            rest = imu if spec.coarse.duration_s is None else _after(imu, part)
+            if spec.fine.duration_s is not None:
+                rest = _first(rest, spec.fine.duration_s)
+            fine = fine_way.align(
+                rest,
+                site,
+                sensors,
+                coarse,
+                lambda share: progress("fine alignment", 0.25 + 0.3 * share),
+                increments,
+            )
     progress("carrying the attitude over the record", 0.55)
     answer = coarse if fine is None else fine.alignment
     attitude = carried_attitude(answer, imu, site)

@@ -21,6 +21,7 @@ from strapdown.estimation.error_models import ERROR_MODELS
 from strapdown.estimation.quaternion_model import QuaternionModel
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
+from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, GYRO
@@ -190,3 +191,22 @@ def test_what_cannot_be_done_is_refused(rest):
     ):
         with pytest.raises(ConfigError, match=word):
             FineAlignment(**options)
+
+
+@pytest.mark.parametrize("name", ["robust_fir", "summed"])
+def test_increments_of_a_prefilter_are_taken(rest, found, name):
+    filtered = PREFILTERS[name](rate=10.0).apply(rest.imu)
+    first = roughly(rest)
+    begin = type(first)(first.method, float(filtered.imu.index[0]), first.q_nb, first.covariance)
+    other = FineAlignment().align(
+        filtered.imu, SITE, UNCERTAINTY, begin, increments=filtered.increments
+    )
+    apart = error_of(other.alignment, rest) - error_of(found.alignment, rest)
+    # The same noise, but for what a low-pass leaves off at the ends of 200 s: a tenth of it.
+    sd = np.sqrt(np.diagonal(found.alignment.covariance))
+    assert np.all(np.abs(apart) < 0.2 * sd)
+    assert len(filtered.increments) < 0.25 * len(rest.imu)
+    with pytest.raises(DataError, match="do not cover"):
+        late = filtered.increments.copy()
+        late.index = late.index + 1e4
+        FineAlignment().align(filtered.imu, SITE, UNCERTAINTY, begin, increments=late)
