@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.claims import refuse_false_claims
 from strapdown.alignment.fine_epochs import (
@@ -29,6 +30,7 @@ from strapdown.alignment.stationary import (
     attitude_of_rest,
     home_of,
     measured_standing,
+    without_steady_turn,
 )
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
@@ -200,7 +202,9 @@ class FineAlignment:
                 "usual",
             )
         state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-        whole = _free_run(filter_, state, time, rows, imu.attrs.get("source"))
+        earth = rotation.rotate(rotation.conjugate(start.q_nb), site.earth_rate)
+        steady = without_steady_turn(rows, earth)
+        whole = _free_run(filter_, state, time, steady, imu.attrs.get("source"))
         home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:

@@ -204,6 +204,42 @@ def attitude_of_rest(segment: Segment) -> Array:
     return rotation.quaternion_from_dcm(level.T @ rotation.dcm_from_quaternion(mean))
 
 
+def without_steady_turn(rows: Array, earth: Array) -> Array:
+    """Motion increments less the mean rate, where that makes the body stay as it stands.
+
+    A run without observations over gyros with a bias of degrees a minute turns over. Of a body that
+    cones the mean rate is no bias: by its rates as they are it comes back to its attitude.
+
+    Parameters
+    ----------
+    rows : ndarray, (k, 10)
+    earth : ndarray, (3,), rad/s
+        Rate of the Earth in body axes.
+
+    Returns
+    -------
+    ndarray, (k, 10)
+    """
+    length = float(rows[:, 0].sum())
+    excess = rows[:, 1:4].sum(axis=0) / length - earth
+    steady = rows.copy()
+    steady[:, 1:4] -= excess * rows[:, :1]
+    whole_turn = float(np.sqrt(excess @ excess)) * length > 2.0 * math.pi
+    return steady if whole_turn or 2.0 * _turned(steady) < _turned(rows) else rows
+
+
+def _turned(rows: Array) -> float:
+    """Angle between the attitudes before and after, rad."""
+    from strapdown._kernels.inertial_sums import inertial_sums
+
+    n = len(rows)
+    turned = np.empty((n + 1, 4))
+    sums = np.zeros((1, 3, 3)), np.zeros((1, 3, 3, 3)), np.zeros((1, 3, 3, 3))
+    inertial_sums(rows, np.array([n - 1]), turned, np.empty((n + 1, 3)), np.empty((1, 3)), *sums)
+    away = rotation.rotation_vector_from_quaternion(turned[-1])
+    return float(np.sqrt(away @ away))
+
+
 def measured_standing(
     segment: Segment, home: NavState, every: int, least: Standing, gyro_noise: Triad
 ) -> Standing:
