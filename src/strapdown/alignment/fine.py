@@ -19,7 +19,7 @@ from strapdown.alignment.fine_epochs import (
     settled,
 )
 from strapdown.alignment.fine_findings import fine_findings
-from strapdown.alignment.fine_result import Epochs, FineResult
+from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
@@ -153,10 +153,7 @@ class FineAlignment:
             know the heading.
         """
         _check_coarse(coarse, imu)
-        if increments is None:
-            increments = motion_increments(imu)
-        else:
-            increments = _within(increments, imu)
+        increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         start = self._start(increments, site, coarse, begin)
         force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
@@ -200,8 +197,8 @@ class FineAlignment:
                 progress((state.time - begin) / (float(time[-1]) - begin))
         used = slice(0, int(ends[-1]))
         result = FineResult(
-            alignment=epochs.alignment(state),
-            at_start=self._carried_back(filter_, epochs, state, increments.iloc[used]),
+            alignment=alignment_of(filter_, state),
+            at_start=self._carried_back(filter_, state, increments.iloc[used]),
             history=epochs.history(),
             innovations=epochs.innovations(),
             standing=standing,
@@ -224,13 +221,8 @@ class FineAlignment:
         if abs(coarse.time - begin) <= slack:
             return replace(home, time=begin)
         if abs(coarse.time - end) <= slack:
-            back = run_mechanization(
-                replace(self.mechanization, height="held"),
-                replace(home, time=end),
-                increments,
-                backward=True,
-            )
-            return replace(home, time=begin, q_nb=back.end.q_nb)
+            back = self._backward(replace(home, time=end), increments)
+            return replace(home, time=begin, q_nb=back.q_nb)
         raise DataError(
             f"the coarse alignment holds at {coarse.time:.9g} s, and the record goes from "
             f"{begin:.9g} to {end:.9g} s",
@@ -240,19 +232,21 @@ class FineAlignment:
         )
 
     def _carried_back(
-        self, filter_: ErrorFilter, epochs: Epochs, state: FilterState, increments: pd.DataFrame
+        self, filter_: ErrorFilter, state: FilterState, increments: pd.DataFrame
     ) -> Alignment:
         """The attitude at the first sample, by the gyros without their drifts."""
         clean = increments.copy()
         clean[list(MOTION)] = filter_.compensated(state, values_of(increments, MOTION))
         clean.attrs = dict(increments.attrs)
-        last = epochs.alignment(state)
+        last = alignment_of(filter_, state)
         end = filter_.mechanization.nav_state(state.mechanization, state.time)
-        still = replace(end, v_n=np.zeros(3))
-        back = run_mechanization(
-            replace(self.mechanization, height="held"), still, clean, backward=True
-        )
-        return replace(last, time=back.end.time, q_nb=back.end.q_nb)
+        back = self._backward(replace(end, v_n=np.zeros(3)), clean)
+        return replace(last, time=back.time, q_nb=back.q_nb)
+
+    def _backward(self, end: NavState, increments: pd.DataFrame) -> NavState:
+        """The state before the first increment, of a body that stands after the last."""
+        held = replace(self.mechanization, height="held")
+        return run_mechanization(held, end, increments, backward=True).end
 
 
 def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
