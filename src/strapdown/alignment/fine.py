@@ -24,17 +24,18 @@ from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
     Standing,
+    attitude_of_rest,
     home_of,
     measured_standing,
 )
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
-from strapdown.estimation.error_model import ErrorModel
+from strapdown.estimation.error_model import ErrorModel, Segment
 from strapdown.estimation.resting_sensors import resting_states
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.exceptions import ConfigError, DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.mechanization.mechanization import Mechanization
@@ -167,6 +168,7 @@ class FineAlignment:
             ),
             self.form,
             self.rule,
+            rests=True,
         )
         rows = values_of(increments, MOTION)
         time = increments.index.to_numpy(dtype=np.float64)
@@ -180,12 +182,12 @@ class FineAlignment:
                 remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
                 "usual",
             )
+        state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
+        whole = _free_run(filter_, state, time, rows, imu.attrs.get("source"))
+        home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
-            state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-            whole = filter_.predict(state, time, rows)[1]
-            standing = measured_standing(whole, int(ends[0]), LEAST, filter_.model.gyro_noise)
-        home = home_of(site, begin)
+            standing = measured_standing(whole, home, int(ends[0]), LEAST, filter_.model.gyro_noise)
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = Epochs(filter_)
         epochs.add(state, {})
@@ -247,6 +249,28 @@ class FineAlignment:
         """The state before the first increment, of a body that stands after the last."""
         held = replace(self.mechanization, height="held")
         return run_mechanization(held, end, increments, backward=True).end
+
+
+def _free_run(
+    filter_: ErrorFilter, state: FilterState, time: Array, rows: Array, source: str | None
+) -> Segment:
+    """The whole record without observations."""
+    try:
+        return filter_.predict(state, time, rows)[1]
+    except DivergenceError as error:
+        rate = rows[:, 1:4] / rows[:, :1]
+        away = np.abs(rate - np.median(rate, axis=0))
+        row, axis = (int(k) for k in np.unravel_index(int(away.argmax()), away.shape))
+        raise DataError(
+            "the record is not one of a body at rest: reckoned without observations it leaves the "
+            f"ground; the largest turn is {np.degrees(rate[row, axis]):.4g} deg/s at "
+            f"{time[row]:.9g} s",
+            file=source,
+            row=row + 1,
+            quantity=GYRO[axis],
+            remedy="cut the record to where the body stands; filter a burst of outliers first "
+            "(prefilter robust_fir or summed); check the units",
+        ) from error
 
 
 def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:

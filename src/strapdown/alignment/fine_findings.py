@@ -8,6 +8,7 @@ import numpy as np
 
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
+from strapdown.alignment.stationary import velocity_of_noise
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 
@@ -18,6 +19,8 @@ UNCHANGED = 0.5
 # What people, wind and an engine do to a parked vehicle stays below.
 MOST_VELOCITY = 0.05  # m/s
 MOST_TURN = 0.5  # deg from epoch to epoch
+# Over what the noise of the sensors makes of a body that stands still.
+OVER_NOISE = 3.0
 # Of a normal distribution one in 16 000 is beyond four standard deviations.
 BEYOND = 4.0
 # Mean square of the innovations over what was expected; by epochs that are not all independent.
@@ -62,7 +65,11 @@ def _north(result: FineResult, site: Site) -> Iterator[Finding]:
 def _stands(result: FineResult) -> Iterator[Finding]:
     velocity = float(result.standing.velocity.max())
     turn = float(np.degrees(result.standing.turn.max()))
-    if velocity > MOST_VELOCITY or turn > MOST_TURN:
+    model = result.filter.model
+    noise = velocity_of_noise(
+        model.gyro_noise, model.accel_noise, result.interval, len(result.history) - 1
+    )
+    if velocity > max(MOST_VELOCITY, OVER_NOISE * noise) or turn > MOST_TURN:
         yield Finding(
             f"the body does not stand: from epoch to epoch it moves by {velocity:.3g} m/s and "
             f"turns by {turn:.3g} deg (one standard deviation)",

@@ -141,6 +141,7 @@ def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: floa
             part = rows[k * each : (k + 1) * each]
             time = state.time + STEP * np.arange(1.0, each + 1)
             state, _ = filter_.predict(state, np.asarray(time), part)
+    home = replace(home, q_nb=q_nb)
     each = round(result.interval / STEP)
     rows = np.tile(_resting(site, q_nb), (each, 1))
     for _ in range(max(1, math.floor(rest / result.interval))):
