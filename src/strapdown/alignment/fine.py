@@ -42,7 +42,7 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, MOTION
-from strapdown.tables.checks import is_number, values_of
+from strapdown.tables.checks import is_number, source_of, values_of
 
 __all__ = ["FineAlignment"]
 
@@ -177,13 +177,13 @@ class FineAlignment:
             raise DataError(
                 f"a record of {time[-1] - begin:.6g} s has {ends.size} epochs of "
                 f"{self.interval:g} s",
-                file=imu.attrs.get("source"),
+                file=source_of(imu),
                 quantity="time",
                 remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
                 "usual",
             )
         state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-        whole = _free_run(filter_, state, time, rows, imu.attrs.get("source"))
+        whole = _free_run(filter_, state, time, rows, source_of(imu))
         home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
@@ -209,7 +209,7 @@ class FineAlignment:
             prior_heading_sd_deg=math.degrees(prior_heading_sd(coarse)),
             filter=filter_,
             state=state,
-            source=imu.attrs.get("source"),
+            source=source_of(imu),
         )
         return replace(result, findings=fine_findings(result, site))
 
@@ -228,7 +228,7 @@ class FineAlignment:
         raise DataError(
             f"the coarse alignment holds at {coarse.time:.9g} s, and the record goes from "
             f"{begin:.9g} to {end:.9g} s",
-            file=increments.attrs.get("source"),
+            file=source_of(increments),
             quantity="time",
             remedy="give the attitude at its first or at its last sample",
         )
@@ -279,7 +279,7 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
         raise DataError(
             f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard "
             f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="heading",
             remedy="state the heading, or align longer, or use gyros of a better grade",
         )
@@ -295,7 +295,7 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     if part.empty:
         raise DataError(
             f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="increments",
             remedy="give those of the same record, or leave them out",
         )
