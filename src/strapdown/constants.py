@@ -14,6 +14,7 @@ __all__ = [
     "DEG_PER_HOUR",
     "GYRO_SUMS",
     "GYRO_UNITS",
+    "MAD_TO_SD",
     "MAG_UNITS",
     "MICRO_G",
     "STANDARD_GRAVITY",
@@ -30,6 +31,10 @@ MICRO_G = 1e6 / STANDARD_GRAVITY
 
 #: 95 % of a normal distribution lie within so many standard deviations.
 TWO_SIDED_95 = 1.959963984540054
+
+#: Standard deviation of a normal distribution over its median absolute deviation: one over the
+#: quantile of 3/4.
+MAD_TO_SD = 1.482602218505602
 
 _DEGREE = math.pi / 180.0
 
