@@ -22,6 +22,7 @@ from strapdown.alignment.fine_epochs import (
 from strapdown.alignment.fine_findings import fine_findings
 from strapdown.alignment.fine_record import telling_record
 from strapdown.alignment.fine_result import Epochs, FineResult
+from strapdown.alignment.north import unit_remedy
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
@@ -156,11 +157,8 @@ class FineAlignment:
         DivergenceError
             The mechanization has left the range in which it means anything.
         """
-        _check_coarse(coarse, imu)
-        if increments is None:
-            increments = motion_increments(imu)
-        else:
-            increments = _within(increments, imu)
+        _check_coarse(coarse, imu, site)
+        increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         with telling_record(imu):
             return self._run(imu, increments, begin, site, sensors, coarse, progress)
@@ -273,7 +271,7 @@ class FineAlignment:
         return replace(last, time=back.end.time, q_nb=back.end.q_nb)
 
 
-def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
+def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
     sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
     if not sd <= math.degrees(MOST_HEADING):
         raise DataError(
@@ -281,7 +279,8 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
             f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
             file=imu.attrs.get("source"),
             quantity="heading",
-            remedy="state the heading, or align longer, or use gyros of a better grade",
+            remedy=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
+            or "state the heading, or align longer, or use gyros of a better grade",
         )
 
 

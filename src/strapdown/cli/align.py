@@ -81,23 +81,38 @@ def align(
         ),
     ] = "none",
     from_s: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
+        float | None,
+        typer.Option(
+            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
+        ),
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Use so much of the log.", rich_help_panel=_RUN),
+        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Of a log without a time column.", rich_help_panel=_LOG),
+        typer.Option(
+            metavar="HZ",
+            help="Samples a second, of a log without a time column.",
+            rich_help_panel=_LOG,
+        ),
     ] = None,
     sampling: Annotated[
         str | None,
-        typer.Option(metavar="KIND", help="instantaneous or mean.", rich_help_panel=_LOG),
+        typer.Option(
+            metavar="KIND",
+            help="What a row is: instantaneous, or the mean over its interval.",
+            rich_help_panel=_LOG,
+        ),
     ] = None,
     columns: Annotated[
         list[str] | None,
-        typer.Option(metavar="Q=NAME", help="time=t,gyro_x=wx,…", rich_help_panel=_LOG),
+        typer.Option(
+            metavar="Q=NAME",
+            help="Columns by name or number: time=t,gyro_x=wx,…",
+            rich_help_panel=_LOG,
+        ),
     ] = None,
     gyro_unit: Annotated[
         str | None,
