@@ -18,6 +18,8 @@ __all__ = ["heading_floor_deg", "refuse_false_claims"]
 CLAIMED = 0.7
 #: A body that turns by more than this does not rest at one attitude, and its drifts show.
 TURNED_DEG = 30.0
+#: So many standard deviations from what it was before, a heading was wrong before.
+BEYOND = 4.0
 DEG_PER_HOUR = math.degrees(3600.0)
 
 
@@ -61,6 +63,17 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
     DataError
     """
     heading = result.history["heading"].to_numpy()
+    moved = float(heading[-1] - heading[0])
+    if result.heading_given and abs(moved) > BEYOND * result.prior_heading_sd_deg:
+        raise DataError(
+            f"the filter turned the heading by {moved:.3g} deg from what it was before, known to "
+            f"± {result.prior_heading_sd_deg:.2g} deg (one standard deviation): the gyros "
+            "contradict it",
+            file=result.source,
+            quantity="heading",
+            remedy="check the heading that was stated, or have it found (inertial_frame); check "
+            "the axes of the gyros",
+        )
     if float(np.ptp(heading[len(heading) // 10 :])) > TURNED_DEG:
         return
     floor = heading_floor_deg(result, site)

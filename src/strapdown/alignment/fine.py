@@ -23,6 +23,7 @@ from strapdown.alignment.fine_epochs import (
 from strapdown.alignment.fine_findings import fine_findings
 from strapdown.alignment.fine_record import telling_record
 from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
+from strapdown.alignment.north import unit_remedy
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
@@ -159,7 +160,7 @@ class FineAlignment:
         DivergenceError
             The mechanization has left the range in which it means anything.
         """
-        _check_coarse(coarse, imu)
+        _check_coarse(coarse, imu, site)
         increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
         with telling_record(imu):
@@ -295,7 +296,7 @@ def _free_run(
         ) from error
 
 
-def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
+def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
     sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
     if not sd <= math.degrees(MOST_HEADING):
         raise DataError(
@@ -303,7 +304,8 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
             f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
             file=source_of(imu),
             quantity="heading",
-            remedy="state the heading, or align longer, or use gyros of a better grade",
+            remedy=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
+            or "state the heading, or align longer, or use gyros of a better grade",
         )
 
 

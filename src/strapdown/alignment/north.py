@@ -62,9 +62,9 @@ def north_findings(
         told = f"{np.degrees(sd):.3g} deg" if sd < 1e3 else "without bound"
         raise DataError(
             f"the gyros cannot find north: the standard deviation of the heading is {told} (at "
-            f"most {np.degrees(LARGEST_SD):.0f}); at latitude {site.lat_deg:.6g} deg the Earth "
-            f"turns at {across * DEG_PER_HOUR:.3g} deg/h about north, and the bias of the gyros is "
-            f"known to {bias * DEG_PER_HOUR:.3g} deg/h",
+            f"most {np.degrees(LARGEST_SD):.0f} deg); at latitude {site.lat_deg:.6g} deg the Earth "
+            f"turns at {_rounded(across * DEG_PER_HOUR)} deg/h about north, and the bias of the "
+            f"gyros is known to {bias * DEG_PER_HOUR:.3g} deg/h",
             file=source,
             quantity="heading",
             remedy=(
@@ -107,6 +107,11 @@ def unit_remedy(rate: Array, site: Site) -> str:
     return ""
 
 
+def _rounded(rate: float) -> str:
+    """A rate in deg/h; what rounding leaves of none is none."""
+    return f"{rate:.3g}" if rate > 1e-9 else "0"
+
+
 def latitude_findings(
     site: Site, measured_deg: float, sd_deg: float, source: str | None
 ) -> tuple[Finding, ...]:
@@ -127,6 +132,17 @@ def latitude_findings(
     off = measured_deg - site.lat_deg
     if not abs(off) > CONTRADICTION * sd_deg:
         return ()
+    if abs(measured_deg) > 90.0 + CONTRADICTION * sd_deg:
+        told = "the Earth's rate, as the gyros read it, and gravity lie as at no latitude"
+        return (
+            Finding(
+                f"{told}: the site says {site.lat_deg:.6g} deg",
+                file=source,
+                quantity="latitude",
+                remedy="check units, axes and signs of the gyros and of the accelerometers, the "
+                "stated bias of the gyros, and that the body stood where it was aligned",
+            ),
+        )
     return (
         Finding(
             f"the sensors tell {measured_deg:.4g} deg (standard deviation {sd_deg:.2g}) from the "

@@ -87,11 +87,14 @@ def align(
         ),
     ] = "none",
     from_s: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
+        float | None,
+        typer.Option(
+            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
+        ),
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Use so much of the log.", rich_help_panel=_RUN),
+        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
     ] = None,
     rate: Rate = None,
     sampling: Sampling = None,

@@ -34,6 +34,10 @@ _TIME = "time, s"
 _NAMES = ("x, forward", "y, right", "z, down")
 #: Differences below this part of the smallest bound are drawn as that.
 LEAST = 0.02
+BEGUN = (
+    " The fine one begins at the coarse attitude and is near it in its first seconds; its bound "
+    "there takes none of that for granted."
+)
 _OFF = {
     "truth": "error",
     "reference": "off the reference",
@@ -90,11 +94,12 @@ def readiness_chart(result: AlignmentResult) -> Chart:
                 )
             )
         panels.append(Panel("deg", tuple(lines), log=True, title=title, height=1.2))
+    begun = "" if result.fine is None else BEGUN
     return Chart(
         "readiness",
         "Readiness: alignment time against accuracy",
         "Bounds hold 95 % (1.96 standard deviations); of roll and pitch the larger one. The coarse "
-        f"alignment was run anew over each length. {_OFF_WORDS[found.against]}",
+        f"alignment was run anew over each length. {_OFF_WORDS[found.against]}{begun}",
         "time since the start, s",
         tuple(panels),
         () if length is None or result.fine is None else (Mark(length, "fine alignment begins"),),
