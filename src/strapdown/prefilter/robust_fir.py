@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.fir_decimation import FirDecimation, FirState, fir_decimation
 from strapdown.dsp.outliers import OutlierDesign, OutlierState
+from strapdown.exceptions import ConfigError
 from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
 from strapdown.prefilter.report import Changed
 
@@ -66,10 +67,24 @@ class RobustFir(Prefilter):
     steps: tuple[float, ...] | None = None
 
     def low_pass(self, grid: Grid) -> FirDecimation:
-        """The low-pass for samples of a grid."""
+        """The low-pass for samples of a grid.
+
+        Raises
+        ------
+        ConfigError
+            The rate does not divide that of the samples, or is theirs.
+        """
+        factor = whole_factor(self.rate, grid, self.name)
+        if factor == 1:
+            raise ConfigError(
+                f"'{self.name}' is to give {self.rate:g} Hz, and the log has no more",
+                quantity="rate",
+                remedy=f"give a lower rate, as {self.name}:rate={0.5 * self.rate:g}; or use "
+                "'summed', which replaces outliers and keeps the rate",
+            )
         return fir_decimation(
             grid.step,
-            whole_factor(self.rate, grid, self.name),
+            factor,
             means=grid.means,
             passband=self.passband,
             attenuation=self.attenuation,

@@ -5,8 +5,9 @@ import pytest
 from scipy.signal import csd, welch
 
 from strapdown import rotation
+from strapdown.exceptions import ConfigError
 from strapdown.increments import motion_increments
-from strapdown.prefilter import RobustFir, Summed
+from strapdown.prefilter import Grid, RobustFir, Summed
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Coning, Sculling
@@ -271,3 +272,10 @@ def test_a_knock_that_a_low_rate_cannot_tell_is_spoken_of(rate, told):
     found = [f for f in report.findings if "as long as a knock" in f.what]
     assert len(found) == told
     assert all(f.row == t.size // 2 + 1 and f.quantity == "gyro_x" for f in found)
+
+
+def test_a_rate_that_is_the_log_s_own_is_refused_with_what_to_give():
+    with pytest.raises(ConfigError, match="the log has no more") as raised:
+        RobustFir(rate=100.0).low_pass(Grid(0.0, 0.01, True))
+    assert "robust_fir:rate=50" in str(raised.value)
+    assert "summed" in str(raised.value)
