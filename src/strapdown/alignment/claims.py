@@ -67,7 +67,8 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
     if result.heading_given and abs(moved) > BEYOND * result.prior_heading_sd_deg:
         raise DataError(
             f"the filter turned the heading by {moved:.3g} deg from what it was before, known to "
-            f"± {result.prior_heading_sd_deg:.2g} deg (one standard deviation): the gyros contradict it",
+            f"± {result.prior_heading_sd_deg:.2g} deg (one standard deviation): the gyros "
+            "contradict it",
             file=result.source,
             quantity="heading",
             remedy="check the heading that was stated, or have it found (inertial_frame); check "
