@@ -292,7 +292,8 @@ def _free_run(
             row=row + 1,
             quantity=GYRO[axis],
             remedy="cut the record to where the body stands; filter a burst of outliers first "
-            "(prefilter robust_fir or summed); check the units",
+            "(prefilter robust_fir or summed); check the units; of sensors that are that poor take "
+            "the coarse alignment alone (--coarse-only)",
         ) from error
 
 

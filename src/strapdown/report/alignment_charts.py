@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
+from strapdown.report.alignment_values import NOT_KNOWN, angle_bound, instant
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -155,6 +156,7 @@ def attitude_chart(result: AlignmentResult) -> Chart:
     table = result.attitude
     time = table.index.to_numpy(dtype=np.float64)
     panels = []
+    carried = NOT_KNOWN not in [angle_bound(result.start, k) for k in (0, 1)]
     for k, angle in enumerate(EULER):
         values = table[angle].to_numpy()
         if angle == "heading":
@@ -166,16 +168,20 @@ def attitude_chart(result: AlignmentResult) -> Chart:
             if angle == "heading":
                 known = np.degrees(np.unwrap(np.radians(known)))
             lines.append(curve("truth", truth.index.to_numpy(), known, BLACK, "dot", buckets=800))
-        half = TWO_SIDED_95 * float(result.end.sd_deg[k])
+        halves = TWO_SIDED_95 * np.array([result.start.sd_deg[k], result.end.sd_deg[k]])
+        half = np.interp(time[:: max(1, len(time) // 400)], time[[0, -1]], halves)
         step = max(1, len(time) // 400)
         x, y = time[::step], values[::step]
         band = Fill("95 % bound", x, y - half, y + half, BLUE)
-        panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,)))
+        panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,) if carried else ()))
     return Chart(
         "attitude",
         "Attitude over the record",
         "The answer, carried to every sample by the gyros, with its bound of 95 %; what rocks here "
-        "is the body.",
+        "is the body."
+        if carried
+        else f"The answer holds at {instant(result.end.time)} alone. These gyros cannot carry it "
+        "to the start, where nothing is known of it: what turns here may be their bias.",
         _TIME,
         tuple(panels),
     )

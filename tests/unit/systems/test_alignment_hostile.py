@@ -7,6 +7,7 @@ import pytest
 
 from strapdown.cli.align_options import spec_of_flags
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.report.alignment_charts import attitude_chart
 from strapdown.report.alignment_trust import bounds_hold, trust
 from strapdown.report.alignment_values import rate_words
 from strapdown.report.alignment_words import headline, key_figures, limits
@@ -133,6 +134,14 @@ def test_a_heading_that_nobody_sought_is_not_known(stand, tmp_path):
     assert "gnss_course" in said and "deg/s" in said
     found = result_of(log, method="levelling")
     assert "inertial_frame" in limits(found)[0][1]
+
+
+def test_gyros_that_cannot_carry_an_attitude_draw_no_bound_around_it(stand, tmp_path):
+    log = write(tmp_path / "a.csv", stand)
+    cheap, good = (result_of(log, method="levelling", sensor=s) for s in ("mpu-6050", "fog-1000"))
+    assert [bool(panel.fills) for panel in attitude_chart(cheap).panels] == [False] * 3
+    assert "cannot carry it" in attitude_chart(cheap).caption
+    assert [bool(panel.fills) for panel in attitude_chart(good).panels] == [True] * 3
 
 
 def test_a_stated_heading_is_not_limited_by_gyros_that_cannot_tell_it(stand, tmp_path):
