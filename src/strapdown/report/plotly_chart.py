@@ -72,7 +72,9 @@ def figure(chart: Chart) -> dict[str, Any]:
                     layout[f"yaxis{suffix}"]["matches"] = "y"
             if not panel.x_label:
                 rows = _mark(layout, chart, x_suffix, domain[1])
-                layout["margin"]["t"] += max(0, 15 * (rows - 1))
+                # A title stands above the labels of marks.
+                beyond = rows if panel.title else rows - 1
+                layout["margin"]["t"] += max(0, 15 * beyond)
         if panel.x_label:
             layout[f"yaxis{suffix}"] |= {"scaleanchor": f"x{x_suffix}", "scaleratio": 1}
         lifted = 6 + (15 * rows if number == planes else 0)
