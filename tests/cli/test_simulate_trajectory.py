@@ -18,7 +18,10 @@ from strapdown.systems.trajectory_source import simulate_trajectory
 from strapdown.tables import ACCEL, GYRO
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
-NAMES = sorted(path.stem for path in EXAMPLES.glob("*.toml"))
+# Trajectories; an alignment is an example of something else.
+NAMES = sorted(
+    path.stem for path in EXAMPLES.glob("*.toml") if "[motion]" in path.read_text(encoding="utf-8")
+)
 REST = """sampling = "mean"
 rate_hz = 20
 ellipsoid = "pz90.11"

@@ -27,6 +27,9 @@ STEPS = 2.0
 # Where most residuals are below half a step, the channel repeats itself and says what it has to
 # say in the rest: nothing that is below so many steps is an outlier there.
 REPEATS, COARSE = 2.0, 30.0
+# Part of two readings by which they may differ and be the same: no converter has 30 bits, and
+# readings that were scaled and turned are right to fewer.
+ROUNDING = 1e-9
 # At an end of the record, where one window must do, it scatters more.
 ONE_SIDE = 1.5
 
@@ -115,6 +118,27 @@ def half_range(x, i, m):
 
 
 @njit(cache=True, error_model="numpy")
+def middle_of_nodes(x, i, m):
+    """Median of the samples that predict a run."""
+    a, b, c = x[i - 3], x[i - 2], x[i - 1]
+    d, e, f = x[i + m], x[i + m + 1], x[i + m + 2]
+    # Of six numbers, by exchanges: the third and the fourth in order.
+    a, b = min(a, b), max(a, b)
+    c, d = min(c, d), max(c, d)
+    e, f = min(e, f), max(e, f)
+    a, c = min(a, c), max(a, c)
+    d, f = min(d, f), max(d, f)
+    b, e = min(b, e), max(b, e)
+    a, b = min(a, b), max(a, b)
+    c, d = min(c, d), max(c, d)
+    e, f = min(e, f), max(e, f)
+    b, c = min(b, c), max(b, c)
+    d, e = min(d, e), max(d, e)
+    c, d = min(c, d), max(c, d)
+    return 0.5 * (c + d)
+
+
+@njit(cache=True, error_model="numpy")
 def same_side(line, residual):
     """Whether a straight line from one side confirms the residual."""
     return line * residual > 0.0 and abs(line) > CONFIRMED * abs(residual)
@@ -128,6 +152,12 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, st
     last = x[j] - predicted(x, i, m, weights[m - 1, m - 1])
     small = min(abs(first), abs(last))
     if small <= STEPS * step:
+        return False
+    # What is nearer to the samples around it than its prediction is stands out of nothing.
+    middle = middle_of_nodes(x, i, m)
+    if abs(x[i] - middle) <= abs(x[i] - first - middle) or abs(x[j] - middle) <= abs(
+        x[j] - last - middle
+    ):
         return False
     before = x[i] - 2.0 * x[i - 1] + x[i - 2]
     behind = x[j] - 2.0 * x[j + 1] + x[j + 2]
@@ -191,7 +221,7 @@ def replace_outliers(
     while i < stop:
         if state[0] <= 0.0 and i + 1 < n:
             d = abs(raw[i + 1] - raw[i])
-            if d > 0.0 and d < -state[0]:
+            if d > ROUNDING * (abs(raw[i]) + abs(raw[i + 1])) and d < -state[0]:
                 state[0] = -d
         if i < NODES or i + NODES > n - 1:
             i += 1

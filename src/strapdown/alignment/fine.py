@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.claims import refuse_false_claims
 from strapdown.alignment.fine_epochs import (
@@ -21,30 +22,32 @@ from strapdown.alignment.fine_epochs import (
 )
 from strapdown.alignment.fine_findings import fine_findings
 from strapdown.alignment.fine_record import telling_record
-from strapdown.alignment.fine_result import Epochs, FineResult
+from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
 from strapdown.alignment.north import unit_remedy
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
     Standing,
+    attitude_of_rest,
     home_of,
     measured_standing,
+    without_steady_turn,
 )
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
-from strapdown.estimation.error_model import ErrorModel
+from strapdown.estimation.error_model import ErrorModel, Segment
 from strapdown.estimation.resting_sensors import resting_states
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.exceptions import ConfigError, DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, MOTION
-from strapdown.tables.checks import is_number, values_of
+from strapdown.tables.checks import is_number, source_of, values_of
 
 __all__ = ["FineAlignment"]
 
@@ -185,6 +188,7 @@ class FineAlignment:
             ),
             self.form,
             self.rule,
+            rests=True,
         )
         rows = values_of(increments, MOTION)
         time = increments.index.to_numpy(dtype=np.float64)
@@ -193,17 +197,19 @@ class FineAlignment:
             raise DataError(
                 f"a record of {time[-1] - begin:.6g} s has {ends.size} epochs of "
                 f"{self.interval:g} s",
-                file=imu.attrs.get("source"),
+                file=source_of(imu),
                 quantity="time",
                 remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
                 "usual",
             )
+        state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
+        earth = rotation.rotate(rotation.conjugate(start.q_nb), site.earth_rate)
+        steady = without_steady_turn(rows, earth)
+        whole = _free_run(filter_, state, time, steady, source_of(imu))
+        home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
-            state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-            whole = filter_.predict(state, time, rows)[1]
-            standing = measured_standing(whole, int(ends[0]), LEAST, filter_.model.gyro_noise)
-        home = home_of(site, begin)
+            standing = measured_standing(whole, home, int(ends[0]), LEAST, filter_.model.gyro_noise)
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
         epochs = Epochs(filter_)
         epochs.add(state, {})
@@ -215,8 +221,8 @@ class FineAlignment:
                 progress((state.time - begin) / (float(time[-1]) - begin))
         used = slice(0, int(ends[-1]))
         result = FineResult(
-            alignment=epochs.alignment(state),
-            at_start=self._carried_back(filter_, epochs, state, increments.iloc[used]),
+            alignment=alignment_of(filter_, state),
+            at_start=self._carried_back(filter_, state, increments.iloc[used]),
             history=epochs.history(),
             innovations=epochs.innovations(),
             standing=standing,
@@ -225,7 +231,7 @@ class FineAlignment:
             prior_heading_sd_deg=math.degrees(prior_heading_sd(coarse)),
             filter=filter_,
             state=state,
-            source=imu.attrs.get("source"),
+            source=source_of(imu),
         )
         refuse_false_claims(result, site)
         return replace(result, findings=fine_findings(result, site))
@@ -240,35 +246,54 @@ class FineAlignment:
         if abs(coarse.time - begin) <= slack:
             return replace(home, time=begin)
         if abs(coarse.time - end) <= slack:
-            back = run_mechanization(
-                replace(self.mechanization, height="held"),
-                replace(home, time=end),
-                increments,
-                backward=True,
-            )
-            return replace(home, time=begin, q_nb=back.end.q_nb)
+            back = self._backward(replace(home, time=end), increments)
+            return replace(home, time=begin, q_nb=back.q_nb)
         raise DataError(
             f"the coarse alignment holds at {coarse.time:.9g} s, and the record goes from "
             f"{begin:.9g} to {end:.9g} s",
-            file=increments.attrs.get("source"),
+            file=source_of(increments),
             quantity="time",
             remedy="give the attitude at its first or at its last sample",
         )
 
     def _carried_back(
-        self, filter_: ErrorFilter, epochs: Epochs, state: FilterState, increments: pd.DataFrame
+        self, filter_: ErrorFilter, state: FilterState, increments: pd.DataFrame
     ) -> Alignment:
         """The attitude at the first sample, by the gyros without their drifts."""
         clean = increments.copy()
         clean[list(MOTION)] = filter_.compensated(state, values_of(increments, MOTION))
         clean.attrs = dict(increments.attrs)
-        last = epochs.alignment(state)
+        last = alignment_of(filter_, state)
         end = filter_.mechanization.nav_state(state.mechanization, state.time)
-        still = replace(end, v_n=np.zeros(3))
-        back = run_mechanization(
-            replace(self.mechanization, height="held"), still, clean, backward=True
-        )
-        return replace(last, time=back.end.time, q_nb=back.end.q_nb)
+        back = self._backward(replace(end, v_n=np.zeros(3)), clean)
+        return replace(last, time=back.time, q_nb=back.q_nb)
+
+    def _backward(self, end: NavState, increments: pd.DataFrame) -> NavState:
+        """The state before the first increment, of a body that stands after the last."""
+        held = replace(self.mechanization, height="held")
+        return run_mechanization(held, end, increments, backward=True).end
+
+
+def _free_run(
+    filter_: ErrorFilter, state: FilterState, time: Array, rows: Array, source: str | None
+) -> Segment:
+    """The whole record without observations."""
+    try:
+        return filter_.predict(state, time, rows)[1]
+    except DivergenceError as error:
+        rate = rows[:, 1:4] / rows[:, :1]
+        away = np.abs(rate - np.median(rate, axis=0))
+        row, axis = (int(k) for k in np.unravel_index(int(away.argmax()), away.shape))
+        raise DataError(
+            "the record is not one of a body at rest: reckoned without observations it leaves the "
+            f"ground; the largest turn is {np.degrees(rate[row, axis]):.4g} deg/s at "
+            f"{time[row]:.9g} s",
+            file=source,
+            row=row + 1,
+            quantity=GYRO[axis],
+            remedy="cut the record to where the body stands; filter a burst of outliers first "
+            "(prefilter robust_fir or summed); check the units",
+        ) from error
 
 
 def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
@@ -277,7 +302,7 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
         raise DataError(
             f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard "
             f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="heading",
             remedy=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
             or "state the heading, or align longer, or use gyros of a better grade",
@@ -294,7 +319,7 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     if part.empty:
         raise DataError(
             f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="increments",
             remedy="give those of the same record, or leave them out",
         )

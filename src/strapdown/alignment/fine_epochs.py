@@ -41,7 +41,7 @@ def settled_epoch(
         made: list[Observation] = []
 
         def turn(segment: Segment) -> Observation:
-            made.append(rate_observation(filter_, segment, standing))
+            made.append(rate_observation(filter_, segment, home, standing))
             return made[0]
 
         state, _, innovations = filter_.predict_observing(state, time, rows, turn)
@@ -77,6 +77,7 @@ def settled(
     ends : ndarray of int
         Number of steps before the end of each epoch.
     home : NavState
+        The place of alignment and the attitude of rest.
     standing : Standing
     observe : tuple of str
 

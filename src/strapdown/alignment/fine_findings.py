@@ -8,7 +8,8 @@ import numpy as np
 
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.alignment.stationary import velocity_of_noise
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 
 #: Quantity of the finding of a body that rocks: no fault, where a coarse alignment lets it.
@@ -20,12 +21,12 @@ UNCHANGED = 0.5
 # What people, wind and an engine do to a parked vehicle stays below.
 MOST_VELOCITY = 0.05  # m/s
 MOST_TURN = 0.5  # deg from epoch to epoch
+# Over what the noise of the sensors makes of a body that stands still.
+OVER_NOISE = 3.0
 # Of a normal distribution one in 16 000 is beyond four standard deviations.
 BEYOND = 4.0
 # Mean square of the innovations over what was expected; by epochs that are not all independent.
 INCONSISTENT = 3.0
-
-DEG_PER_HOUR = np.degrees(1.0) * 3600.0
 
 
 def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
@@ -66,7 +67,12 @@ def _north(result: FineResult, site: Site) -> Iterator[Finding]:
 def _stands(result: FineResult) -> Iterator[Finding]:
     velocity = float(result.standing.velocity.max())
     turn = float(np.degrees(result.standing.turn.max()))
-    if velocity <= MOST_VELOCITY and turn > MOST_TURN:
+    model = result.filter.model
+    noise = velocity_of_noise(
+        model.gyro_noise, model.accel_noise, result.interval, len(result.history) - 1
+    )
+    moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
+    if not moves and turn > MOST_TURN:
         yield Finding(
             f"the body rocks: from epoch to epoch it turns by {turn:.3g} deg, and stays at its "
             f"place within {velocity:.2g} m/s (one standard deviation): this is in the stated "
@@ -75,7 +81,7 @@ def _stands(result: FineResult) -> Iterator[Finding]:
             quantity=ROCKS,
             remedy="nothing, where it is known to rock; a body that stands is aligned sooner",
         )
-    elif velocity > MOST_VELOCITY:
+    elif moves:
         yield Finding(
             f"the body does not stand: from epoch to epoch it moves by {velocity:.3g} m/s and "
             f"turns by {turn:.3g} deg (one standard deviation)",

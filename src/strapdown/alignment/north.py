@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.alignment.site import Site
+from strapdown.constants import DEG_PER_HOUR
 from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
@@ -13,7 +14,6 @@ Array = NDArray[np.float64]
 
 __all__ = [
     "CONTRADICTION",
-    "DEG_PER_H",
     "HIGH_LATITUDE",
     "LARGEST_SD",
     "latitude_findings",
@@ -27,7 +27,6 @@ LARGEST_SD = 1.0
 HIGH_LATITUDE = 70.0
 #: So many standard deviations are no chance: one in two million.
 CONTRADICTION = 5.0
-DEG_PER_H = np.degrees(1.0) * 3600.0
 
 
 def north_findings(
@@ -64,8 +63,8 @@ def north_findings(
         raise DataError(
             f"the gyros cannot find north: the standard deviation of the heading is {told} (at "
             f"most {np.degrees(LARGEST_SD):.0f} deg); at latitude {site.lat_deg:.6g} deg the Earth "
-            f"turns at {_rounded(across * DEG_PER_H)} deg/h about north, and the bias of the gyros "
-            f"is known to {bias * DEG_PER_H:.3g} deg/h",
+            f"turns at {_rounded(across * DEG_PER_HOUR)} deg/h about north, and the bias of the "
+            f"gyros is known to {bias * DEG_PER_HOUR:.3g} deg/h",
             file=source,
             quantity="heading",
             remedy=(

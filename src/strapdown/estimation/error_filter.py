@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,7 +10,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown._kernels.compensation import compensate
+from strapdown._kernels.level import ALT, AXIS, Q_LB
+from strapdown.earth import gravity
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
@@ -22,10 +26,16 @@ from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
 
-# Part by which noise is larger than what is known of it, so that what is left is no less than zero.
-ROUNDING = 1e-9
+# Part by which noise is larger than what is known of it, so that what is left is no less than zero:
+# of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
+# whole, 2e-16, must be nothing beside this part of it (`_kernels.factors.INDEFINITE`).
+ROUNDING = 1e-5
 # Place of the rotation among the physical errors.
 ROTATION = slice(6, 9)
+# Place of the attitude in a level row.
+ATTITUDE = slice(Q_LB, Q_LB + 4)
+# Blocks of states that are vectors of the body.
+BIASES = ("gyro_bias", "accel_bias")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +81,15 @@ class ErrorFilter:
         How far an observation is believed; without one, all of it.
     step : float, s
         Longest time over which errors grow by means of attitude and force.
+    rests : bool
+        Whether the body is known to stay where it is, so that errors grow by gravity and the
+        attitude, and not by what the sensors read: their noise, and what sways, would be taken for
+        a motion that tells one error from another, although they are what is observed. Errors
+        of the biases then keep their direction in level axes, and not in the body's, where an
+        attitude is corrected: what a rest cannot tell keeps its direction, while otherwise each
+        correction of a heading by degrees makes something of it known (Huang, Mourikis and
+        Roumeliotis, Int. J. Robotics Research 29 (2010) 502, of such filters). The standard
+        deviations of the axes that a correction mixes should be alike.
     """
 
     mechanization: Mechanization
@@ -78,6 +97,7 @@ class ErrorFilter:
     form: CovarianceForm
     rule: UpdateRule | None = None
     step: float = 0.1
+    rests: bool = False
 
     @cached_property
     def earth(self) -> Array:
@@ -142,7 +162,7 @@ class ErrorFilter:
             The mechanization has left the range in which it means anything.
         """
         after, segment = self._run(state, time, rows)
-        Phi, Q = self.model.transition(segment, self.step)
+        Phi, Q = self._transition(segment)
         return replace(after, covariance=self.form.predict(state.covariance, Phi, Q)), segment
 
     def predict_observing(
@@ -176,7 +196,7 @@ class ErrorFilter:
         innovations : Innovations
         """
         after, segment = self._run(state, time, rows)
-        Phi, Q = self.model.transition(segment, self.step)
+        Phi, Q = self._transition(segment)
         observation = observe(segment)
         used = self.mechanization
         H = observation.H @ self.model.to_physical(used, state.time, state.row)
@@ -228,6 +248,27 @@ class ErrorFilter:
         T = self.model.to_physical(self.mechanization, state.time, state.row)
         return symmetric(T @ self.form.matrix(state.covariance) @ T.T)
 
+    def _transition(self, segment: Segment) -> tuple[Array, Array]:
+        """How errors go over a segment."""
+        if self.rests:
+            levels = self.mechanization.levels(segment.history[:-1])
+            rows = segment.increments.copy()
+            up = np.zeros((len(rows), 3))
+            up[:, 2] = self.mechanization.level_up * self._gravity(levels[0])
+            up = rotation.rotate(rotation.conjugate(levels[:, ATTITUDE]), up)
+            rows[:, 4:7] = up * rows[:, :1]
+            segment = replace(segment, increments=rows)
+        return self.model.transition(segment, self.step)
+
+    def _gravity(self, level: Array) -> float:
+        """Gravity at a level row, m/s²."""
+        sine = float(level[AXIS + 2]) * self.mechanization.level_up
+        lat = math.degrees(math.asin(min(max(sine, -1.0), 1.0)))
+        found = gravity(
+            lat, float(level[ALT]), ellipsoid=find_ellipsoid(self.mechanization.ellipsoid)
+        )
+        return float(np.linalg.norm(found))
+
     def _run(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
         """The mechanization over increments without estimated errors; the covariance as it was."""
         used = self.mechanization
@@ -264,6 +305,9 @@ class ErrorFilter:
             # on: the norm of a quaternion is along the new one.
             carried = self.model.from_physical(used, state.time, row) @ to_physical
             covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
+        if self.rests:
+            turned = self._turned(state.row, row)
+            covariance = self.form.predict(covariance, turned, np.zeros_like(covariance))
         return replace(
             state,
             mechanization=corrected,
@@ -271,6 +315,17 @@ class ErrorFilter:
             sensors=state.sensors + physical[PHYSICAL:],
             covariance=covariance,
         )
+
+    def _turned(self, before: Array, after: Array) -> Array:
+        """How states go on where the errors of the biases stay in level axes, (n, n)."""
+        q_before, q_after = self.mechanization.levels(np.stack([before, after]))[:, ATTITUDE]
+        turn = rotation.dcm_from_quaternion(rotation.compose(rotation.conjugate(q_after), q_before))
+        out = np.eye(self.model.layout.size)
+        for name in BIASES:
+            if name in self.model.layout:
+                at = self.model.layout[name]
+                out[at, at] = turn
+        return out
 
 
 def symmetric(P: Array) -> Array:

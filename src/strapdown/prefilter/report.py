@@ -105,6 +105,10 @@ class PrefilterReport:
     findings: tuple[Finding, ...]
 
 
+# A knock on a body lasts some milliseconds; faster samples show more than one of it.
+SHORTEST_KNOCK = 2e-3  # s
+
+
 def report_of(
     name: str,
     figures: dict[str, float],
@@ -131,7 +135,11 @@ def report_of(
 
     replaced = table(REPLACED)
     share = {c: float((replaced["channel"] == c).sum()) / samples for c in columns}
-    found = [*_bursts(changed, grid, columns, source), *_too_many(share, samples, source)]
+    found = [
+        *_bursts(changed, grid, columns, source),
+        *_too_many(share, samples, source),
+        *_knocks(replaced, grid, source),
+    ]
     return PrefilterReport(
         name=name,
         replaced=replaced,
@@ -192,4 +200,22 @@ def _too_many(share: dict[str, float], samples: int, source: str | None) -> list
         )
         for column, part in share.items()
         if part > USUAL_SHARE
+    ]
+
+
+def _knocks(replaced: pd.DataFrame, grid: Any, source: str | None) -> list[Finding]:
+    if replaced.empty or grid.step <= SHORTEST_KNOCK:
+        return []
+    first = replaced.iloc[0]
+    return [
+        Finding(
+            f"{len(replaced)} samples were replaced, {grid.step:.4g} s apart from the next, which "
+            "is as long as a knock on the body lasts: what was taken for an outlier may be motion, "
+            "whose turn is then lost",
+            file=source,
+            row=int(first["row"]),
+            quantity=str(first["channel"]),
+            remedy="leave the pre-filter out of a log of so low a rate, unless outliers are seen "
+            "in it",
+        )
     ]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.report.alignment_values import NOT_KNOWN, angle_bound, instant
 from strapdown.report.chart import (
     AXIS_COLOURS,
@@ -33,8 +31,6 @@ __all__ = ["attitude_chart", "bias_charts", "innovation_chart", "readiness_chart
 
 Array = NDArray[np.float64]
 
-DEG_H = math.degrees(3600.0)
-UG = 1e6 / 9.80665
 _TIME = "time, s"
 _NAMES = ("x, forward", "y, right", "z, down")
 #: Differences below this part of the smallest bound are drawn as that.
@@ -115,7 +111,10 @@ def readiness_chart(result: AlignmentResult) -> Chart:
 def signal_chart(result: AlignmentResult) -> Chart:
     """Rates and specific force: as recorded, as aligned, and their means over a second."""
     panels = []
-    for columns, factor, label in ((GYRO, DEG_H, "rate, deg/h"), (ACCEL, 1.0, "force, m/s²")):
+    for columns, factor, label in (
+        (GYRO, DEG_PER_HOUR, "rate, deg/h"),
+        (ACCEL, 1.0, "force, m/s²"),
+    ):
         for k, column in enumerate(columns):
             lines = [_signal("recorded", result.source.imu, column, factor, GREY, 0.8)]
             if result.prefilter is not None:
@@ -196,8 +195,8 @@ def bias_charts(result: AlignmentResult) -> tuple[Chart, ...]:
     time = history.index.to_numpy(dtype=np.float64)
     out = []
     for sensor, factor, unit, what in (
-        ("gyro", DEG_H, "deg/h", "Drifts of the gyros"),
-        ("accel", UG, "µg", "Biases of the accelerometers"),
+        ("gyro", DEG_PER_HOUR, "deg/h", "Drifts of the gyros"),
+        ("accel", MICRO_G, "µg", "Biases of the accelerometers"),
     ):
         panels = []
         for k, axis in enumerate("xyz"):

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.report.alignment_trust import ORDER, answer_error
-from strapdown.report.alignment_values import DEG_H, NOT_KNOWN, UG, angle_bound, instant, small
+from strapdown.report.alignment_values import NOT_KNOWN, angle_bound, instant, small
 from strapdown.report.alignment_words import prior_sd
 from strapdown.report.crash_values import about, plain
 from strapdown.report.document import TableBlock
@@ -55,8 +55,8 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
     rows = []
     gyro, accel = prior_sd(result)
     for name, bias, sd, prior, factor, unit in (
-        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_H, "deg/h"),
-        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, UG, "µg"),
+        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_PER_HOUR, "deg/h"),
+        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, MICRO_G, "µg"),
     ):
         assert bias is not None and sd is not None
         for k, axis in enumerate(("x, forward", "y, right", "z, down")):
@@ -128,8 +128,8 @@ def turn_table(result: AlignmentResult) -> TableBlock | None:
         return None
     rows = []
     for one in result.manoeuvres:
-        gyro = TWO_SIDED_95 * DEG_H * float(np.max(one.gyro_bias_sd))
-        accel = TWO_SIDED_95 * UG * float(np.max(one.accel_bias_sd))
+        gyro = TWO_SIDED_95 * DEG_PER_HOUR * float(np.max(one.gyro_bias_sd))
+        accel = TWO_SIDED_95 * MICRO_G * float(np.max(one.accel_bias_sd))
         rows.append(
             (
                 one.name,

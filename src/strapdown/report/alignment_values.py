@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.report.crash_values import GAP, about, plain
 
 __all__ = [
     "ANY",
-    "DEG_H",
     "NOT_KNOWN",
-    "UG",
     "angle_bound",
     "force_words",
     "instant",
@@ -25,8 +23,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-DEG_H = math.degrees(3600.0)
-UG = 1e6 / 9.80665
 #: Bounds of roll, pitch and heading, in deg, that leave no angle out.
 ANY = (180.0, 90.0, 180.0)
 NOT_KNOWN = "not known"
@@ -50,14 +46,15 @@ def instant(time: float) -> str:
 
 def rate_words(rate: float) -> str:
     """A rate in rad/s in deg/h, or in deg/s where that is a large number."""
-    if rate * DEG_H < 3600.0:
-        return f"{small(rate * DEG_H)} deg/h"
+    if rate * DEG_PER_HOUR < 3600.0:
+        return f"{small(rate * DEG_PER_HOUR)} deg/h"
     return f"{small(math.degrees(rate))} deg/s"
 
 
 def force_words(force: float) -> str:
     """A specific force in m/s² in µg, or in mg where that is a large number."""
-    return f"{force * UG:.3g} µg" if force * UG < 1e4 else f"{1e-3 * force * UG:.3g} mg"
+    micro = force * MICRO_G
+    return f"{micro:.3g} µg" if micro < 1e4 else f"{1e-3 * micro:.3g} mg"
 
 
 def small(value: float) -> str:

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, TWO_SIDED_95
 from strapdown.estimation.resting_sensors import resting_sd
 from strapdown.report.alignment_trust import ORDER, bounds_hold
 from strapdown.report.alignment_values import (
-    DEG_H,
     NOT_KNOWN,
     angle_bound,
     force_words,
@@ -93,8 +92,8 @@ def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
     coarse, heading = result.coarse, float(result.end.sd_deg[2])
     across = float(np.linalg.norm(result.site.earth_rate[:2]))
     hidden = (
-        f"the horizontal rate of the Earth is {small(across * DEG_H)} deg/h here, and the gyros "
-        f"may read {rate_words(east)} too much (one standard deviation)"
+        f"the horizontal rate of the Earth is {small(across * DEG_PER_HOUR)} deg/h here, and the "
+        f"gyros may read {rate_words(east)} too much (one standard deviation)"
     )
     if coarse.method == "levelling":
         return (
@@ -114,10 +113,9 @@ def _heading_limit(result: AlignmentResult, east: float) -> tuple[str, str]:
         )
     part = math.degrees(east / across) if across > 0 else math.inf
     told = (
-        f"{small(east * DEG_H)} deg/h too much about east, one standard deviation of bias, scale "
-        f"and misalignment, are "
-        f"{small(part)}° of heading at this latitude; all of the heading's standard deviation is "
-        f"{small(heading)}°"
+        f"{small(east * DEG_PER_HOUR)} deg/h too much about east, one standard deviation of bias, "
+        f"scale and misalignment, are {small(part)}° of heading at this latitude; all of the "
+        f"heading's standard deviation is {small(heading)}°"
     )
     if coarse.heading_given and heading < 0.7 * part:
         return ("What was stated of the heading limits it", f"{told}: state it better.")

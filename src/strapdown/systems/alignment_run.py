@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.carried import carried_attitude
-from strapdown.alignment.carry import carry
+from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
@@ -33,6 +32,7 @@ from strapdown.systems.alignment_source import AlignmentSource, read_alignment_s
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
+from strapdown.tables.checks import source_of
 
 __all__ = ["AlignmentResult", "run_alignment"]
 
@@ -212,7 +212,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
     if kept.sum() < 2:
         raise DataError(
             f"{duration:g} s hold no two samples",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="time",
             remedy="align for longer",
         )
@@ -229,7 +229,7 @@ def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
         raise DataError(
             f"nothing is left for the fine alignment: the coarse one takes all "
             f"{float(imu.index[-1] - imu.index[0]):.6g} s",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="coarse, duration_s",
             remedy="give it less, or leave its duration out: then both use the whole record",
         )

@@ -59,7 +59,7 @@ def _observed(names, seconds=600, every=20):
         state, segment = filter_.predict(state, time[at : at + each], rows[at : at + each])
         phi, _ = model.transition(segment, 0.1)
         if "rate" in names:
-            one = rate_observation(filter_, segment, STANDING)
+            one = rate_observation(filter_, segment, start, STANDING)
             found.append(one.H @ so_far / np.sqrt(one.R)[:, None])
         so_far = phi @ so_far
         for one in still_observations(filter_, state, home, STANDING, names):

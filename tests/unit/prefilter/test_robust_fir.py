@@ -258,3 +258,16 @@ def test_nothing_of_a_crash_or_a_blow_is_an_outlier(name):
     report = Summed().apply(imu).report
     assert report.replaced.empty
     assert report.findings == ()
+
+
+@pytest.mark.parametrize(("rate", "told"), [(100.0, 1), (1000.0, 0)])
+def test_a_knock_that_a_low_rate_cannot_tell_is_spoken_of(rate, told):
+    t = np.arange(0.0, 20.0, 1.0 / rate)
+    values = 1e-4 * np.random.default_rng(1).standard_normal((t.size, 6))
+    values[t.size // 2, 0] = 0.1
+    table = imu_table(t, values[:, :3], values[:, 3:] - [0.0, 0.0, 9.8], source="log")
+    report = RobustFir(rate=50.0).apply(table).report
+    assert len(report.replaced) == 1
+    found = [f for f in report.findings if "as long as a knock" in f.what]
+    assert len(found) == told
+    assert all(f.row == t.size // 2 + 1 and f.quantity == "gyro_x" for f in found)

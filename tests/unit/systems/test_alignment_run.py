@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.carried import carried_attitude
-from strapdown.alignment.carry import carry
+from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.site import Site
 from strapdown.config.alignment_file import alignment_spec
