@@ -21,7 +21,7 @@ from strapdown.alignment.fine_epochs import (
     settled,
 )
 from strapdown.alignment.fine_findings import fine_findings
-from strapdown.alignment.fine_record import telling_record
+from strapdown.alignment.fine_record import WITHOUT, telling_record
 from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
 from strapdown.alignment.north import unit_remedy
 from strapdown.alignment.site import Site
@@ -33,6 +33,7 @@ from strapdown.alignment.stationary import (
     measured_standing,
     without_steady_turn,
 )
+from strapdown.constants import DEG_PER_HOUR
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
@@ -292,8 +293,9 @@ def _free_run(
             row=row + 1,
             quantity=GYRO[axis],
             remedy="cut the record to where the body stands; filter a burst of outliers first "
-            "(prefilter robust_fir or summed); check the units; of sensors that are that poor take "
-            "the coarse alignment alone (--coarse-only)",
+            "(prefilter robust_fir or summed); check the units; where the gyros read "
+            f"{DEG_PER_HOUR * float(np.linalg.norm(rate.mean(axis=0))):.3g} deg/h in the mean by "
+            f"their bias, {WITHOUT}",
         ) from error
 
 

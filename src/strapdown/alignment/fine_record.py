@@ -13,7 +13,7 @@ from strapdown.exceptions import DataError, DivergenceError
 from strapdown.tables import GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = ["telling_record"]
+__all__ = ["WITHOUT", "telling_record"]
 
 WITHOUT = 'leave the fine alignment out (--coarse-only; kind = "none" in [fine])'
 
