@@ -255,8 +255,8 @@ class FineAlignment:
         back = run_mechanization(
             replace(self.mechanization, height="held"), still, clean, backward=True
         )
-        # Drifts that no rest can tell turn the body by as much as the attitude misplaces the rate of
-        # the Earth; what the carrying adds is the noise of the gyros.
+        # Drifts that no rest can tell turn the body by as much as the attitude misplaces the rate
+        # of the Earth; what the carrying adds is the noise of the gyros.
         C = rotation.dcm_from_quaternion(back.end.q_nb)
         noise = C * np.square(filter_.model.gyro_noise) @ C.T * abs(last.time - back.end.time)
         covariance = np.asarray(last.covariance + noise)
