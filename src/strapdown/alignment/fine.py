@@ -267,7 +267,12 @@ class FineAlignment:
         last = alignment_of(filter_, state)
         end = filter_.mechanization.nav_state(state.mechanization, state.time)
         back = self._backward(replace(end, v_n=np.zeros(3)), clean)
-        return replace(last, time=back.time, q_nb=back.q_nb)
+        # Drifts that no rest can tell turn the body by as much as the attitude misplaces the rate
+        # of the Earth; what the carrying adds is the noise of the gyros.
+        C = rotation.dcm_from_quaternion(back.q_nb)
+        noise = C * np.square(filter_.model.gyro_noise) @ C.T * abs(last.time - back.time)
+        covariance = np.asarray(last.covariance + noise)
+        return replace(last, time=back.time, q_nb=back.q_nb, covariance=covariance)
 
     def _backward(self, end: NavState, increments: pd.DataFrame) -> NavState:
         """The state before the first increment, of a body that stands after the last."""

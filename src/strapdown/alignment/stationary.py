@@ -37,6 +37,8 @@ LEAST_STRETCHES = 8
 # The largest of several variances of as few numbers, over the one that is expected: of eight
 # chi-square with 8 degrees of freedom one in a thousand is beyond 3.9.
 BY_CHANCE = 4.0
+# What a body is taken to turn by where nothing is found, as a part of the noise of its gyros.
+LEAST_TURN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,7 +265,7 @@ def measured_standing(
         No body is taken to stand more still than this.
     gyro_noise : triad, rad/√s
         It turns the level, too, and is not the body's motion: where no more is found than chance
-        makes of it, the body does not turn.
+        makes of it, the body is taken to turn by a part of it.
 
     Returns
     -------
@@ -276,7 +278,9 @@ def measured_standing(
     turns = turns_between(used, segment, home, every)
     found = _as_independent(turns, 1) ** 2
     noise = max(gyro_noise) ** 2 * float(segment.increments[:every, 0].sum())
-    turn = np.sqrt(np.where(found > BY_CHANCE * noise, found - noise, 0.0))
+    # By a turn of exactly nothing the attitude would count as known to what the second order of its
+    # errors belies.
+    turn = np.sqrt(np.where(found > BY_CHANCE * noise, found - noise, LEAST_TURN**2 * noise))
     return Standing(
         position=np.maximum(_as_independent(place, 4), least.position),
         velocity=np.maximum(_as_independent(velocity, 3), least.velocity),
