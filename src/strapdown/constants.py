@@ -11,9 +11,12 @@ __all__ = [
     "ACCEL_SUMS",
     "ACCEL_UNITS",
     "CORTEX_M4F_CYCLES",
+    "DEG_PER_HOUR",
     "GYRO_SUMS",
     "GYRO_UNITS",
+    "MAD_TO_SD",
     "MAG_UNITS",
+    "MICRO_G",
     "STANDARD_GRAVITY",
     "TIME_UNITS",
     "TWO_SIDED_95",
@@ -22,8 +25,16 @@ __all__ = [
 #: Conventional standard acceleration of gravity, m/s² (3rd CGPM, 1901, Resolution 2).
 STANDARD_GRAVITY = 9.80665
 
+#: Factors from rad/s to deg/h and from m/s² to µg, for what is shown to people.
+DEG_PER_HOUR = math.degrees(3600.0)
+MICRO_G = 1e6 / STANDARD_GRAVITY
+
 #: 95 % of a normal distribution lie within so many standard deviations.
 TWO_SIDED_95 = 1.959963984540054
+
+#: Standard deviation of a normal distribution over its median absolute deviation: one over the
+#: quantile of 3/4.
+MAD_TO_SD = 1.482602218505602
 
 _DEGREE = math.pi / 180.0
 

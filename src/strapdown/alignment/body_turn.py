@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.inertial_sums import InertialSums
 from strapdown.alignment.mean_errors import mean_of_drift
-from strapdown.alignment.north import CONTRADICTION, DEG_PER_H
+from strapdown.alignment.north import CONTRADICTION
 from strapdown.alignment.site import Site
+from strapdown.constants import DEG_PER_HOUR
 from strapdown.exceptions import Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
@@ -86,8 +87,8 @@ def turn_findings(
     )
     return (
         Finding(
-            f"the body turns about the vertical by {rate * DEG_PER_H:+.4g} deg/h (standard "
-            f"deviation {sd * DEG_PER_H:.2g}) against the local level at latitude "
+            f"the body turns about the vertical by {rate * DEG_PER_HOUR:+.4g} deg/h (standard "
+            f"deviation {sd * DEG_PER_HOUR:.2g}) against the local level at latitude "
             f"{site.lat_deg:.6g}{elsewhere}",
             file=source,
             quantity="gyro",

@@ -1,20 +1,28 @@
-"""An alignment taken to another instant by the gyros."""
+"""An alignment taken to another instant, or over its whole record, by the gyros."""
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.site import Site
+from strapdown.attitude import Quaternion, run_attitude
 from strapdown.exceptions import DataError
+from strapdown.increments import increments_from_imu
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.tables import check_imu
+from strapdown.tables import GYRO, QUATERNION, attitude_table, check_imu
+from strapdown.tables.checks import source_of, values_of
 
-__all__ = ["carry"]
+__all__ = ["carried_attitude", "carry"]
+
+Array = NDArray[np.float64]
 
 
 def carry(
@@ -58,10 +66,7 @@ def carry(
     if here == there:
         return alignment
     first, last = min(here, there), max(here, there)
-    piece = imu.iloc[first : last + 1]
-    if alignment.gyro_bias is not None:
-        piece = piece.copy()
-        piece[["gyro_x", "gyro_y", "gyro_z"]] -= alignment.gyro_bias
+    piece = _without_gyro_bias(imu.iloc[first : last + 1], alignment)
     sums = sum_inertially(piece)
     forward = there > here
     level = rotation.dcm_from_rotation_vector(
@@ -78,29 +83,67 @@ def carry(
         none = np.zeros_like(turn)
         covariance = covariance + sensor_covariance(sums, turn, none, sensors)
         covariance = covariance + sensor_noise(sums, turn, none, sensors)
-    return Alignment(
-        alignment.method,
-        float(stamps[there]),
-        rotation.quaternion_from_dcm(C_there),
-        np.asarray(covariance),
-        gyro_bias=alignment.gyro_bias,
-        accel_bias=alignment.accel_bias,
-        gyro_bias_sd=alignment.gyro_bias_sd,
-        accel_bias_sd=alignment.accel_bias_sd,
-        heading_given=alignment.heading_given,
-        measured_latitude_deg=alignment.measured_latitude_deg,
-        measured_latitude_sd_deg=alignment.measured_latitude_sd_deg,
-        findings=alignment.findings,
+    return replace(
+        alignment,
+        time=float(stamps[there]),
+        q_nb=rotation.quaternion_from_dcm(C_there),
+        covariance=np.asarray(covariance),
     )
 
 
-def _sample(stamps: np.ndarray, time: float, imu: pd.DataFrame) -> int:
+def carried_attitude(alignment: Alignment, imu: pd.DataFrame, site: Site) -> pd.DataFrame:
+    """Carry an attitude over the record that it was found in.
+
+    Parameters
+    ----------
+    alignment : Alignment
+        At an instant of the record; its gyro bias, where it has one, is taken off.
+    imu : DataFrame
+        Imu table of a body that stays at its place.
+    site : Site
+
+    Returns
+    -------
+    DataFrame
+        Attitude table: ``q_nb(t) = q_n(t)n(T) q_nb(T) q_b(T)b(t)``, the body's turn in inertial
+        space by the gyros and that of the level by the Earth's rate. One sample of a mean rate
+        has no step before it and is that of the first whole interval's start.
+
+    Raises
+    ------
+    DataError
+        The instant of the alignment is not in the record.
+    """
+    clean = _without_gyro_bias(imu, alignment)
+    run = run_attitude(Quaternion(), increments_from_imu(clean)).attitude
+    time = run.index.to_numpy(dtype=np.float64)
+    turned = values_of(run, QUATERNION)
+    at = int(np.argmin(np.abs(time - alignment.time)))
+    back = rotation.conjugate(turned[at])
+    level = rotation.quaternion_from_rotation_vector(
+        np.outer(time - alignment.time, -site.earth_rate)
+    )
+    here = rotation.compose(alignment.q_nb, back)
+    q_nb = rotation.compose(level, rotation.compose(here, turned))
+    return attitude_table(time, q_nb, source=source_of(imu))
+
+
+def _without_gyro_bias(imu: pd.DataFrame, alignment: Alignment) -> pd.DataFrame:
+    if alignment.gyro_bias is None:
+        return imu
+    clean = imu.copy()
+    clean[GYRO] = values_of(imu, GYRO) - alignment.gyro_bias
+    clean.attrs = dict(imu.attrs)
+    return clean
+
+
+def _sample(stamps: Array, time: float, imu: pd.DataFrame) -> int:
     slack = 0.5 * float(np.median(np.diff(stamps))) * (1.0 + 1e-6)
     if not stamps[0] - slack <= time <= stamps[-1] + slack:
         raise DataError(
             f"{time:.9g} s is not within the record, which lasts from {stamps[0]:.9g} to "
             f"{stamps[-1]:.9g} s: the gyros cannot carry the attitude there",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="time",
             remedy="give the record that holds both instants, on one clock",
         )

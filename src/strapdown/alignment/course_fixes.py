@@ -13,6 +13,7 @@ from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.exceptions import DataError
 from strapdown.increments import motion_increments
 from strapdown.tables import DV, VELOCITY, VELOCITY_SD, check_gnss
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -79,12 +80,12 @@ def course_fixes(
     if gnss is None:
         raise DataError(
             "there are no fixes, and a course comes from nothing else",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="gnss",
             remedy="give the Gnss table of the drive, or align at rest",
         )
     check_gnss(gnss)
-    source = gnss.attrs.get("source")
+    source = source_of(gnss)
     stamps = imu.index.to_numpy(dtype=np.float64)
     time = gnss.index.to_numpy(dtype=np.float64)
     velocity = gnss[VELOCITY].to_numpy(dtype=np.float64)
@@ -128,7 +129,7 @@ def course_fixes(
     if len(at) < 2:
         raise DataError(
             f"{len(at)} inertial samples lie between the fixes",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="time",
             remedy="use an inertial record that is faster than the fixes",
         )

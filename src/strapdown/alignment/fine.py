@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.claims import refuse_false_claims
 from strapdown.alignment.fine_epochs import (
     MOST_HEADING,
     epoch_ends,
@@ -20,7 +21,9 @@ from strapdown.alignment.fine_epochs import (
     settled,
 )
 from strapdown.alignment.fine_findings import fine_findings
-from strapdown.alignment.fine_result import Epochs, FineResult
+from strapdown.alignment.fine_record import telling_record
+from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
+from strapdown.alignment.north import unit_remedy
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
@@ -44,7 +47,7 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO, MOTION
-from strapdown.tables.checks import is_number, values_of
+from strapdown.tables.checks import is_number, source_of, values_of
 
 __all__ = ["FineAlignment"]
 
@@ -152,12 +155,27 @@ class FineAlignment:
         Raises
         ------
         DataError
-            The record is too short, or the coarse alignment belongs to another instant or does not
-            know the heading.
+            The record is too short or has gaps, the coarse alignment belongs to another instant or
+            does not know the heading, or the sensors' errors are beyond a linear filter.
+        DivergenceError
+            The mechanization has left the range in which it means anything.
         """
-        _check_coarse(coarse, imu)
+        _check_coarse(coarse, imu, site)
         increments = motion_increments(imu) if increments is None else _within(increments, imu)
         begin = float(increments.index[0] - increments["dt"].iloc[0])
+        with telling_record(imu):
+            return self._run(imu, increments, begin, site, sensors, coarse, progress)
+
+    def _run(
+        self,
+        imu: pd.DataFrame,
+        increments: pd.DataFrame,
+        begin: float,
+        site: Site,
+        sensors: ImuUncertainty,
+        coarse: Alignment,
+        progress: Progress | None,
+    ) -> FineResult:
         start = self._start(increments, site, coarse, begin)
         force = imu[ACCEL].to_numpy(dtype=np.float64).mean(axis=0)
         rate = imu[GYRO].to_numpy(dtype=np.float64).mean(axis=0)
@@ -179,7 +197,7 @@ class FineAlignment:
             raise DataError(
                 f"a record of {time[-1] - begin:.6g} s has {ends.size} epochs of "
                 f"{self.interval:g} s",
-                file=imu.attrs.get("source"),
+                file=source_of(imu),
                 quantity="time",
                 remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
                 "usual",
@@ -187,7 +205,7 @@ class FineAlignment:
         state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
         earth = rotation.rotate(rotation.conjugate(start.q_nb), site.earth_rate)
         steady = without_steady_turn(rows, earth)
-        whole = _free_run(filter_, state, time, steady, imu.attrs.get("source"))
+        whole = _free_run(filter_, state, time, steady, source_of(imu))
         home = replace(home_of(site, begin), q_nb=attitude_of_rest(whole))
         standing = self.standing
         if standing is None:
@@ -203,8 +221,8 @@ class FineAlignment:
                 progress((state.time - begin) / (float(time[-1]) - begin))
         used = slice(0, int(ends[-1]))
         result = FineResult(
-            alignment=epochs.alignment(state),
-            at_start=self._carried_back(filter_, epochs, state, increments.iloc[used]),
+            alignment=alignment_of(filter_, state),
+            at_start=self._carried_back(filter_, state, increments.iloc[used]),
             history=epochs.history(),
             innovations=epochs.innovations(),
             standing=standing,
@@ -213,8 +231,9 @@ class FineAlignment:
             prior_heading_sd_deg=math.degrees(prior_heading_sd(coarse)),
             filter=filter_,
             state=state,
-            source=imu.attrs.get("source"),
+            source=source_of(imu),
         )
+        refuse_false_claims(result, site)
         return replace(result, findings=fine_findings(result, site))
 
     def _start(
@@ -227,40 +246,37 @@ class FineAlignment:
         if abs(coarse.time - begin) <= slack:
             return replace(home, time=begin)
         if abs(coarse.time - end) <= slack:
-            back = run_mechanization(
-                replace(self.mechanization, height="held"),
-                replace(home, time=end),
-                increments,
-                backward=True,
-            )
-            return replace(home, time=begin, q_nb=back.end.q_nb)
+            back = self._backward(replace(home, time=end), increments)
+            return replace(home, time=begin, q_nb=back.q_nb)
         raise DataError(
             f"the coarse alignment holds at {coarse.time:.9g} s, and the record goes from "
             f"{begin:.9g} to {end:.9g} s",
-            file=increments.attrs.get("source"),
+            file=source_of(increments),
             quantity="time",
             remedy="give the attitude at its first or at its last sample",
         )
 
     def _carried_back(
-        self, filter_: ErrorFilter, epochs: Epochs, state: FilterState, increments: pd.DataFrame
+        self, filter_: ErrorFilter, state: FilterState, increments: pd.DataFrame
     ) -> Alignment:
         """The attitude at the first sample, by the gyros without their drifts."""
         clean = increments.copy()
         clean[list(MOTION)] = filter_.compensated(state, values_of(increments, MOTION))
         clean.attrs = dict(increments.attrs)
-        last = epochs.alignment(state)
+        last = alignment_of(filter_, state)
         end = filter_.mechanization.nav_state(state.mechanization, state.time)
-        still = replace(end, v_n=np.zeros(3))
-        back = run_mechanization(
-            replace(self.mechanization, height="held"), still, clean, backward=True
-        )
+        back = self._backward(replace(end, v_n=np.zeros(3)), clean)
         # Drifts that no rest can tell turn the body by as much as the attitude misplaces the rate
         # of the Earth; what the carrying adds is the noise of the gyros.
-        C = rotation.dcm_from_quaternion(back.end.q_nb)
-        noise = C * np.square(filter_.model.gyro_noise) @ C.T * abs(last.time - back.end.time)
+        C = rotation.dcm_from_quaternion(back.q_nb)
+        noise = C * np.square(filter_.model.gyro_noise) @ C.T * abs(last.time - back.time)
         covariance = np.asarray(last.covariance + noise)
-        return replace(last, time=back.end.time, q_nb=back.end.q_nb, covariance=covariance)
+        return replace(last, time=back.time, q_nb=back.q_nb, covariance=covariance)
+
+    def _backward(self, end: NavState, increments: pd.DataFrame) -> NavState:
+        """The state before the first increment, of a body that stands after the last."""
+        held = replace(self.mechanization, height="held")
+        return run_mechanization(held, end, increments, backward=True).end
 
 
 def _free_run(
@@ -281,19 +297,21 @@ def _free_run(
             row=row + 1,
             quantity=GYRO[axis],
             remedy="cut the record to where the body stands; filter a burst of outliers first "
-            "(prefilter robust_fir or summed); check the units",
+            "(prefilter robust_fir or summed); check the units; of sensors that are that poor take "
+            "the coarse alignment alone (--coarse-only)",
         ) from error
 
 
-def _check_coarse(coarse: Alignment, imu: pd.DataFrame) -> None:
+def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
     sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
     if not sd <= math.degrees(MOST_HEADING):
         raise DataError(
             f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard "
             f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="heading",
-            remedy="state the heading, or align longer, or use gyros of a better grade",
+            remedy=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
+            or "state the heading, or align longer, or use gyros of a better grade",
         )
 
 
@@ -307,7 +325,7 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     if part.empty:
         raise DataError(
             f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="increments",
             remedy="give those of the same record, or leave them out",
         )

@@ -9,9 +9,11 @@ import numpy as np
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import velocity_of_noise
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.exceptions import Finding
 
+#: Quantity of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+ROCKS = "rocking"
 # A heading less sure than this is no north.
 NO_NORTH = 5.0  # deg
 # Of what it was before, where a filter has found nothing.
@@ -25,8 +27,6 @@ OVER_NOISE = 3.0
 BEYOND = 4.0
 # Mean square of the innovations over what was expected; by epochs that are not all independent.
 INCONSISTENT = 3.0
-
-DEG_PER_HOUR = np.degrees(1.0) * 3600.0
 
 
 def fine_findings(result: FineResult, site: Site) -> tuple[Finding, ...]:
@@ -71,7 +71,17 @@ def _stands(result: FineResult) -> Iterator[Finding]:
     noise = velocity_of_noise(
         model.gyro_noise, model.accel_noise, result.interval, len(result.history) - 1
     )
-    if velocity > max(MOST_VELOCITY, OVER_NOISE * noise) or turn > MOST_TURN:
+    moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
+    if not moves and turn > MOST_TURN:
+        yield Finding(
+            f"the body rocks: from epoch to epoch it turns by {turn:.3g} deg, and stays at its "
+            f"place within {velocity:.2g} m/s (one standard deviation): this is in the stated "
+            "uncertainty",
+            file=result.source,
+            quantity=ROCKS,
+            remedy="nothing, where it is known to rock; a body that stands is aligned sooner",
+        )
+    elif moves:
         yield Finding(
             f"the body does not stand: from epoch to epoch it moves by {velocity:.3g} m/s and "
             f"turns by {turn:.3g} deg (one standard deviation)",

@@ -16,15 +16,15 @@ from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.estimation.observation import Observation
 from strapdown.exceptions import Finding
+from strapdown.tables import EULER
 
-__all__ = ["FINE_COLUMNS", "FineResult"]
+__all__ = ["FINE_COLUMNS", "Epochs", "FineResult", "alignment_of"]
 
 Array = NDArray[np.float64]
 
-ANGLES = ("roll", "pitch", "heading")
 BIASES = tuple(f"{sensor}_bias_{axis}" for sensor in ("gyro", "accel") for axis in "xyz")
 #: Columns of the history: degrees, rad/s and m/s², and the standard deviation of each.
-FINE_COLUMNS = (*ANGLES, *BIASES, *(f"{name}_sd" for name in (*ANGLES, *BIASES)))
+FINE_COLUMNS = (*EULER, *BIASES, *(f"{name}_sd" for name in (*EULER, *BIASES)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,28 @@ class FineResult:
     source: str | None = None
 
 
+def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
+    """Read a state of a filter as an alignment.
+
+    The turn of the level with the place, 1.6e-7 rad a metre, is nothing beside the attitude's
+    own uncertainty and left out.
+    """
+    here = filter_.mechanization.nav_state(state.mechanization, state.time)
+    P = filter_.physical_covariance(state)
+    level = filter_.mechanization.level_from_ned(state.row)
+    sd = np.sqrt(np.diagonal(P))
+    return Alignment(
+        method="fine",
+        time=state.time,
+        q_nb=here.q_nb,
+        covariance=level.T @ P[6:9, 6:9] @ level,
+        gyro_bias=state.sensors[:3].copy(),
+        accel_bias=state.sensors[3:6].copy(),
+        gyro_bias_sd=sd[PHYSICAL : PHYSICAL + 3],
+        accel_bias_sd=sd[PHYSICAL + 3 : PHYSICAL + 6],
+    )
+
+
 class Epochs:
     """Collects the epochs of a run.
 
@@ -88,7 +110,7 @@ class Epochs:
 
     def add(self, state: FilterState, seen: Mapping[str, tuple[Observation, Innovations]]) -> None:
         """Take an epoch."""
-        alignment = self.alignment(state)
+        alignment = alignment_of(self._filter, state)
         assert alignment.gyro_bias is not None and alignment.accel_bias is not None
         assert alignment.gyro_bias_sd is not None and alignment.accel_bias_sd is not None
         self._time.append(state.time)
@@ -106,28 +128,6 @@ class Epochs:
         )
         for name, (observation, innovations) in seen.items():
             self._seen.setdefault(name, []).append((state.time, observation, innovations))
-
-    def alignment(self, state: FilterState) -> Alignment:
-        """Read a state as an alignment.
-
-        The turn of the level with the place, 1.6e-7 rad a metre, is nothing beside the attitude's
-        own uncertainty and left out.
-        """
-        filter_ = self._filter
-        here = filter_.mechanization.nav_state(state.mechanization, state.time)
-        P = filter_.physical_covariance(state)
-        level = filter_.mechanization.level_from_ned(state.row)
-        sd = np.sqrt(np.diagonal(P))
-        return Alignment(
-            method="fine",
-            time=state.time,
-            q_nb=here.q_nb,
-            covariance=level.T @ P[6:9, 6:9] @ level,
-            gyro_bias=state.sensors[:3].copy(),
-            accel_bias=state.sensors[3:6].copy(),
-            gyro_bias_sd=sd[PHYSICAL : PHYSICAL + 3],
-            accel_bias_sd=sd[PHYSICAL + 3 : PHYSICAL + 6],
-        )
 
     def history(self) -> pd.DataFrame:
         """Estimates and their standard deviations, by time."""

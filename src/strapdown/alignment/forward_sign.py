@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.course_fixes import CourseFixes
 from strapdown.exceptions import Finding
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -58,7 +59,7 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, reverse: bool) -> tuple
             f"the force along the forward axis falls by {-slope:.2g} m/s² per m/s² by which the "
             f"vehicle gains speed (standard deviation {sd:.1g}): it drives the other way round "
             "than taken",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="heading",
             remedy="state reverse = "
             + ("false" if reverse else "true")

@@ -120,7 +120,7 @@ class GnssCourse(CoarseAlignment):
         level = rotation.dcm_from_rotation_vector(_level_rate(fixes, site) * ago)
         back = level @ C_last @ turned[-1].T @ turned
         heading = np.arctan2(back[:, 1, 0], back[:, 0, 0])
-        off = _wrap(fixes.course + yaw - heading)
+        off = np.radians(rotation.within_half_turn(np.degrees(fixes.course + yaw - heading)))
         drift = _gyro_sd(sensors) * (fixes.time[-1] - fixes.time)
         weight = 1.0 / (np.square(fixes.course_sd) + np.square(drift) + 1e-12)
         weight /= weight.sum()
@@ -148,10 +148,6 @@ class GnssCourse(CoarseAlignment):
             heading_given=True,
             findings=findings,
         )
-
-
-def _wrap(angle: Array) -> Array:
-    return np.asarray((angle + math.pi) % (2.0 * math.pi) - math.pi)
 
 
 def _gyro_sd(sensors: ImuUncertainty) -> float:

@@ -166,7 +166,7 @@ def _refuse_travel(
         f"{noise.sway:.3g} m (root mean square), {noise.ratio:.3g} times what the noise of the "
         f"sensors explains, and the heading is not known to better than "
         f"{np.degrees(sd[2]):.3g} deg",
-        file=imu.attrs.get("source"),
+        file=source_of(imu),
         quantity="accel",
         remedy=unit_remedy(rate, site)
         or "align while the vehicle stands (it may rock), or with gnss_course while it drives; "

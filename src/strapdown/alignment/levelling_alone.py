@@ -14,6 +14,7 @@ from strapdown.alignment.rest_level import level_at_rest
 from strapdown.alignment.site import Site
 from strapdown.exceptions import Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables.checks import source_of
 
 __all__ = ["UNKNOWN_HEADING", "Levelling"]
 
@@ -47,7 +48,7 @@ class Levelling(CoarseAlignment):
         unknown = Finding(
             "the heading is not known: 0 deg stands for any, with the standard deviation of a "
             f"uniform one, {math.degrees(UNKNOWN_HEADING):.1f} deg",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="heading",
             remedy="state it (known_heading), find it by the gyros (two_vector, inertial_frame), "
             "or by GNSS while moving (gnss_course)",

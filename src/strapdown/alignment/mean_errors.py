@@ -31,7 +31,7 @@ def rate_covariance(sensors: ImuUncertainty, length: float, rate: Array, force: 
     ndarray, (3, 3), (rad/s)²
     """
     gyro = sensors.gyro
-    variance = _of_input(gyro.axis("scale"), gyro.axis("misalignment"), rate)
+    variance = gyro.variance_by_input(rate)
     variance += np.array(gyro.axis("g_sensitivity")) ** 2 * float(force @ force)
     variance += _own(gyro.axis("bias"), gyro.axis("noise_density"), sensors.gyro_drift, length)
     return np.diag(variance)
@@ -40,7 +40,7 @@ def rate_covariance(sensors: ImuUncertainty, length: float, rate: Array, force: 
 def force_covariance(sensors: ImuUncertainty, length: float, force: Array) -> Array:
     """Covariance of a mean specific force; (3, 3), (m/s²)², as `rate_covariance`."""
     accel = sensors.accel
-    variance = _of_input(accel.axis("scale"), accel.axis("misalignment"), force)
+    variance = accel.variance_by_input(force)
     variance += _own(accel.axis("bias"), accel.axis("noise_density"), sensors.accel_drift, length)
     return np.diag(variance)
 
@@ -77,8 +77,3 @@ def mean_of_drift(drift: BiasDrift, length: float) -> Array:
 def _own(bias: Triad, density: Triad, drift: BiasDrift, length: float) -> Array:
     noise = np.square(density) / length
     return np.asarray(np.square(bias) + noise + mean_of_drift(drift, length))
-
-
-def _of_input(scale: Triad, across: Triad, mean: Array) -> Array:
-    others = float(mean @ mean) - mean * mean
-    return np.asarray(np.square(scale) * mean * mean + np.square(across) * others)

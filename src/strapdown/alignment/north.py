@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.alignment.site import Site
+from strapdown.constants import DEG_PER_HOUR
 from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
@@ -13,7 +14,6 @@ Array = NDArray[np.float64]
 
 __all__ = [
     "CONTRADICTION",
-    "DEG_PER_H",
     "HIGH_LATITUDE",
     "LARGEST_SD",
     "latitude_findings",
@@ -27,7 +27,6 @@ LARGEST_SD = 1.0
 HIGH_LATITUDE = 70.0
 #: So many standard deviations are no chance: one in two million.
 CONTRADICTION = 5.0
-DEG_PER_H = np.degrees(1.0) * 3600.0
 
 
 def north_findings(
@@ -63,9 +62,9 @@ def north_findings(
         told = f"{np.degrees(sd):.3g} deg" if sd < 1e3 else "without bound"
         raise DataError(
             f"the gyros cannot find north: the standard deviation of the heading is {told} (at "
-            f"most {np.degrees(LARGEST_SD):.0f}); at latitude {site.lat_deg:.6g} deg the Earth "
-            f"turns at {across * DEG_PER_H:.3g} deg/h about north, and the bias of the gyros is "
-            f"known to {bias * DEG_PER_H:.3g} deg/h",
+            f"most {np.degrees(LARGEST_SD):.0f} deg); at latitude {site.lat_deg:.6g} deg the Earth "
+            f"turns at {_rounded(across * DEG_PER_HOUR)} deg/h about north, and the bias of the "
+            f"gyros is known to {bias * DEG_PER_HOUR:.3g} deg/h",
             file=source,
             quantity="heading",
             remedy=(
@@ -108,6 +107,11 @@ def unit_remedy(rate: Array, site: Site) -> str:
     return ""
 
 
+def _rounded(rate: float) -> str:
+    """A rate in deg/h; what rounding leaves of none is none."""
+    return f"{rate:.3g}" if rate > 1e-9 else "0"
+
+
 def latitude_findings(
     site: Site, measured_deg: float, sd_deg: float, source: str | None
 ) -> tuple[Finding, ...]:
@@ -128,6 +132,17 @@ def latitude_findings(
     off = measured_deg - site.lat_deg
     if not abs(off) > CONTRADICTION * sd_deg:
         return ()
+    if abs(measured_deg) > 90.0 + CONTRADICTION * sd_deg:
+        told = "the Earth's rate, as the gyros read it, and gravity lie as at no latitude"
+        return (
+            Finding(
+                f"{told}: the site says {site.lat_deg:.6g} deg",
+                file=source,
+                quantity="latitude",
+                remedy="check units, axes and signs of the gyros and of the accelerometers, the "
+                "stated bias of the gyros, and that the body stood where it was aligned",
+            ),
+        )
     return (
         Finding(
             f"the sensors tell {measured_deg:.4g} deg (standard deviation {sd_deg:.2g}) from the "

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.fine_epochs import settled_epoch
-from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment.fine_result import FineResult, alignment_of
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import home_of
 from strapdown.estimation.error_filter import FilterState
-from strapdown.estimation.error_model import PHYSICAL
 
 __all__ = ["Manoeuvre", "manoeuvres_after", "null_space"]
 
@@ -156,16 +155,14 @@ def _forecast(result: FineResult, site: Site, name: str, turn: Array, rest: floa
             result.standing,
             tuple(result.innovations),
         )
-    P = filter_.physical_covariance(state)
-    level = used.level_from_ned(state.row)
-    attitude = level.T @ P[6:9, 6:9] @ level
-    sd = np.sqrt(np.diagonal(P))
+    after = alignment_of(filter_, state)
+    assert after.gyro_bias_sd is not None and after.accel_bias_sd is not None
     return Manoeuvre(
         name,
         rest,
-        np.degrees(np.sqrt(np.diagonal(attitude))),
-        sd[PHYSICAL : PHYSICAL + 3],
-        sd[PHYSICAL + 3 : PHYSICAL + 6],
+        np.degrees(np.sqrt(np.diagonal(after.covariance))),
+        after.gyro_bias_sd,
+        after.accel_bias_sd,
     )
 
 

@@ -44,13 +44,19 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
     row = int(np.argmax(steps[:, channel])) + 1
     return (
         Finding(
-            f"{len(large)} steps from sample to sample are more than {FACTOR:g} times as large as "
-            f"99 of 100 are, the largest, {ratio[channel]:.3g} times, to "
-            f"{values[row, channel]:.4g}: outliers or shocks",
+            f"{_steps(len(large))} more than {FACTOR:g} times as large as 99 of 100 are, the "
+            f"largest, {ratio[channel]:.3g} times, to {values[row, channel]:.4g}: outliers or "
+            "shocks",
             file=source,
             row=row + 1,
             quantity=columns[channel],
-            remedy="replace outliers by the robust filter before the alignment, or align over "
-            "a stretch without them",
+            remedy="take a pre-filter that replaces outliers (--prefilter robust_fir; kind = "
+            '"robust_fir" in [prefilter]), or align over a stretch without them',
         ),
     )
+
+
+def _steps(count: int) -> str:
+    if count == 1:
+        return "one step from sample to sample is"
+    return f"{count} steps from sample to sample are"

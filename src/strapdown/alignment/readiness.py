@@ -16,6 +16,7 @@ from strapdown.alignment.site import Site
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import EULER, QUATERNION, check_attitude
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -92,7 +93,7 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
     if not length >= 2.0 * SHORTEST:
         raise DataError(
             f"the record lasts {length:.3g} s, and readiness is asked from {SHORTEST:g} s on",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="time",
             remedy=f"use a record of {2.0 * SHORTEST:g} s or more",
         )
@@ -185,6 +186,6 @@ def _row(
     if reference is not None:
         row = int(np.argmin(np.abs(reference.index.to_numpy() - found.time)))
         true = rotation.euler_from_quaternion(reference[QUATERNION].to_numpy()[row])
-        errors = (found.roll_pitch_heading - true + 180.0) % 360.0 - 180.0
+        errors = rotation.within_half_turn(found.roll_pitch_heading - true)
     numbers = [found.time, *found.roll_pitch_heading, *found.sd_deg, *errors]
     return [*numbers, len(found.findings), ""]

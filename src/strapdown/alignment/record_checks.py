@@ -11,6 +11,7 @@ from strapdown.alignment.outliers import outlier_findings
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError, Finding
 from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
         channel does not change at all while others do.
     """
     check_imu(imu)
-    source = imu.attrs.get("source")
+    source = source_of(imu)
     if ACCEL[0] not in imu.columns:
         raise DataError(
             "there is no accelerometer, and an alignment needs the direction of gravity",

@@ -10,6 +10,7 @@ from strapdown.alignment.site import Site
 from strapdown.earth import radii_of_curvature
 from strapdown.exceptions import DataError, Finding
 from strapdown.tables import VELOCITY, VELOCITY_SD, check_gnss
+from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
@@ -69,7 +70,7 @@ def still_by_gnss(
         f"takes it for standing: the heading may err by {np.degrees(error):.2g} deg"
     )
     row = int(np.flatnonzero(good)[0]) + 1
-    file = gnss.attrs.get("source")
+    file = source_of(gnss)
     remedy = "align while the vehicle stands, or with gnss_course while it drives"
     if error > heading_sd:
         raise DataError(what, file=file, row=row, quantity="VN, VE", remedy=remedy)

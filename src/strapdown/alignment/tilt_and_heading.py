@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.exceptions import DataError
 
 Array = NDArray[np.float64]
@@ -56,8 +57,6 @@ def error_of_force_and_heading(
         )
     steep, heading = np.tan(np.radians(pitch_deg)), np.radians(heading_deg)
     row = np.array([steep * np.cos(heading), steep * np.sin(heading), 1.0])
-    x, y, z = force
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     along = force / (row @ force)
-    by_force = (np.eye(3) - np.outer(along, row)) @ cross / (force @ force)
+    by_force = (np.eye(3) - np.outer(along, row)) @ rotation.cross_matrix(force) / (force @ force)
     return np.asarray(by_force), np.asarray(along)

@@ -22,7 +22,6 @@ from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.mean_errors import force_covariance, gravity_change, rate_covariance
 from strapdown.alignment.north import (
     CONTRADICTION,
-    DEG_PER_H,
     LARGEST_SD,
     latitude_findings,
     north_findings,
@@ -31,6 +30,7 @@ from strapdown.alignment.north import (
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
+from strapdown.constants import DEG_PER_HOUR
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables.checks import source_of
@@ -176,10 +176,10 @@ def _check_rate(
     size, sd = float(np.sqrt(rate @ rate)), float(np.sqrt(np.trace(covariance)))
     if not abs(size - earth) > CONTRADICTION * sd:
         return ()
-    bias = max(sensors.gyro.axis("bias")) * DEG_PER_H
+    bias = max(sensors.gyro.axis("bias")) * DEG_PER_HOUR
     told = Finding(
-        f"the mean rate over {means.length:.4g} s is {size * DEG_PER_H:.4g} deg/h (standard "
-        f"deviation {sd * DEG_PER_H:.2g}), and the Earth's is {earth * DEG_PER_H:.4g}",
+        f"the mean rate over {means.length:.4g} s is {size * DEG_PER_HOUR:.4g} deg/h (standard "
+        f"deviation {sd * DEG_PER_HOUR:.2g}), and the Earth's is {earth * DEG_PER_HOUR:.4g}",
         file=source,
         quantity="gyro",
         remedy=unit_remedy(rate, site)
@@ -232,7 +232,7 @@ def _disturbed(
         ]
     )
     middle = rotation.euler_from_dcm(triad_attitude(means.whole_force, means.whole_rate, site))[2]
-    off = (headings - middle + 180.0) % 360.0 - 180.0
+    off = rotation.within_half_turn(headings - middle)
     angle = np.degrees(np.sqrt(np.trace(swing)))
     first, last = (middle + off.min()) % 360.0, (middle + off.max()) % 360.0
     return Finding(

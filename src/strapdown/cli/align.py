@@ -7,17 +7,23 @@ from typing import Annotated, Any
 
 import typer
 
+from strapdown.cli.log_options import (
+    AccelUnit,
+    Axes,
+    Columns,
+    GyroUnit,
+    Rate,
+    Repair,
+    Sampling,
+    TimeUnit,
+)
+
 EPILOG = (
     "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000   |   "
     "Example: strapdown align align.toml (strapdown init align LOG writes one)"
 )
 MOST = 6  # findings on the terminal
-_WHERE, _LOG, _RUN, _OUT = (
-    "Where it stands, and with what",
-    "How to read the log",
-    "What to run",
-    "What to write",
-)
+_WHERE, _RUN, _OUT = "Where it stands, and with what", "What to run", "What to write"
 
 
 def align(
@@ -81,50 +87,23 @@ def align(
         ),
     ] = "none",
     from_s: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
+        float | None,
+        typer.Option(
+            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
+        ),
     ] = None,
     duration: Annotated[
         float | None,
-        typer.Option(metavar="S", help="Use so much of the log.", rich_help_panel=_RUN),
+        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
     ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(metavar="HZ", help="Of a log without a time column.", rich_help_panel=_LOG),
-    ] = None,
-    sampling: Annotated[
-        str | None,
-        typer.Option(metavar="KIND", help="instantaneous or mean.", rich_help_panel=_LOG),
-    ] = None,
-    columns: Annotated[
-        list[str] | None,
-        typer.Option(metavar="Q=NAME", help="time=t,gyro_x=wx,…", rich_help_panel=_LOG),
-    ] = None,
-    gyro_unit: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.", rich_help_panel=_LOG
-        ),
-    ] = None,
-    accel_unit: Annotated[
-        str | None,
-        typer.Option(metavar="UNIT", help="m/s2, g, mg, …; m/s: increments.", rich_help_panel=_LOG),
-    ] = None,
-    time_unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.", rich_help_panel=_LOG)
-    ] = None,
-    axes: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z",
-            help="Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
-            "forward-left-up. A matrix goes in the file of an alignment.",
-            rich_help_panel=_LOG,
-        ),
-    ] = None,
-    repair: Annotated[
-        bool,
-        typer.Option("--repair", help="Leave out rows that cannot be used.", rich_help_panel=_LOG),
-    ] = False,
+    rate: Rate = None,
+    sampling: Sampling = None,
+    columns: Columns = None,
+    gyro_unit: GyroUnit = None,
+    accel_unit: AccelUnit = None,
+    time_unit: TimeUnit = None,
+    axes: Axes = None,
+    repair: Repair = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder to make (LOG-align).", rich_help_panel=_OUT),

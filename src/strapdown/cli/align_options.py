@@ -27,7 +27,7 @@ FLAGS = {
     "gnss, path": "--gnss",
     "log, sampling": "--sampling",
     "log, rate_hz": "--rate",
-    "log, to_s": "--duration",
+    "log, duration_s": "--duration",
     "log, gyro_unit": "--gyro-unit",
     "log, accel_unit": "--accel-unit",
     "log, time_unit": "--time-unit",
@@ -87,9 +87,6 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             remedy="name one of the catalogue (strapdown modules) or a .toml file of your own; or "
             "state bias and noise in the file of an alignment (strapdown init align)",
         )
-    begin = first
-    if duration is not None and first is None:
-        begin = _begin(log)
     options = {
         "path": str(log),
         "columns": parse_column_option(given["columns"] or []),
@@ -100,7 +97,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         "rate_hz": given["rate"],
         "repair": bool(given["repair"]),
         "from_s": first,
-        "to_s": None if duration is None else (begin or 0.0) + duration,
+        "duration_s": duration,
     }
     coarse = _module(given["method"] or "inertial_frame")
     alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
@@ -118,17 +115,25 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     try:
         return alignment_spec(table)
     except ValidationError as error:
-        first_one = error.errors()[0]
-        place = ", ".join(str(p) for p in first_one["loc"])
-        context = first_one.get("ctx", {})
-        what = context.get("what") or f"{first_one['input']!r} does not fit: {first_one['msg']}"
-        if context.get("key"):
-            place = f"{place}, {context['key']}"
-        raise ConfigError(
-            what, quantity=_flag(place), remedy=context.get("remedy") or "give another value"
-        ) from None
+        raise _refused(error.errors()[0]) from None
     except ConfigError as error:
         raise _as_flag(error) from None
+
+
+def _refused(error: Any) -> ConfigError:
+    """What pydantic finds in flags, in our words."""
+    path = [str(p) for p in error["loc"]]
+    context = error.get("ctx", {})
+    if error["type"] == "missing":
+        what, remedy = "it is missing", f"write it after the colon: {path[-1]}=…"
+    elif error["type"] == "finite_number":
+        what, remedy = f"{error['input']} is no number", "give a finite number"
+    else:
+        what = context.get("what") or f"{error['input']!r} does not fit: {error['msg'].lower()}"
+        remedy = context.get("remedy") or "give another value"
+    if context.get("key"):
+        path.append(context["key"])
+    return ConfigError(what, quantity=_flag(", ".join(path)), remedy=remedy)
 
 
 def _as_flag(error: StrapdownError) -> StrapdownError:
@@ -141,18 +146,14 @@ def _as_flag(error: StrapdownError) -> StrapdownError:
 def _flag(place: str) -> str:
     if place in FLAGS:
         return FLAGS[place]
+    # Where it was told by name of the flag already, that is the name.
+    said = [part for part in place.split(", ") if part.startswith("--")]
+    if said:
+        return said[-1]
     stage, _, rest = place.partition(", ")
     if stage not in _STAGES:
         return place
     return f"{_STAGES[stage]}, {rest}" if rest and rest != "kind" else _STAGES[stage]
-
-
-def _begin(log: Path) -> float:
-    """The instant at which a log begins, where its stamps are seconds already; else zero."""
-    raw = read_raw(log)
-    named = [s for s, (q, unit) in raw.stated.items() if q == "time" and unit == "s"]
-    stamp = float(raw.columns[named[0]][0]) if named and len(raw.columns[named[0]]) else 0.0
-    return stamp if 0.0 < stamp < 1e6 and stamp > 1.0 else 0.0
 
 
 def _site(log: Path, given: Mapping[str, Any]) -> dict[str, float]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from strapdown.cli.console import console, print_table
 from strapdown.report.alignment_tables import answer_table, bias_table, readiness_table
-from strapdown.report.alignment_words import headline, limits, trust
+from strapdown.report.alignment_trust import trust
+from strapdown.report.alignment_words import headline, limits
 from strapdown.report.crash_values import spaced
 from strapdown.report.document import TableBlock
 from strapdown.systems.alignment_run import AlignmentResult

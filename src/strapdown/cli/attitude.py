@@ -8,11 +8,22 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.log_options import (
+    LOG_PANEL,
+    AccelUnit,
+    Axes,
+    Columns,
+    GyroUnit,
+    Repair,
+    Sampling,
+    TimeUnit,
+)
+
 EPILOG = (
     "Example: strapdown attitude alexiev-fig4 --rate 100   |   "
     "Example: strapdown attitude log.csv --gyro-unit deg/s --reference 'end same as start'"
 )
-_LOG, _RUN, _OUT = "How to read the log", "What to run", "What to write"
+_RUN, _OUT = "What to run", "What to write"
 
 
 def attitude(
@@ -112,61 +123,16 @@ def attitude(
         typer.Option(
             metavar="HZ",
             help="Rate of a scenario (100), or of a log without a time column.",
-            rich_help_panel=_LOG,
+            rich_help_panel=LOG_PANEL,
         ),
     ] = None,
-    sampling: Annotated[
-        str | None,
-        typer.Option(
-            metavar="KIND",
-            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
-            "there).",
-            rich_help_panel=_LOG,
-        ),
-    ] = None,
-    columns: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="Q=NAME",
-            help="time=t,gyro_x=wx,… ; a number counts columns from 1; gyro=NAME for an array of "
-            "three.",
-            rich_help_panel=_LOG,
-        ),
-    ] = None,
-    gyro_unit: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.", rich_help_panel=_LOG
-        ),
-    ] = None,
-    accel_unit: Annotated[
-        str | None,
-        typer.Option(
-            metavar="UNIT",
-            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS); m/s: increments.",
-            rich_help_panel=_LOG,
-        ),
-    ] = None,
-    time_unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.", rich_help_panel=_LOG)
-    ] = None,
-    axes: Annotated[
-        str | None,
-        typer.Option(
-            metavar="X,Y,Z",
-            help="Sensor axes that point forward, right, down: 'x,-y,-z' for a sensor whose axes "
-            "point forward, left, up.",
-            rich_help_panel=_LOG,
-        ),
-    ] = None,
-    repair: Annotated[
-        bool,
-        typer.Option(
-            "--repair",
-            help="Leave out rows that cannot be used, undo a wrapped clock, and say so.",
-            rich_help_panel=_LOG,
-        ),
-    ] = False,
+    sampling: Sampling = None,
+    columns: Columns = None,
+    gyro_unit: GyroUnit = None,
+    accel_unit: AccelUnit = None,
+    time_unit: TimeUnit = None,
+    axes: Axes = None,
+    repair: Repair = False,
     seed: Annotated[
         int | None, typer.Option(help="Of a scenario's noise (0).", rich_help_panel=_RUN)
     ] = None,

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.log_options import AccelUnit, Axes, GyroUnit, Rate, Sampling, TimeUnit
+
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
@@ -93,17 +95,12 @@ def align(
             metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
         ),
     ],
-    gyro_unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.")
-    ] = None,
-    accel_unit: Annotated[
-        str | None, typer.Option(metavar="UNIT", help="m/s2, g, mg, …; m/s: increments.")
-    ] = None,
-    time_unit: Annotated[str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.")] = None,
-    axes: Annotated[
-        str | None,
-        typer.Option(metavar="X,Y,Z", help="As 'x,-y,-z', or forward-left-up."),
-    ] = None,
+    gyro_unit: GyroUnit = None,
+    accel_unit: AccelUnit = None,
+    time_unit: TimeUnit = None,
+    axes: Axes = None,
+    rate: Rate = None,
+    sampling: Sampling = None,
     out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
         "align.toml"
     ),
@@ -121,7 +118,12 @@ def align(
 
     check_free(out, force)
     options = ReadOptions(
-        gyro_unit=gyro_unit, accel_unit=accel_unit, time_unit=time_unit, axes=axes
+        gyro_unit=gyro_unit,
+        accel_unit=accel_unit,
+        time_unit=time_unit,
+        axes=axes,
+        rate=rate,
+        sampling=sampling,
     )
     draft = draft_alignment(log, folder=out.absolute().parent, options=options)
     write_file(out, draft.text, force=force)

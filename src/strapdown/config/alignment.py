@@ -51,6 +51,8 @@ class LogTable(TableSpec):
     repair: StrictBool = False
     from_s: Number | None = None
     to_s: Number | None = None
+    #: From `from_s`, or from the first stamp.
+    duration_s: Positive | None = None
 
 
 class GnssTable(TableSpec):

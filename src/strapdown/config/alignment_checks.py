@@ -139,6 +139,9 @@ class _Checks:
 
     def times(self, spec: AlignmentSpec) -> None:
         log = spec.log
+        if log is not None and log.to_s is not None and log.duration_s is not None:
+            remedy = "keep one of the two"
+            raise self.refuse(("log", "duration_s"), "to_s says it already", remedy)
         if (
             log is not None
             and log.from_s is not None
@@ -155,6 +158,8 @@ class _Checks:
                     f"{spec.simulation.rate_hz * longest:.3g} samples are too many",
                     f"stay below {MOST_SAMPLES:.0e}: a lower rate_hz, or a shorter duration_s",
                 )
+        elif log is not None and log.duration_s is not None:
+            longest = log.duration_s
         elif log is not None and log.from_s is not None and log.to_s is not None:
             longest = log.to_s - log.from_s
         else:

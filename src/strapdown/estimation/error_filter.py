@@ -26,8 +26,9 @@ from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
 
-# Part by which noise is larger than what is known of it. What is left is a difference of numbers
-# that are alike to this part, and its correlations must still be right to 1e-9.
+# Part by which noise is larger than what is known of it, so that what is left is no less than zero:
+# of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
+# whole, 2e-16, must be nothing beside this part of it (`_kernels.factors.INDEFINITE`).
 ROUNDING = 1e-5
 # Place of the rotation among the physical errors.
 ROTATION = slice(6, 9)

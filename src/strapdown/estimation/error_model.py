@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.estimation.states import StateBlock, StateLayout
+from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.sensors.triad_errors import Triad
 
@@ -109,3 +110,23 @@ class ErrorModel(ABC):
         What the model does not hold, such as a height that is kept, is lost; what is nothing
         physical, such as the norm of a quaternion, is zero.
         """
+
+
+def refuse_damped_height(mechanization: Mechanization) -> None:
+    """Refuse a mechanization whose height has a loop of its own.
+
+    Parameters
+    ----------
+    mechanization : Mechanization
+
+    Raises
+    ------
+    ConfigError
+        Its height is damped.
+    """
+    if mechanization.height == "damped":
+        raise ConfigError(
+            "an error model has no states for the loop that damps the height",
+            quantity="height",
+            remedy="use height='held' or 'free', and give heights as measurements",
+        )

@@ -11,7 +11,13 @@ from strapdown._kernels import wander_error_states as states
 from strapdown._kernels import wander_errors as kernel
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_model import PHYSICAL, Array, ErrorModel, Segment
+from strapdown.estimation.error_model import (
+    PHYSICAL,
+    Array,
+    ErrorModel,
+    Segment,
+    refuse_damped_height,
+)
 from strapdown.estimation.sensor_states import stacked
 from strapdown.estimation.states import StateBlock
 from strapdown.exceptions import ConfigError
@@ -196,10 +202,5 @@ def _checked(mechanization: Mechanization) -> Mechanization:
             quantity="mechanization",
             remedy=f"use mechanization '{WanderAzimuth.name}', or error model 'rotation_vector'",
         )
-    if mechanization.height == "damped":
-        raise ConfigError(
-            "an error model has no states for the loop that damps the height",
-            quantity="height",
-            remedy="use height='held' or 'free', and give heights as measurements",
-        )
+    refuse_damped_height(mechanization)
     return mechanization

@@ -68,13 +68,8 @@ def resting_states(
 
 def _resting(triad: TriadUncertainty, drift: BiasDrift, value: Array) -> Array:
     """Variance of each axis."""
-    across = float(value @ value) - value**2
-    return np.asarray(
-        np.square(triad.axis("bias"))
-        + np.square(drift.triad)
-        + np.square(np.asarray(triad.axis("scale")) * value)
-        + np.square(triad.axis("misalignment")) * across
-    )
+    constant = np.square(triad.axis("bias")) + np.square(drift.triad)
+    return np.asarray(constant + triad.variance_by_input(value))
 
 
 def _walk(drift: BiasDrift) -> tuple[float, float, float]:

@@ -9,10 +9,15 @@ import numpy as np
 
 from strapdown._kernels import psi_model as kernel
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_model import PHYSICAL, Array, ErrorModel, Segment
+from strapdown.estimation.error_model import (
+    PHYSICAL,
+    Array,
+    ErrorModel,
+    Segment,
+    refuse_damped_height,
+)
 from strapdown.estimation.sensor_states import stacked
 from strapdown.estimation.states import StateBlock
-from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Mechanization
 
 AXES = ("x", "y", "z")
@@ -53,12 +58,7 @@ class RotationVectorModel(ErrorModel):
             The height of the mechanization is damped: its loop has states of its own.
         """
         used = segment.mechanization
-        if used.height == "damped":
-            raise ConfigError(
-                "an error model has no states for the loop that damps the height",
-                quantity="height",
-                remedy="use height='held' or 'free', and give heights as measurements",
-            )
+        refuse_damped_height(used)
         n = self.layout.size
         k = n - PHYSICAL
         phi, q = np.empty((n, n)), np.empty((n, n))

@@ -189,7 +189,7 @@ class Prefilter(ABC):
                 return pd.DataFrame(columns=MOTION, dtype=float)
             return motion_increments(table, interpolation="cubic")
         out = pd.DataFrame(rows, index=table.index.copy(), columns=MOTION)
-        out.attrs["source"] = table.attrs.get("source")
+        out.attrs["source"] = source_of(table)
         check_motion_increments(out)
         return out
 

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.outliers import REPLACED
 from strapdown.dsp.samples import check_segment
 from strapdown.estimation.covariance import CovarianceForm
@@ -28,8 +29,8 @@ __all__ = ["RobustWd", "RobustWdState"]
 SETTLE = 256
 # A sample with less weight was replaced: its residual is beyond 5.4 standard deviations of Huber's.
 BELIEVED = 0.25
-# Of a sixth difference over twenty, by white noise; and of a median of sizes, one over.
-RESIDUAL, TO_SIGMA = math.sqrt(924.0) / 20.0, 1.482602218505602
+# Of a sixth difference over twenty, by white noise.
+RESIDUAL = math.sqrt(924.0) / 20.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +181,7 @@ class RobustWd(Prefilter):
 def _noise(samples: Array) -> Array:
     """Standard deviation of each channel from sample to sample."""
     rough = np.abs(np.diff(samples, 6, axis=0)) / 20.0
-    sd = TO_SIGMA * np.median(rough, axis=0) / RESIDUAL if len(rough) else np.zeros(1)
+    sd = MAD_TO_SD * np.median(rough, axis=0) / RESIDUAL if len(rough) else np.zeros(1)
     if not (sd > 0.0).all():
         c = int(np.argmin(sd))
         raise DataError(

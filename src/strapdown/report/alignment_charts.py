@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
+from strapdown.report.alignment_values import NOT_KNOWN, angle_bound, instant
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -32,12 +31,14 @@ __all__ = ["attitude_chart", "bias_charts", "innovation_chart", "readiness_chart
 
 Array = NDArray[np.float64]
 
-DEG_H = math.degrees(3600.0)
-UG = 1e6 / 9.80665
 _TIME = "time, s"
 _NAMES = ("x, forward", "y, right", "z, down")
 #: Differences below this part of the smallest bound are drawn as that.
 LEAST = 0.02
+BEGUN = (
+    " The fine one begins at the coarse attitude and is near it in its first seconds; its bound "
+    "there takes none of that for granted."
+)
 _OFF = {
     "truth": "error",
     "reference": "off the reference",
@@ -94,11 +95,12 @@ def readiness_chart(result: AlignmentResult) -> Chart:
                 )
             )
         panels.append(Panel("deg", tuple(lines), log=True, title=title, height=1.2))
+    begun = "" if result.fine is None else BEGUN
     return Chart(
         "readiness",
         "Readiness: alignment time against accuracy",
         "Bounds hold 95 % (1.96 standard deviations); of roll and pitch the larger one. The coarse "
-        f"alignment was run anew over each length. {_OFF_WORDS[found.against]}",
+        f"alignment was run anew over each length. {_OFF_WORDS[found.against]}{begun}",
         "time since the start, s",
         tuple(panels),
         () if length is None or result.fine is None else (Mark(length, "fine alignment begins"),),
@@ -109,7 +111,10 @@ def readiness_chart(result: AlignmentResult) -> Chart:
 def signal_chart(result: AlignmentResult) -> Chart:
     """Rates and specific force: as recorded, as aligned, and their means over a second."""
     panels = []
-    for columns, factor, label in ((GYRO, DEG_H, "rate, deg/h"), (ACCEL, 1.0, "force, m/s²")):
+    for columns, factor, label in (
+        (GYRO, DEG_PER_HOUR, "rate, deg/h"),
+        (ACCEL, 1.0, "force, m/s²"),
+    ):
         for k, column in enumerate(columns):
             lines = [_signal("recorded", result.source.imu, column, factor, GREY, 0.8)]
             if result.prefilter is not None:
@@ -151,6 +156,7 @@ def attitude_chart(result: AlignmentResult) -> Chart:
     table = result.attitude
     time = table.index.to_numpy(dtype=np.float64)
     panels = []
+    carried = NOT_KNOWN not in [angle_bound(result.start, k) for k in (0, 1)]
     for k, angle in enumerate(EULER):
         values = table[angle].to_numpy()
         if angle == "heading":
@@ -162,16 +168,20 @@ def attitude_chart(result: AlignmentResult) -> Chart:
             if angle == "heading":
                 known = np.degrees(np.unwrap(np.radians(known)))
             lines.append(curve("truth", truth.index.to_numpy(), known, BLACK, "dot", buckets=800))
-        half = TWO_SIDED_95 * float(result.end.sd_deg[k])
+        halves = TWO_SIDED_95 * np.array([result.start.sd_deg[k], result.end.sd_deg[k]])
+        half = np.interp(time[:: max(1, len(time) // 400)], time[[0, -1]], halves)
         step = max(1, len(time) // 400)
         x, y = time[::step], values[::step]
         band = Fill("95 % bound", x, y - half, y + half, BLUE)
-        panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,)))
+        panels.append(Panel(f"{angle}, deg", tuple(lines), fills=(band,) if carried else ()))
     return Chart(
         "attitude",
         "Attitude over the record",
         "The answer, carried to every sample by the gyros, with its bound of 95 %; what rocks here "
-        "is the body.",
+        "is the body."
+        if carried
+        else f"The answer holds at {instant(result.end.time)} alone. These gyros cannot carry it "
+        "to the start, where nothing is known of it: what turns here may be their bias.",
         _TIME,
         tuple(panels),
     )
@@ -185,8 +195,8 @@ def bias_charts(result: AlignmentResult) -> tuple[Chart, ...]:
     time = history.index.to_numpy(dtype=np.float64)
     out = []
     for sensor, factor, unit, what in (
-        ("gyro", DEG_H, "deg/h", "Drifts of the gyros"),
-        ("accel", UG, "µg", "Biases of the accelerometers"),
+        ("gyro", DEG_PER_HOUR, "deg/h", "Drifts of the gyros"),
+        ("accel", MICRO_G, "µg", "Biases of the accelerometers"),
     ):
         panels = []
         for k, axis in enumerate("xyz"):

@@ -11,12 +11,8 @@ from strapdown.report.alignment_tables import (
     readiness_table,
     turn_table,
 )
-from strapdown.report.alignment_words import (
-    headline,
-    key_figures,
-    limits,
-    trust,
-)
+from strapdown.report.alignment_trust import trust
+from strapdown.report.alignment_words import headline, key_figures, limits
 from strapdown.report.chart import Chart
 from strapdown.report.document import (
     Block,

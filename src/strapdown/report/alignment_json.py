@@ -11,7 +11,8 @@ import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.exceptions import Finding
-from strapdown.report.alignment_words import answer_error, limits, trust
+from strapdown.report.alignment_trust import answer_error, trust
+from strapdown.report.alignment_words import limits
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import EULER
 

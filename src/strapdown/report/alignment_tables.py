@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from strapdown.constants import TWO_SIDED_95
-from strapdown.report.alignment_words import (
-    DEG_H,
-    ORDER,
-    UG,
-    angle_bound,
-    answer_error,
-    prior_sd,
-    small,
-)
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
+from strapdown.report.alignment_trust import ORDER, answer_error
+from strapdown.report.alignment_values import NOT_KNOWN, angle_bound, instant, small
+from strapdown.report.alignment_words import prior_sd
 from strapdown.report.crash_values import about, plain
 from strapdown.report.document import TableBlock
 from strapdown.systems.alignment_run import AlignmentResult
@@ -46,7 +42,7 @@ def answer_table(result: AlignmentResult) -> TableBlock:
                 else f"{plain(float(known[1][k]), 4)}°"
             )
         rows.append(tuple(row))
-    time = ("time", *(f"{a.time:.6g} s" for a in (result.start, result.end, result.coarse)))
+    time = ("time", *(instant(a.time) for a in (result.start, result.end, result.coarse)))
     rows.append((*time, "") if known is not None else time)
     return TableBlock(tuple(columns), tuple(rows), text=(0,), strong=(0,))
 
@@ -59,8 +55,8 @@ def bias_table(result: AlignmentResult) -> TableBlock | None:
     rows = []
     gyro, accel = prior_sd(result)
     for name, bias, sd, prior, factor, unit in (
-        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_H, "deg/h"),
-        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, UG, "µg"),
+        ("gyro", end.gyro_bias, end.gyro_bias_sd, gyro, DEG_PER_HOUR, "deg/h"),
+        ("accelerometer", end.accel_bias, end.accel_bias_sd, accel, MICRO_G, "µg"),
     ):
         assert bias is not None and sd is not None
         for k, axis in enumerate(("x, forward", "y, right", "z, down")):
@@ -108,8 +104,10 @@ def readiness_table(result: AlignmentResult) -> TableBlock:
                 at = table.index.to_numpy(dtype=np.float64)
                 sizes = table[list(names)].to_numpy().max(axis=1)
                 inside = at[0] <= time * 1.001
-                value = float(np.interp(time, at, sizes)) if inside else float("nan")
-                cells.append(f"{plain(TWO_SIDED_95 * value, 3)}°" if value == value else "–")
+                # Lengths that were tried are evenly apart in their logarithm.
+                where = np.log(np.maximum(at, 1e-9))
+                value = np.exp(np.interp(np.log(time), where, np.log(sizes))) if inside else np.nan
+                cells.append(_bound(TWO_SIDED_95 * value, names[0]))
         rows.append(tuple(cells))
     columns = ["after"]
     for name, table in (("coarse", found.coarse), ("fine", found.fine)):
@@ -118,14 +116,20 @@ def readiness_table(result: AlignmentResult) -> TableBlock:
     return TableBlock(tuple(columns), tuple(rows), text=(0,))
 
 
+def _bound(half: float, name: str) -> str:
+    if math.isnan(half):
+        return "–"
+    return f"{small(half)}°" if half < (180.0 if name == "heading_sd" else 90.0) else NOT_KNOWN
+
+
 def turn_table(result: AlignmentResult) -> TableBlock | None:
     """What a turn and a further rest would make known, the best heading first."""
     if not result.manoeuvres:
         return None
     rows = []
     for one in result.manoeuvres:
-        gyro = TWO_SIDED_95 * DEG_H * float(np.max(one.gyro_bias_sd))
-        accel = TWO_SIDED_95 * UG * float(np.max(one.accel_bias_sd))
+        gyro = TWO_SIDED_95 * DEG_PER_HOUR * float(np.max(one.gyro_bias_sd))
+        accel = TWO_SIDED_95 * MICRO_G * float(np.max(one.accel_bias_sd))
         rows.append(
             (
                 one.name,

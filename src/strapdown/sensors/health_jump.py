@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from statistics import NormalDist
 
 import numpy as np
@@ -198,8 +199,6 @@ def _fault(log: HealthLog, k: int, at: int, step: float, limit: float) -> Channe
 
 def _until_next(log: HealthLog, faults: list[ChannelFault]) -> list[ChannelFault]:
     """Each jump ends where the same channel jumps again."""
-    from dataclasses import replace
-
     out = []
     for fault in faults:
         later = [f.first for f in faults if f.channel == fault.channel and f.first > fault.first]

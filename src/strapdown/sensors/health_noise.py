@@ -8,6 +8,7 @@ from statistics import NormalDist
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD
 from strapdown.sensors.health_log import (
     ChannelFault,
     HealthLog,
@@ -162,7 +163,7 @@ def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
     if known.sum() < 4 * LASTING:
         return np.full(relative.shape, np.inf)
     middle = float(np.median(relative[known]))
-    scatter = 1.4826 * float(np.median(np.abs(relative[known] - middle)))
+    scatter = MAD_TO_SD * float(np.median(np.abs(relative[known] - middle)))
     room = max(math.log(slack), OWN_SCATTER * scatter)
     out = np.full(relative.shape, np.inf)
     # noise e^(middle + room - relative) is where the ratio would stand at its limit.

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.axis_voting import AxisVoting, VotingState
-from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
+from strapdown.sensors.fused_axes import fused_drift, fused_noise, fused_uncertainty
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.mounted_unit import MountedUnit
 from strapdown.sensors.unit_checks import SAME_STAMP
 from strapdown.sensors.vote_events import VoteEvent, told_events
 from strapdown.sensors.voting_rule import AxisErrors, VotingRule
@@ -21,48 +21,8 @@ from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
 
 Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 __all__ = ["MountedUnit", "UnitVoting", "UnitVotingState", "VoteEvent", "VotedImu", "vote_units"]
-
-# Of a mounting: how far it may be from a rotation.
-ROTATION = 1e-6
-
-
-@dataclass(frozen=True, eq=False)
-class MountedUnit:
-    """What is known of a unit before it is switched on.
-
-    Attributes
-    ----------
-    name : str
-    uncertainty : ImuUncertainty
-        Its noise, bias, scale factor and so on, of its own axes; the misalignment with that of its
-        mounting.
-    mounting : array_like, (3, 3)
-        ``C``, with which a vector in the unit's axes becomes one in body axes, ``C v``.
-
-    Raises
-    ------
-    ConfigError
-        The mounting is no rotation.
-    """
-
-    name: str
-    uncertainty: ImuUncertainty
-    mounting: ArrayLike = field(default_factory=lambda: np.eye(3))
-
-    def __post_init__(self) -> None:
-        c = np.asarray(self.mounting, dtype=np.float64)
-        good = c.shape == (3, 3) and np.isfinite(c).all()
-        if not good or np.abs(c @ c.T - np.eye(3)).max() > ROTATION or np.linalg.det(c) < 0.0:
-            raise ConfigError(
-                "its mounting is no rotation",
-                file=self.name,
-                quantity="mounting",
-                remedy="give three orthonormal columns, the unit's axes in body axes",
-            )
-        object.__setattr__(self, "mounting", c)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +166,9 @@ class UnitVoting:
         used = pd.DataFrame(
             np.hstack([rates.used, forces.used]), index=imu.index, columns=columns[0] + columns[1]
         )
-        noise = np.hstack([_noise(self.gyro, rates.used), _noise(self.accel, forces.used)])
+        noise = np.hstack(
+            [fused_noise(self.gyro, rates.used), fused_noise(self.accel, forces.used)]
+        )
         events = [
             *told_events(rates, time, columns[0], "rad/s", state.gyro.samples),
             *told_events(forces, time, columns[1], "m/s²", state.accel.samples),
@@ -228,10 +190,10 @@ class UnitVoting:
             Range, quantization and bandwidth have no place in a mean, and are left open.
         """
         return ImuUncertainty(
-            _fused(self.gyro),
-            _fused(self.accel),
-            _fused_drift(self.gyro),
-            _fused_drift(self.accel),
+            fused_uncertainty(self.gyro),
+            fused_uncertainty(self.accel),
+            fused_drift(self.gyro),
+            fused_drift(self.accel),
         )
 
     def _readings(
@@ -326,32 +288,3 @@ def _middle(values: Array) -> Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)
         return np.nan_to_num(np.nanmedian(values, axis=0))
-
-
-def _noise(voting: AxisVoting, used: Mask) -> Array:
-    """Noise density of the fused axes at each sample, (n, 3)."""
-    out = np.empty((len(used), 3))
-    code = used @ (2 ** np.arange(used.shape[1], dtype=np.int64))
-    for value in np.unique(code):
-        at = code == value
-        mask = used[int(np.argmax(at))]
-        covariance = voting.covariance(mask, voting.errors.noise_density**2)
-        out[at] = np.sqrt(np.diagonal(covariance))
-    return out
-
-
-def _fused(voting: AxisVoting) -> TriadUncertainty:
-    e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
-    parts: dict[str, Any] = {}
-    for name in ("noise_density", "bias", "scale", "misalignment", "g_sensitivity"):
-        variance = np.asarray(getattr(e, name)) ** 2
-        x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, variance))).tolist()
-        parts[name] = (x, y, z)
-    return TriadUncertainty(**parts)
-
-
-def _fused_drift(voting: AxisVoting) -> BiasDrift:
-    e, everything = voting.errors, np.ones(len(voting.errors.bias), dtype=bool)
-    x, y, z = np.sqrt(np.diagonal(voting.covariance(everything, e.drift**2))).tolist()
-    # The shortest: what the slower ones do is allowed for too early.
-    return BiasDrift((x, y, z), float(e.correlation_time.min()))

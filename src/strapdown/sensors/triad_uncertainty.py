@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.triad_errors import Triad, TriadLike
 from strapdown.tables.checks import is_number
@@ -106,6 +109,23 @@ class TriadUncertainty:
         """Return a per-axis attribute as three numbers."""
         value: Triad = getattr(self, name)
         return value
+
+    def variance_by_input(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what scale factors and misalignments make of an input that stays the same.
+
+        Parameters
+        ----------
+        value : ndarray, (3,), u
+
+        Returns
+        -------
+        ndarray, (3,), u²
+            Variance of the reading of each axis.
+        """
+        squares = value * value
+        across = float(value @ value) - squares
+        scale, misalignment = self.axis("scale"), self.axis("misalignment")
+        return np.asarray(np.square(scale) * squares + np.square(misalignment) * across)
 
 
 def _numbers(given: Any, name: str) -> tuple[float, ...]:

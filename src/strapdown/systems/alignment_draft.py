@@ -104,7 +104,9 @@ def _log(
             page.key(key, string(value))
     if options.rate:
         page.key("rate_hz", number(options.rate))
-    page.say("from_s = 0.0, to_s = 300.0: a part of it alone, where the body stands")
+    page.say(
+        f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone, where the body stands"
+    )
     return [f"{recording.name}: {span}"]
 
 

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.alignment.carried import carried_attitude
-from strapdown.alignment.carry import carry
+from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FineResult
@@ -26,12 +25,14 @@ from strapdown.results import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu
+from strapdown.systems.alignment_health import channel_findings
 from strapdown.systems.alignment_outliers import saying_outliers
 from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
 from strapdown.systems.alignment_source import AlignmentSource, read_alignment_source
 from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
+from strapdown.tables.checks import source_of
 
 __all__ = ["AlignmentResult", "run_alignment"]
 
@@ -60,8 +61,10 @@ class AlignmentResult:
     manoeuvres : tuple of Manoeuvre
         What a turn and a further rest would make known; empty without a fine alignment.
     inputs : tuple of InputFiles
+    unread : tuple of Finding
+        Of channels that read nothing for a while.
     findings : tuple of Finding
-        Of reading, pre-filter, coarse and fine alignment, in this order.
+        Of reading, channels, pre-filter, coarse and fine alignment, in this order.
     """
 
     spec: AlignmentSpec
@@ -78,6 +81,7 @@ class AlignmentResult:
     readiness: AlignmentReadiness
     manoeuvres: tuple[Manoeuvre, ...]
     inputs: tuple[InputFiles, ...]
+    unread: tuple[Finding, ...]
     findings: tuple[Finding, ...]
 
 
@@ -120,6 +124,7 @@ def run_alignment(
     coarse_way: CoarseAlignment = make_choice(spec.coarse, SLOTS["coarse"], given)
     fine_way: FineAlignment | None = make_choice(spec.fine, SLOTS["fine"], given)
     imu, report, increments = source.imu, None, None
+    unread = channel_findings(imu, sensors) if source.truth is None else ()
     # Samples as they come may have any stamps.
     if spec.prefilter.kind != "none":
         prefilter: Prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
@@ -167,6 +172,7 @@ def run_alignment(
     of_filter = () if report is None else report.findings
     findings = [
         *source.findings,
+        *unread,
         *of_filter,
         *coarse.findings,
         *(() if fine is None else fine.findings),
@@ -186,6 +192,7 @@ def run_alignment(
         readiness=readiness,
         manoeuvres=manoeuvres,
         inputs=(*files, *source.inputs),
+        unread=unread,
         findings=tuple(dict.fromkeys(findings)),
     )
 
@@ -205,7 +212,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
     if kept.sum() < 2:
         raise DataError(
             f"{duration:g} s hold no two samples",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="time",
             remedy="align for longer",
         )
@@ -222,7 +229,7 @@ def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
         raise DataError(
             f"nothing is left for the fine alignment: the coarse one takes all "
             f"{float(imu.index[-1] - imu.index[0]):.6g} s",
-            file=imu.attrs.get("source"),
+            file=source_of(imu),
             quantity="coarse, duration_s",
             remedy="give it less, or leave its duration out: then both use the whole record",
         )

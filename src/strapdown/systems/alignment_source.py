@@ -175,16 +175,19 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
     time = imu.index.to_numpy(dtype=np.float64)
     first = -np.inf if log.from_s is None else log.from_s
     last = np.inf if log.to_s is None else log.to_s
+    if log.duration_s is not None:
+        last = (float(time[0]) if log.from_s is None else log.from_s) + log.duration_s
     # A stamp that is a sum of steps may miss the instant by its rounding.
     slack = 1e-6 * float(np.median(np.diff(time)))
     kept = (time >= first - slack) & (time <= last + slack)
     if kept.sum() < 2:
         raise DataError(
-            f"nothing is recorded {_words(first, last)}: it goes from {time[0]:.6g} to "
-            f"{time[-1]:.6g} s",
+            f"nothing is recorded {_words(first, last)}: it goes from {time[0]:.9g} to "
+            f"{time[-1]:.9g} s",
             file=name,
             quantity="time",
-            remedy="give another span (from_s, to_s; --from, --to, --duration)",
+            remedy="give another span of the log's own stamps (from_s, to_s, duration_s; --from, "
+            "--duration)",
         )
     out = imu[kept]
     out.attrs = dict(imu.attrs)
@@ -192,8 +195,8 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
 
 
 def _words(first: float, last: float) -> str:
-    parts = [f"from {first:g} s on"] if np.isfinite(first) else []
-    return " ".join([*parts, f"to {last:g} s"] if np.isfinite(last) else parts)
+    parts = [f"from {first:.9g} s on"] if np.isfinite(first) else []
+    return " ".join([*parts, f"to {last:.9g} s"] if np.isfinite(last) else parts)
 
 
 def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:

@@ -61,6 +61,14 @@ def test_a_known_bias_is_taken_off():
     assert np.abs(phi(carry(wrong, true_at(truth, 0), 600.0, SITE), truth[-1])).max() > 1e-3
 
 
+def test_what_is_known_besides_goes_along():
+    imu, truth = ideal(rocking(600.0), 50.0)
+    told = replace(true_at(truth, 0), heading_given=True, measured_latitude_deg=55.1)
+    found = carry(imu, told, 600.0, SITE)
+    assert found.heading_given
+    assert found.measured_latitude_deg == 55.1
+
+
 def test_an_instant_outside_of_the_record():
     imu, truth = ideal(rocking(600.0), 50.0)
     with pytest.raises(DataError, match=r"log.csv, time: 601 s is not within the record"):

@@ -265,7 +265,7 @@ def test_a_burst_of_outliers(method, stood):
     burst.iloc[3000:3005, burst.columns.get_loc("accel_x")] += 50.0
     place = r"log.csv, row 300[16], accel_x: 2 steps from sample to sample"
     if method.name == "inertial_frame":
-        with pytest.raises(DataError, match=rf"(?s){place}.*heading is not known.*robust filter"):
+        with pytest.raises(DataError, match=rf"(?s){place}.*heading is not known.*robust_fir"):
             method.align(burst, SITE, sensors)
         return
     found = method.align(burst, SITE, sensors)

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.alignment.carried import carried_attitude
-from strapdown.alignment.carry import carry
+from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.site import Site
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.exceptions import DataError
-from strapdown.report.alignment_words import answer_error, trust
+from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.formats.inference.conclusion import Inference, conclude, posterior
 
 Array = NDArray[np.float64]
@@ -72,7 +72,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
             usual,
         )
     whole = bool((accel == np.round(accel)).all())
-    spread = 1.4826 * float(np.median(np.abs(norms - usual))) / usual
+    spread = MAD_TO_SD * float(np.median(np.abs(norms - usual))) / usual
     # The median over m pieces is better than a piece, but what the motion adds is one-sided. A
     # log of few pieces does not know its spread, and a crash is shorter than one.
     few = 2.0 / len(norms) if step else 0.4
