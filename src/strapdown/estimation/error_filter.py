@@ -178,7 +178,7 @@ class ErrorFilter:
         with the Earth's turns the attitude as well. It is met by taking the observation before the
         prediction, from which then comes off what is known of the noise: with the noise v of the
         observation, ``M = cov(w, v)`` and ``S = M R^-1``, the transition is ``Phi - S H`` and the
-        covariance of the noise ``Q - S M'`` (Brown and Hwang 1997, sec. 7.3).
+        covariance of the noise ``Q - S M'`` (Simon, Optimal State Estimation, 2006, sec. 7.1).
 
         Parameters
         ----------
