@@ -105,6 +105,8 @@ class PrefilterReport:
     findings: tuple[Finding, ...]
 
 
+#: What to do about a pre-filter that cannot tell outliers from knocks: a caution, and no fault.
+LEAVE_IT_OUT = "leave the pre-filter out of a log of so low a rate, unless outliers are seen in it"
 # A knock on a body lasts some milliseconds; faster samples show more than one of it.
 SHORTEST_KNOCK = 2e-3  # s
 
@@ -209,13 +211,12 @@ def _knocks(replaced: pd.DataFrame, grid: Any, source: str | None) -> list[Findi
     first = replaced.iloc[0]
     return [
         Finding(
-            f"{len(replaced)} samples were replaced, {grid.step:.4g} s apart from the next, which "
-            "is as long as a knock on the body lasts: what was taken for an outlier may be motion, "
-            "whose turn is then lost",
+            f"{len(replaced)} {'sample was' if len(replaced) == 1 else 'samples were'} replaced, "
+            f"at {1.0 / grid.step:.4g} Hz: a knock on the body lasts no longer than one of these, "
+            "so that what was taken for an outlier may be motion, whose turn is then lost",
             file=source,
             row=int(first["row"]),
             quantity=str(first["channel"]),
-            remedy="leave the pre-filter out of a log of so low a rate, unless outliers are seen "
-            "in it",
+            remedy=LEAVE_IT_OUT,
         )
     ]

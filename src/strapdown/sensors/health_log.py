@@ -25,6 +25,8 @@ __all__ = ["Blocks", "ChannelFault", "HealthLog", "health_log", "intervals_of"]
 # Long enough for a standard deviation and a mean, short enough to say when.
 BLOCK = 1.0  # s
 LEAST_BLOCK = 32  # samples
+#: Fewer say nothing of how a channel usually reads.
+LEAST_SAMPLES = 2 * LEAST_BLOCK
 # A body is at rest where so many of the other channels say so.
 LEAST_WITNESSES = 3
 WORDS = {
@@ -211,12 +213,12 @@ def health_log(
     names = [*GYRO, *(ACCEL if ACCEL[0] in imu.columns else [])]
     check_columns(imu, names, source)
     time = index_of(imu)
-    if time.size < 2 * LEAST_BLOCK:
+    if time.size < LEAST_SAMPLES:
         raise DataError(
             f"{time.size} samples are too few to tell a channel's habits",
             file=source,
             quantity="time",
-            remedy=f"give a record of {2 * LEAST_BLOCK} samples or more",
+            remedy=f"give a record of {LEAST_SAMPLES} samples or more",
         )
     check_time(time, source)
     values = np.ascontiguousarray(values_of(imu, names).T)

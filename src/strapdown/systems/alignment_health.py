@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
@@ -42,6 +43,9 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
         A channel is stuck, dead, saturated or without numbers for more than a hundredth of the
         record.
     """
+    if len(imu) < LEAST_SAMPLES:
+        # So short a record is refused by each alignment, with what would be long enough.
+        return _made_up(imu)
     faults = [f for f in check_imu_channels(imu, sensors).faults if f.kind in SILENT]
     for channel in dict.fromkeys(f.channel for f in faults):
         own = [f for f in faults if f.channel == channel]

@@ -10,8 +10,9 @@ import pandas as pd
 
 from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import DataError
+from strapdown.exceptions import DataError, Finding
 from strapdown.prefilter import PrefilterReport
+from strapdown.prefilter.report import LEAVE_IT_OUT
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, values_of
 
@@ -40,8 +41,9 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
     try:
         yield
     except DataError as error:
-        if report is not None and report.findings:
-            raise _after_prefilter(error, report) from None
+        faults = () if report is None else _faults(report)
+        if faults:
+            raise _after_prefilter(error, faults[0]) from None
         found = None if report is not None else _outliers(imu)
         if found is None:
             raise _with_unquiet(error, imu) from None
@@ -59,8 +61,13 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
         ) from None
 
 
-def _after_prefilter(error: DataError, report: PrefilterReport) -> DataError:
-    f, said = error.finding, report.findings[0]
+def _faults(report: PrefilterReport) -> tuple[Finding, ...]:
+    """What a pre-filter found, but for the caution that goes with a low rate."""
+    return tuple(f for f in report.findings if f.remedy != LEAVE_IT_OUT)
+
+
+def _after_prefilter(error: DataError, said: Finding) -> DataError:
+    f = error.finding
     return DataError(
         f"{f.what}; the pre-filter said of {said.quantity} before: {said.what}",
         file=f.file,

@@ -269,7 +269,7 @@ def test_a_knock_that_a_low_rate_cannot_tell_is_spoken_of(rate, told):
     table = imu_table(t, values[:, :3], values[:, 3:] - [0.0, 0.0, 9.8], source="log")
     report = RobustFir(rate=50.0).apply(table).report
     assert len(report.replaced) == 1
-    found = [f for f in report.findings if "as long as a knock" in f.what]
+    found = [f for f in report.findings if "a knock on the body" in f.what]
     assert len(found) == told
     assert all(f.row == t.size // 2 + 1 and f.quantity == "gyro_x" for f in found)
 
