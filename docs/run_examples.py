@@ -184,7 +184,8 @@ def check(page: Path, write: bool) -> int:
 
 if __name__ == "__main__":
     pages = [Path(a) for a in sys.argv[1:] if a != "--write"] or [
-        *sorted(HERE.glob("*.md")),
+        # What is said about bad input has files of its own, and is held by the tests.
+        *(page for page in sorted(HERE.glob("*.md")) if page.name != "messages.md"),
         *sorted(HERE.glob("notebooks/*.md")),
     ]
     sys.exit(1 if sum(check(page, "--write" in sys.argv) for page in pages) else 0)
