@@ -616,3 +616,37 @@ def within_half_turn(angles_deg: Array) -> Array:
     """
     wrapped = np.remainder(angles_deg + 180.0, 360.0) - 180.0
     return np.where(np.abs(angles_deg) <= 180.0, angles_deg, wrapped)
+
+
+def euler_sd(euler_deg: ArrayLike, covariance: ArrayLike) -> Array:
+    """Return the standard deviations of 3-2-1 angles, to first order.
+
+    Near a pitch of ±90° those of roll and heading grow without bound.
+
+    Parameters
+    ----------
+    euler_deg : array_like, (..., 3), deg
+        Roll, pitch, heading.
+    covariance : array_like, (..., 3, 3), rad²
+        Of the rotation vector ``phi`` in north-east-down with
+        ``C_estimated = exp([phi x]) C_true``.
+
+    Returns
+    -------
+    ndarray, (..., 3), deg
+    """
+    _, pitch, heading = np.moveaxis(np.radians(euler_deg), -1, 0)
+    # phi = turning of the three axes by which the angles turn: heading about down, pitch about
+    # the horizontal right, roll about forward.
+    s, c, cp, zero = np.sin(heading), np.cos(heading), np.cos(pitch), np.zeros_like(pitch)
+    axes = np.stack(
+        [
+            np.stack([cp * c, -s, zero], axis=-1),
+            np.stack([cp * s, c, zero], axis=-1),
+            np.stack([-np.sin(pitch), zero, zero + 1.0], axis=-1),
+        ],
+        axis=-2,
+    )
+    angles = np.linalg.inv(axes)
+    spread = angles @ np.asarray(covariance) @ np.swapaxes(angles, -1, -2)
+    return np.asarray(np.degrees(np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))))

@@ -64,16 +64,4 @@ class Alignment:
 
         Near a pitch of ±90° those of roll and heading grow without bound.
         """
-        _, pitch, heading = np.radians(self.roll_pitch_heading)
-        # phi_n = turning of the three axes by which the angles turn: heading about down, pitch
-        # about the horizontal right, roll about forward.
-        s, c = np.sin(heading), np.cos(heading)
-        axes = np.array(
-            [
-                [np.cos(pitch) * c, -s, 0.0],
-                [np.cos(pitch) * s, c, 0.0],
-                [-np.sin(pitch), 0.0, 1.0],
-            ]
-        )
-        angles = np.linalg.solve(axes, np.eye(3))
-        return np.degrees(np.sqrt(np.diagonal(angles @ self.covariance @ angles.T)))
+        return rotation.euler_sd(self.roll_pitch_heading, self.covariance)

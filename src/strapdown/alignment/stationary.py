@@ -21,7 +21,6 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.error_model import PHYSICAL, Segment
 from strapdown.estimation.observation import Observation
-from strapdown.estimation.sensor_states import stacked
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState
@@ -149,8 +148,7 @@ def rate_observation(
     matrices = rotation.dcm_from_quaternion(levels[:-1, Q_LB : Q_LB + 4])
     length = float(rows[:, 0].sum())
     earth = filter_.earth[RATE] * levels[:, AXIS : AXIS + 3].mean(axis=0)
-    size = model.physical_size - PHYSICAL
-    gyro, _, _, _ = stacked(model.sensors, size)
+    gyro = model.stacked.gyro
     weights = np.concatenate([[1.0], rows[:, 1:7].sum(axis=0) / length])
     H = np.zeros((3, model.physical_size))
     H[:, 6:9] = -rotation.cross_matrix(earth * length)

@@ -18,8 +18,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
 from strapdown.estimation.observation import Observation
-from strapdown.estimation.sensor_states import stacked
-from strapdown.estimation.update_rule import UpdateRule
+from strapdown.estimation.update_rule import FullUpdate, UpdateRule
 from strapdown.exceptions import DivergenceError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
@@ -134,10 +133,73 @@ class ErrorFilter:
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
         """Return rows of motion increments without the errors estimated so far, (k, 10)."""
-        gyro, accel, _, _ = stacked(self.model.sensors, state.sensors.size)
+        stacked = self.model.stacked
         out = np.empty_like(rows)
-        compensate(rows, gyro, accel, state.sensors, out)
+        compensate(rows, stacked.gyro, stacked.accel, state.sensors, out)
         return out
+
+    def advance_compensated(
+        self, mechanization: Array, time: Array, rows: Array, history: Array
+    ) -> None:
+        """Advance a state of the mechanization, in place, over increments without errors.
+
+        Parameters
+        ----------
+        mechanization : ndarray
+            It is changed.
+        time : ndarray, (k,), s
+            Ends of the steps, for messages.
+        rows : ndarray, (k, 10)
+            From `compensated`.
+        history : ndarray, (k, row)
+            Filled with its rows after each step.
+
+        Raises
+        ------
+        DivergenceError
+            The state left what the mechanization can do; the sample is named.
+        """
+        made, why = self.mechanization.advance_rows(
+            mechanization, rows, np.empty(0), self.earth, history
+        )
+        if why:
+            raise DivergenceError(
+                f"the state has diverged with the sample at {time[made]:.9g} s",
+                quantity="state",
+                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+                "gravity, a burst; or begin from a state that is nearer to the truth",
+            )
+
+    def follow(
+        self, state: FilterState, time: Array, history: Array, rows: Array, mechanization: Array
+    ) -> FilterState:
+        """Take estimates and covariance over steps that the mechanization has made.
+
+        Parameters
+        ----------
+        state : FilterState
+            At the start of the first step.
+        time : ndarray, (k,), s
+            Ends of the steps.
+        history : ndarray, (k + 1, row)
+        rows : ndarray, (k, 10)
+            From `compensated`.
+        mechanization : ndarray
+            Its state after the last step.
+
+        Returns
+        -------
+        FilterState
+        """
+        segment = Segment(self.mechanization, np.concatenate([[state.time], time]), history, rows)
+        Phi, Q = self._transition(segment)
+        return FilterState(
+            float(time[-1]),
+            mechanization.copy(),
+            history[-1],
+            self._decayed(state, float(time[-1])),
+            self.form.predict(state.covariance, Phi, Q),
+        )
 
     def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
         """Go on over motion increments.
@@ -215,7 +277,10 @@ class ErrorFilter:
         return self._fed_back(after, to_physical, Phi @ x + S @ observation.z), segment, seen
 
     def observe(
-        self, state: FilterState, observations: Sequence[Observation]
+        self,
+        state: FilterState,
+        observations: Sequence[Observation],
+        rules: Sequence[UpdateRule | None] | None = None,
     ) -> tuple[FilterState, list[Innovations]]:
         """Take the observations of an epoch, and take off what they tell of the errors.
 
@@ -224,6 +289,8 @@ class ErrorFilter:
         state : FilterState
         observations : sequence of Observation
             Of this state, independent of each other.
+        rules : sequence of UpdateRule or None, optional
+            How far each is believed; the filter's own for all, if not given.
 
         Returns
         -------
@@ -238,7 +305,7 @@ class ErrorFilter:
             np.concatenate([one.z for one in observations]),
             np.concatenate([one.H for one in observations]) @ to_physical,
             np.concatenate([one.R for one in observations]),
-            self.rule,
+            self.rule if rules is None else _each(rules, observations),
         )
         after = self._fed_back(replace(state, covariance=covariance), to_physical, x)
         return after, _split(seen, [one.z.size for one in observations])
@@ -276,22 +343,14 @@ class ErrorFilter:
         history = np.empty((len(rows) + 1, used.row))
         history[0] = state.row
         after = state.mechanization.copy()
-        made, why = used.advance_rows(after, rows, np.empty(0), self.earth, history[1:])
-        if why:
-            raise DivergenceError(
-                f"the state has diverged with the sample at {time[made]:.9g} s",
-                quantity="state",
-                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-                "gravity, a burst; or begin from a state that is nearer to the truth",
-            )
+        self.advance_compensated(after, time, rows, history[1:])
         segment = Segment(used, np.concatenate([[state.time], time]), history, rows)
-        sensors = state.sensors.copy()
-        at = 0
-        for one in self.model.sensors:
-            end = at + len(one.block)
-            sensors[at:end] *= np.exp(-one.decay * (float(time[-1]) - state.time))
-            at = end
+        sensors = self._decayed(state, float(time[-1]))
         return FilterState(float(time[-1]), after, history[-1], sensors, state.covariance), segment
+
+    def _decayed(self, state: FilterState, time: float) -> Array:
+        """Estimates of the sensors' errors at a later time."""
+        return state.sensors * np.exp(-self.model.stacked.decay * (time - state.time))
 
     def _fed_back(self, state: FilterState, to_physical: Array, x: Array) -> FilterState:
         """Take an estimate off the mechanization and off the sensors."""
@@ -331,6 +390,19 @@ class ErrorFilter:
 def symmetric(P: Array) -> Array:
     """Return the symmetric part of a square matrix."""
     return 0.5 * (P + P.T)
+
+
+def _each(
+    rules: Sequence[UpdateRule | None], observations: Sequence[Observation]
+) -> list[UpdateRule] | None:
+    """One rule for each component; none at all where nothing has one."""
+    if not any(rules):
+        return None
+    return [
+        rule or FullUpdate()
+        for rule, one in zip(rules, observations, strict=True)
+        for _ in range(one.z.size)
+    ]
 
 
 def _split(seen: Innovations, sizes: Sequence[int]) -> list[Innovations]:

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.estimation.sensor_states import SensorStates
+from strapdown.estimation.sensor_states import SensorStates, Stacked, stack
 from strapdown.estimation.states import StateBlock, StateLayout
 from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Mechanization
@@ -80,6 +80,21 @@ class ErrorModel(ABC):
     def physical_size(self) -> int:
         """Number of physical errors: nine, and those of the sensors."""
         return PHYSICAL + sum(len(s.block) for s in self.sensors)
+
+    @cached_property
+    def stacked(self) -> Stacked:
+        """States of the sensors side by side, as kernels take them."""
+        return stack(self.sensors)
+
+    @cached_property
+    def columns_of(self) -> dict[str, slice]:
+        """Place of each block of the sensors among the physical errors, by name."""
+        out: dict[str, slice] = {}
+        at = PHYSICAL
+        for one in self.sensors:
+            out[one.block.name] = slice(at, at + len(one.block))
+            at += len(one.block)
+        return out
 
     @abstractmethod
     def transition(self, segment: Segment, step: float) -> tuple[Array, Array]:

@@ -18,7 +18,6 @@ from strapdown.estimation.error_model import (
     Segment,
     refuse_damped_height,
 )
-from strapdown.estimation.sensor_states import stacked
 from strapdown.estimation.states import StateBlock
 from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Mechanization
@@ -84,7 +83,7 @@ class QuaternionModel(ErrorModel):
         n = PHYSICAL + k
         levels = used.levels(segment.history)
         phi, q = np.empty((n, n)), np.empty((n, n))
-        gyro, accel, decay, drive = stacked(self.sensors, k)
+        gyro, accel, decay, drive, _ = self.stacked
         earth = find_ellipsoid(used.ellipsoid).parameters()
         kernel.wander_transitions(
             levels,

@@ -16,7 +16,6 @@ from strapdown.estimation.error_model import (
     Segment,
     refuse_damped_height,
 )
-from strapdown.estimation.sensor_states import stacked
 from strapdown.estimation.states import StateBlock
 from strapdown.mechanization.mechanization import Mechanization
 
@@ -62,7 +61,7 @@ class RotationVectorModel(ErrorModel):
         n = self.layout.size
         k = n - PHYSICAL
         phi, q = np.empty((n, n)), np.empty((n, n))
-        gyro, accel, decay, drive = stacked(self.sensors, k)
+        gyro, accel, decay, drive, _ = self.stacked
         kernel.psi_transitions(
             used.levels(segment.history),
             segment.increments,

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,28 +49,52 @@ class SensorStates:
         """One over the correlation time, 1/s."""
         return 0.0 if math.isinf(self.correlation_time) else 1.0 / self.correlation_time
 
+    def named(self, name: str) -> SensorStates:
+        """Return the same states under another name, as where two receivers have a lever arm."""
+        return replace(self, block=replace(self.block, name=name))
 
-def stacked(blocks: tuple[SensorStates, ...], size: int) -> tuple[Array, Array, Array, Array]:
+
+class Stacked(NamedTuple):
+    """Blocks side by side.
+
+    Attributes
+    ----------
+    gyro, accel : ndarray, (7, 3, k)
+    decay : ndarray, (k,), 1/s
+    drive : ndarray, (k,)
+    sd : ndarray, (k,)
+    """
+
+    gyro: Array
+    accel: Array
+    decay: Array
+    drive: Array
+    sd: Array
+
+
+def stack(blocks: tuple[SensorStates, ...]) -> Stacked:
     """Put blocks side by side, as kernels take them.
 
     Parameters
     ----------
     blocks : tuple of SensorStates
-    size : int
-        Number of their states.
 
     Returns
     -------
-    gyro, accel : ndarray, (7, 3, size)
-    decay : ndarray, (size,), 1/s
-    drive : ndarray, (size,)
+    Stacked
     """
-    gyro, accel = np.zeros((COUPLING, 3, size)), np.zeros((COUPLING, 3, size))
-    decay, drive = np.zeros(size), np.zeros(size)
+    size = sum(len(one.block) for one in blocks)
+    out = Stacked(
+        np.zeros((COUPLING, 3, size)),
+        np.zeros((COUPLING, 3, size)),
+        np.zeros(size),
+        np.zeros(size),
+        np.zeros(size),
+    )
     at = 0
     for one in blocks:
         end = at + len(one.block)
-        gyro[:, :, at:end], accel[:, :, at:end] = one.gyro, one.accel
-        decay[at:end], drive[at:end] = one.decay, one.drive
+        out.gyro[:, :, at:end], out.accel[:, :, at:end] = one.gyro, one.accel
+        out.decay[at:end], out.drive[at:end], out.sd[at:end] = one.decay, one.drive, one.sd
         at = end
-    return gyro, accel, decay, drive
+    return out

@@ -45,3 +45,11 @@ class UpdateRule(Protocol):
             Variance of the observation.
         """
         ...
+
+
+class FullUpdate:
+    """Every observation is believed by its stated variance: Kalman's update."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return the whole step, as `UpdateRule.step`."""
+        return Step(nu, 1.0, r, 1.0)

@@ -23,7 +23,7 @@ from strapdown.estimation.sensor_blocks import (
     gyro_misalignment,
     gyro_scale,
 )
-from strapdown.estimation.sensor_states import stacked
+from strapdown.estimation.sensor_states import stack
 from strapdown.exceptions import DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS, NorthEastDown, WanderAzimuth
@@ -70,7 +70,7 @@ def test_errors_that_samples_have_are_taken_off_increments():
         gyro_misalignment(1.0),
         accel_misalignment(1.0),
     )
-    gyro, accel, _, _ = stacked(blocks, states.size)
+    gyro, accel, *_ = stack(blocks)
     true = moving()
     wrong = true.copy()
     wrong.attrs = dict(true.attrs)

@@ -18,7 +18,7 @@ from strapdown.estimation.observation import Observation
 from strapdown.estimation.quaternion_model import QuaternionModel
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
-from strapdown.estimation.sensor_states import stacked
+from strapdown.estimation.sensor_states import stack
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from wander_runs import history_of, made_up, physical_error, segment_of, start
 
@@ -48,7 +48,7 @@ def by_vectors(segment, step):
     """The psi-angle model with a vertical displacement of zero, each group by expm (Van Loan)."""
     used, rows = segment.mechanization, segment.increments
     n = len(SIZE)
-    gyro, accel, decay, drive = stacked(BLOCKS, n - 9)
+    gyro, accel, decay, drive, _ = stack(BLOCKS)
     earth, levels = find_ellipsoid(used.ellipsoid).parameters(), used.levels(segment.history)
     Phi, Q, matrix, at = np.eye(n), np.zeros((n, n)), np.empty((6, 3)), 0
     while at < len(rows):
@@ -144,7 +144,7 @@ def test_two_filters_tell_the_same():
     first = start(70.0, 50.0, (20.0, -10.0, 0.0))
     rows = made_up(mechanization.begin(first)[8:12], 40.0, 0.02)
     truth = history_of(mechanization, mechanization.begin(first), rows)
-    gyro, accel, _, _ = stacked(BLOCKS, 9)
+    gyro, accel, *_ = stack(BLOCKS)
     wrong = np.empty_like(rows)
     put_on = np.array([1e-6, -2e-6, 1e-6, 1e-3, 2e-3, -1e-3, 1e-4, -2e-4, 1e-4])
     compensate(rows, gyro, accel, -put_on, wrong)

@@ -14,7 +14,7 @@ from strapdown.estimation.sensor_blocks import (
     gyro_bias,
     gyro_scale,
 )
-from strapdown.estimation.sensor_states import stacked
+from strapdown.estimation.sensor_states import stack
 
 EARTH = WGS84.parameters()
 RATE = WGS84.rotation_rate
@@ -110,7 +110,7 @@ def test_every_entry_is_the_derivative_of_the_equations(seed, alt, pole):
     Y, t, rate, force = drawn(seed, pole)
     blocks = (gyro_bias(1), accel_bias(1), gyro_scale(1), accel_misalignment(1), g_sensitivity(1))
     k = sum(len(b.block) for b in blocks)
-    gyro, accel, _, _ = stacked(blocks, k)
+    gyro, accel, *_ = stack(blocks)
     level, C = level_row(Y, t, alt)
     F = np.empty((9, 9 + k))
     rooms = [np.empty((3, 3)) for _ in range(3)]
@@ -165,7 +165,7 @@ def test_with_a_held_height_nothing_moves_vertically():
     Y, t, rate, force = drawn(0, pole=False)
     level, C = level_row(Y, t, 0.0)
     blocks = (gyro_bias(1), accel_bias(1))
-    gyro, accel, _, _ = stacked(blocks, 6)
+    gyro, accel, *_ = stack(blocks)
     free, held = np.empty((9, 15)), np.empty((9, 15))
     for F, hold in ((free, False), (held, True)):
         rooms = [np.empty((3, 3)) for _ in range(3)]

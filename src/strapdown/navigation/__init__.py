@@ -1,0 +1,1 @@
+"""The aided navigator: segments between epochs, what it records, how it is watched."""

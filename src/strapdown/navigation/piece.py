@@ -1,0 +1,81 @@
+"""What a navigator gives for a piece of a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.estimation.covariance import Innovations
+
+__all__ = ["Mark", "NavigationPiece", "Seen"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One observation at an epoch.
+
+    Attributes
+    ----------
+    time : float, s
+    name : str
+        Of the observation: ``rtk.position``.
+    labels : tuple of str
+        Of its components, with units.
+    innovations : Innovations
+        Computed less observed less what was expected of it; variance that was expected; weight.
+    """
+
+    time: float
+    name: str
+    labels: tuple[str, ...]
+    innovations: Innovations
+
+
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """Covariance and estimates at an instant, after what was observed then.
+
+    Attributes
+    ----------
+    time : float, s
+    covariance : ndarray, (9, 9)
+        Of the errors of the state in north-east-down: displacement m, velocity m/s, rotation rad
+        (`mechanization.state_error.state_error`).
+    sensors : ndarray, (k,)
+        Estimates of the errors of the sensors and of the aids.
+    sensors_sd : ndarray, (k,)
+    """
+
+    time: float
+    covariance: Array
+    sensors: Array
+    sensors_sd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationPiece:
+    """What came of a piece of a log.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        Ends of the steps.
+    history : ndarray, (n, row)
+        Rows of the mechanization then, what was estimated taken off.
+    seen : tuple of Seen
+        In the order in which they were taken.
+    marks : tuple of Mark
+        At every epoch, and at least as often as the navigator's `mark_interval`.
+    late : tuple of (str, float)
+        Epochs of aids that came when the navigator was beyond their time, and were not used.
+    """
+
+    time: Array
+    history: Array
+    seen: tuple[Seen, ...]
+    marks: tuple[Mark, ...]
+    late: tuple[tuple[str, float], ...] = ()
