@@ -91,12 +91,12 @@ def figure(chart: Chart) -> dict[str, Any]:
 
 
 def _height(chart: Chart) -> int:
-    rows = max(len(panel.categories) for panel in chart.panels)
+    rows = min(len(panel.categories) for panel in chart.panels)
     if rows:
-        return 150 + _ROW * rows
+        return 150 + _ROW * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
         return 440
-    if len(chart.panels) == 1:
+    if len(chart.panels) == 1 and not chart.panels[0].x_label:
         return 400
     return 150 + round(190 * sum(panel.height for panel in chart.panels))
 
@@ -351,7 +351,9 @@ def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dic
             trace["marker"]["line"] = {"width": 1.8}
         if line.inside:
             trace |= {"fill": "toself", "fillcolor": see_through(line.colour, line.inside)}
-        if panel.categories:
+        if line.points and not line.size:
+            trace["hoverinfo"] = "skip"
+        elif panel.categories:
             trace["hovertemplate"] = f"%{{x:.3g}}<extra>{name}</extra>"
         if line.low is not None and line.high is not None:
             trace["error_x"] = {

@@ -184,9 +184,8 @@ def _axes(chart: Chart, figure: Figure) -> list[Axes]:
 
 
 def _height(chart: Chart) -> float:
-    rows = max(len(panel.categories) for panel in chart.panels)
-    if rows:
-        return 1.5 + 0.3 * rows
+    if min(len(panel.categories) for panel in chart.panels):
+        return 1.5 + 0.3 * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
         return 4.6
     return 1.4 + 2.0 * sum(panel.height for panel in chart.panels) + (len(chart.panels) == 1)
@@ -194,9 +193,8 @@ def _height(chart: Chart) -> float:
 
 def _paper_height(chart: Chart) -> float:
     """Of a chart in a column of print: two of three panels, with what is said, fill a page."""
-    rows = max(len(panel.categories) for panel in chart.panels)
-    if rows:
-        return 0.8 + 0.19 * rows
+    if min(len(panel.categories) for panel in chart.panels):
+        return 0.8 + 0.19 * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
         return 3.2
     titles = 0.18 * sum(bool(panel.title) for panel in chart.panels)
