@@ -263,6 +263,18 @@ def steady_range(panel: Panel) -> tuple[float, float] | None:
     return middle - 0.5, middle + 0.5
 
 
+def strip_range(chart: Chart) -> tuple[float, float] | None:
+    """Ends of the horizontal axis where a strip of categories stands above other panels."""
+    strips = [p for p in chart.panels if p.categories]
+    if not strips or len(strips) == len(chart.panels):
+        return None
+    found = np.concatenate([fill.x for p in strips for fill in p.fills] or [np.empty(0)])
+    found = found[np.isfinite(found)]
+    if not found.size or not np.ptp(found):
+        return None
+    return float(found.min()), float(found.max())
+
+
 def runs(*columns: Array) -> list[slice]:
     """Stretches in which all columns are finite, which is how NaN breaks a curve."""
     whole = np.isfinite(np.vstack(columns)).all(axis=0)

@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 from strapdown.constants import TWO_SIDED_95
 from strapdown.navigation.record import NavigationRecord
 
-__all__ = ["Agreement", "agreements", "chi_square_band"]
+__all__ = ["Agreement", "agreements", "chi_square_band", "chi_square_far"]
 
 Array = NDArray[np.float64]
 
 #: A root mean square of innovations beyond this many of the expected standard deviation, or below
 #: one over it, speaks against what was stated.
 FAR_OFF = 2.0
+#: From so large a correlation on, errors of an aid that last matter for the bounds.
+REMEMBER = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +113,12 @@ class Agreement:
         return TWO_SIDED_95 / math.sqrt(max(1, int(self.used.sum())))
 
     @property
+    def remembers(self) -> bool:
+        """Whether they hang together from epoch to epoch far more than by chance."""
+        size = abs(self.correlation)
+        return bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+
+    @property
     def inside(self) -> bool:
         """Whether the mean is within its band."""
         return self.band[0] <= self.mean_nis <= self.band[1]
@@ -133,6 +141,13 @@ def chi_square_band(freedom: float) -> tuple[float, float]:
 
     low, high = chi2.ppf([0.025, 0.975], freedom)
     return float(low), float(high)
+
+
+def chi_square_far(freedom: float) -> float:
+    """Quantile of chi-square that as few exceed as exceed three standard deviations."""
+    from scipy.stats import chi2, norm
+
+    return float(chi2.isf(2.0 * norm.sf(3.0), freedom))
 
 
 def _agreement(name: str, table: pd.DataFrame) -> Agreement:

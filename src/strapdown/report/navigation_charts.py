@@ -7,7 +7,17 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.navigation.record import NavigationRecord
-from strapdown.report.chart import AXIS_COLOURS, BLACK, BLUE, Chart, Fill, Line, Panel, curve
+from strapdown.report.chart import (
+    AXIS_COLOURS,
+    BLACK,
+    BLUE,
+    Chart,
+    Fill,
+    Line,
+    Panel,
+    break_jumps,
+    curve,
+)
 from strapdown.report.navigation_strip import outage_bands, strip
 from strapdown.report.navigation_thinning import BUCKETS, thin_fill
 from strapdown.report.navigation_told import NavigationTold
@@ -15,6 +25,7 @@ from strapdown.report.navigation_values import (
     StateBlock,
     at_marks,
     blocks_of,
+    heading_shown,
     plane_bound,
     unwrapped,
 )
@@ -63,7 +74,11 @@ def bound_chart(told: NavigationTold) -> Chart:
             "m",
             (("horizontal", plane_bound(record), BLUE), _bound(record, "down", "height")),
         ),
-        ("Velocity", "m/s", tuple(_bound(record, v, v) for v in VELOCITY)),
+        (
+            "Velocity",
+            "m/s",
+            tuple(_bound(record, v, n) for v, n in zip(VELOCITY, NED, strict=True)),
+        ),
         ("Attitude", "deg", tuple(_bound(record, a, a) for a in EULER)),
     )
     panels = []
@@ -118,7 +133,7 @@ def attitude_chart(told: NavigationTold) -> Chart:
     return over_time(
         "attitude",
         "Attitude",
-        "The heading goes on over north, so that no turn breaks it.",
+        heading_shown(told.record)[2],
         panels,
         told.record,
     )
@@ -129,27 +144,30 @@ def _state_panel(told: NavigationTold, column: str, error: str, label: str) -> P
     record = told.record
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     values = record.trajectory[column].to_numpy(dtype=np.float64)
-    values = unwrapped(values) if column == "heading" else values
+    here = at_marks(record, column)
+    if column == "heading":
+        values, here, _ = heading_shown(record)
     lines = [curve("navigated", time, values, BLUE, width=1.3, buckets=BUCKETS)]
     if told.truth is not None:
-        lines.append(_true(told, column, values[0]))
+        lines.append(_true(told, column, values))
     at = record.sd.index.to_numpy(dtype=np.float64)
     half = TWO_SIDED_95 * record.sd[error].to_numpy(dtype=np.float64)
-    here = at_marks(record, column)
     fill = thin_fill(BOUND, at, here - half, here + half, BLUE, opacity=0.25)
     return Panel(label, tuple(lines), fills=(fill,), height=0.8)
 
 
-def _true(told: NavigationTold, column: str, first: float) -> Line:
+def _true(told: NavigationTold, column: str, navigated: Array) -> Line:
     truth = told.truth
     assert truth is not None
     time = told.record.trajectory.index
     within = truth[(truth.index >= time[0]) & (truth.index <= time[-1])]
     values = within[column].to_numpy(dtype=np.float64)
-    if column == "heading" and values.size:
+    if column == "heading" and np.isnan(navigated).any():
+        values = break_jumps(values % 360.0)
+    elif column == "heading" and values.size:
         values = unwrapped(values)
         # The same turn as the navigated heading.
-        values = values + 360.0 * np.round((first - values[0]) / 360.0)
+        values = values + 360.0 * np.round((navigated[0] - values[0]) / 360.0)
     stamps = within.index.to_numpy(dtype=np.float64)
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 

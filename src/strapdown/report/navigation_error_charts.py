@@ -16,6 +16,7 @@ from strapdown.tables import EULER, NED, VELOCITY
 __all__ = ["error_charts", "nees_chart"]
 
 _LEAST = 1e-2
+_NAMES = dict(zip(VELOCITY, NED, strict=True))
 
 
 def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, ...]:
@@ -32,7 +33,7 @@ def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, 
             error = found.errors[column].to_numpy(dtype=np.float64)
             panels.append(
                 Panel(
-                    f"{column}, {unit}",
+                    f"{_NAMES.get(column, column)}, {unit}",
                     (curve("error", found.time, error, AXIS_COLOURS[k], buckets=BUCKETS),),
                     fills=(thin_fill(BOUND, found.time, -half, half, AXIS_COLOURS[k]),),
                     height=0.8,

@@ -13,7 +13,7 @@ from strapdown.formats.trajectory_thinning import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Chart, Line, Panel
-from strapdown.report.crash_values import GAP
+from strapdown.report.crash_values import GAP, plain
 from strapdown.report.error_envelope import ellipse
 from strapdown.report.label_places import place_labels
 from strapdown.report.navigation_strip import mode_colour
@@ -31,9 +31,11 @@ MOST_POINTS, MOST_FIXES = 1500, 600
 # From here on a plan is in kilometres.
 _FAR = 20e3
 # Ellipses: so many at ends of outages, and along the way; the largest as a share of the view.
-_AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.04
+_AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.05
 # Bar of the scale and arrow to the north, as shares of the view, and what they keep off.
 _BAR, _ARROW, _CORNER = 0.12, 0.05, 0.22
+# Height of the plan over its width, at most.
+_TALL = 0.9
 # What moves less has no path, m.
 NO_PATH = 0.05
 
@@ -76,7 +78,7 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     plane = _Plane(origin, told, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = kept.index.to_numpy(dtype=np.float64)
-    view = _with_margin(View.of([path]))
+    view = _with_margin(View.of([path], most=_TALL))
     fixes, beyond = _fixes(plane, view)
     lines = [*fixes, *_truth(plane), *_path(record, time, path)]
     round_, said, obstacles = _ellipses(plane, view)
@@ -85,7 +87,7 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     lines += marks
     lines += _labels(plane, view, path, marks, obstacles)
     lines += _scale(view, path, plane.unit)
-    at = f"{origin[0]:.6f}°, {origin[1]:.6f}°"
+    at = f"{plain(origin[0], 6)}°, {plain(origin[1], 6)}°"
     words = [
         f"In the level plane at the start ({at}), to one scale; arrows show the direction of "
         "motion.",
@@ -277,7 +279,8 @@ def _ellipses(plane: _Plane, view: View) -> tuple[list[Line], str, list[tuple[in
     centres = _centres(plane, rows)
     out = []
     count = len(along)
-    drawn = "" if factor == 1.0 else f", drawn {factor:,.0f} times as large".replace(",", GAP)
+    times = f"{factor:,.0f}".replace(",", GAP)
+    drawn = "" if factor == 1.0 else f", drawn {times} times as large"
     for name, colour, part in (
         (f"95{GAP}% ellipse{drawn}", BLUE, slice(0, count)),
         (f"95{GAP}% ellipse at the end of an outage{drawn}", VERMILLION, slice(count, None)),

@@ -9,7 +9,6 @@ from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import TableBlock
 from strapdown.report.navigation_found import NavigationFound
 from strapdown.report.navigation_values import (
-    at_marks,
     blocks_of,
     duration_words,
     half,
@@ -50,10 +49,10 @@ def end_table(found: NavigationFound) -> TableBlock:
         ),
         *((a, a, a, "°") for a in reversed(EULER)),
     ):
-        values = at_marks(record, column)
         cells = []
         for k in (0, -1):
-            value = float(values[k]) % 360.0 if column == "heading" else float(values[k])
+            value = float(record.trajectory[column].iloc[k])
+            value = value % 360.0 if column == "heading" else value
             cells.append(about(value, half(record.sd[sd].iloc[k]), unit))
         rows.append((name, *cells))
     return TableBlock(
@@ -172,8 +171,8 @@ def withheld_table(found: NavigationFound) -> TableBlock | None:
         ("withheld", "from", "for", "largest error", "bound then", "inside"),
         tuple(rows),
         text=(0, 5),
-        caption="Aids withheld on purpose: the largest horizontal error, and the run's own bound of "
-        "95 % at that instant.",
+        caption="Aids withheld on purpose: the largest horizontal error, and the run's own bound "
+        "of 95 % at that instant.",
         strong=tuple(k for k, w in enumerate(found.told.withheld) if not w.inside),
     )
 

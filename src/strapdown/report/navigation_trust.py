@@ -31,6 +31,7 @@ def trust(found: NavigationFound) -> Trust:
     """
     reasons = [*_errors(found), *_withheld(found)]
     reasons += [_innovations(one) for one in found.agreements if one.used.any()]
+    reasons += [_memory(one) for one in found.agreements if one.remembers]
     reasons += _rejected(found)
     reasons += [
         (False, f.what.partition(": ")[0]) for f in found.findings if not _of_truth(found, f)
@@ -51,8 +52,8 @@ def _short(found: NavigationFound) -> str:
     if found.errors is not None:
         score = found.errors.score("horizontal")
         parts.append(
-            f"the place is within its bound {share_words(score.share)} of the time, by "
-            f"{found.told.truth_name}"
+            f"beside {found.told.truth_name} the place is within its bound for "
+            f"{share_words(score.share)} of the time"
         )
     if found.told.withheld:
         count = len(found.told.withheld)
@@ -65,9 +66,8 @@ def _short(found: NavigationFound) -> str:
     if used:
         worst = max(used, key=lambda a: abs(a.ratio - 1.0))
         parts.append(
-            f"what was observed is {plain(worst.ratio, 2)} times as far from what was expected as "
-            "was stated"
-            + (f" ({worst.name}, the farthest of {len(used)})" if len(used) > 1 else "")
+            f"{worst.name} scatters {plain(worst.ratio, 2)} times as much as was expected"
+            + (f", the farthest off of {len(used)}" if len(used) > 1 else "")
         )
     if not parts:
         return "nothing was observed that could speak for it or against it"
@@ -91,8 +91,8 @@ def _errors(found: NavigationFound) -> list[tuple[bool, str]]:
 def _share(score: Score, word: str) -> str:
     rms, bound = _sized(score.rms, score.unit), _sized(score.bound, score.unit)
     return (
-        f"the error of the {word} is within its bound of 95{GAP}% {share_words(score.share)} of "
-        f"the time: {rms} (root mean square) beside {bound}"
+        f"the {word} is off by {rms} (root mean square; its bound of 95{GAP}% is {bound}), and "
+        f"within that bound for {share_words(score.share)} of the time"
     )
 
 
@@ -110,9 +110,9 @@ def _withheld(found: NavigationFound) -> list[tuple[bool, str]]:
     inside = sum(w.inside for w in those)
     worst = max(those, key=lambda w: w.error_m / w.bound_m if w.bound_m > 0.0 else 0.0)
     text = (
-        f"{inside} of {len(those)} stretches without a known aid end within the bound; the one "
-        f"nearest to it or farthest beyond: {length_words(worst.error_m)} beside "
-        f"{length_words(worst.bound_m)} in {plain(worst.end - worst.begin, 0)}{GAP}s"
+        f"the error is within the bound in {inside} of {len(those)} stretches that were withheld; "
+        f"the largest for its bound is {length_words(worst.error_m)} beside "
+        f"{length_words(worst.bound_m)}, in {plain(worst.end - worst.begin, 0)}{GAP}s"
     )
     return [(inside >= _ENOUGH * len(those), text)]
 
@@ -131,6 +131,13 @@ def _innovations(one: Agreement) -> tuple[bool, str]:
     return False, (
         f"{one.name} scatters less than was stated, so that its bounds are too wide: {ratio} "
         "(root mean square)"
+    )
+
+
+def _memory(one: Agreement) -> tuple[bool, str]:
+    return False, (
+        f"what is left of {one.name} lasts from epoch to epoch, as no noise does: correlation "
+        f"{plain(one.correlation, 2)}, by chance up to {plain(one.correlation_bound, 2)}"
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.report.chart import break_jumps
 from strapdown.report.crash_values import GAP, plain
 from strapdown.report.error_envelope import PLANE_95
 
@@ -21,6 +22,7 @@ __all__ = [
     "distance_over_ground",
     "duration_words",
     "half",
+    "heading_shown",
     "length_words",
     "plane_bound",
     "share_words",
@@ -31,6 +33,8 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _MG = 1e-3 * MICRO_G
+#: A heading that turns by more is drawn within 0 to 360 deg.
+MOST_TURN = 900.0
 
 
 @dataclass(frozen=True)
@@ -75,7 +79,7 @@ def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
         words = own.replace("_", " ")
         out.append(
             StateBlock(
-                f"{aid}: {words}" if dot else words,
+                f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
                 name.replace("_", "-").replace(".", "-"),
                 tuple(columns),
                 tuple(labels),
@@ -109,6 +113,23 @@ def unwrapped(heading: Array) -> Array:
         return heading
     whole = np.degrees(np.unwrap(np.radians(heading)))
     return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
+
+
+def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
+    """Heading over the trajectory and at the marks, deg, as it is drawn, and what to say of it.
+
+    It goes on over north, unless it turns so often that nothing could be read; then NaN breaks it
+    there.
+    """
+    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
+    marks = at_marks(record, "heading")
+    if np.ptp(values) <= MOST_TURN:
+        return values, marks, "The heading goes on over north, so that no turn breaks it."
+    return (
+        break_jumps(values % 360.0),
+        break_jumps(marks % 360.0),
+        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
+    )
 
 
 def at_marks(record: NavigationRecord, column: str) -> Array:

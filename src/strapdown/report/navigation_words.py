@@ -27,8 +27,6 @@ __all__ = ["cautions", "headline", "key_figures", "longest_outages", "place_word
 _NO_HEADING = 180.0
 # A bound that fell by less than this share says that the motion did not tell.
 _FELL = 0.1
-# From so large a correlation on, innovations remember those before them.
-_REMEMBER = 0.3
 
 
 def headline(found: NavigationFound) -> str:
@@ -187,16 +185,14 @@ def _heading_caution(found: NavigationFound) -> list[tuple[str, str]]:
 def _memory(found: NavigationFound) -> list[tuple[str, str]]:
     out = []
     for one in found.agreements:
-        size = abs(one.correlation)
-        if math.isfinite(size) and size > max(_REMEMBER, 2.0 * one.correlation_bound):
+        if one.remembers:
             out.append(
                 (
                     f"What is left of {one.name} is no noise",
                     f"an epoch is like the one before it (correlation {plain(one.correlation, 2)}, "
-                    f"by chance up to {plain(one.correlation_bound, 2)}): its errors last, and so "
-                    "are the bounds narrower than they should be. State the standard deviation of "
-                    "what lasts, or look for a time offset, a lever arm, or too small noise of the "
-                    "sensors.",
+                    f"by chance up to {plain(one.correlation_bound, 2)}): its errors last, and the "
+                    "bounds are narrower than they should be. Look for a time offset, a lever arm, "
+                    "or noise of the sensors that is stated too small.",
                 )
             )
     return out

@@ -10,7 +10,7 @@ from textwrap import fill
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from strapdown.report.chart import Chart, Line, Panel, steady_range
+from strapdown.report.chart import Chart, Line, Panel, steady_range, strip_range
 from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.svg_areas import draw_bars, draw_fills, fill_outline, set_ticks
 
@@ -269,6 +269,8 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
     set_ticks(panel, axis)
     if panel.steady:
         axis.ticklabel_format(axis="y", useOffset=False)
+    if (span := strip_range(chart)) is not None:
+        axis.set_xlim(*span)
     if panel.x_label:
         axis.set_xlabel(panel.x_label)
         axis.set_aspect("equal", adjustable="datalim")
