@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown._kernels.compensation import compensate
+from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.level import ALT, AXIS, Q_LB
 from strapdown.earth import gravity
 from strapdown.ellipsoids import find_ellipsoid
@@ -133,9 +133,19 @@ class ErrorFilter:
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
         """Return rows of motion increments without the errors estimated so far, (k, 10)."""
-        stacked = self.model.stacked
         out = np.empty_like(rows)
-        compensate(rows, stacked.gyro, stacked.accel, state.sensors, out)
+        of_gyros, of_accels = self.errors_of_sensors(state)
+        compensate(rows, of_gyros, of_accels, out)
+        return out
+
+    def errors_of_sensors(self, state: FilterState) -> Array:
+        """Return what the estimates say of the readings, (2, 7, 3): gyros, accelerometers.
+
+        A constant part, and parts per rate x, y, z and per force x, y, z.
+        """
+        stacked, out = self.model.stacked, np.empty((2, 7, 3))
+        errors_of_states(stacked.gyro_terms, state.sensors, out[0])
+        errors_of_states(stacked.accel_terms, state.sensors, out[1])
         return out
 
     def advance_compensated(
@@ -163,16 +173,11 @@ class ErrorFilter:
             mechanization, rows, np.empty(0), self.earth, history
         )
         if why:
-            raise DivergenceError(
-                f"the state has diverged with the sample at {time[made]:.9g} s",
-                quantity="state",
-                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-                "gravity, a burst; or begin from a state that is nearer to the truth",
-            )
+            raise diverged(float(time[made]))
 
     def follow(
         self, state: FilterState, time: Array, history: Array, rows: Array, mechanization: Array
-    ) -> FilterState:
+    ) -> tuple[FilterState, Array]:
         """Take estimates and covariance over steps that the mechanization has made.
 
         Parameters
@@ -189,17 +194,20 @@ class ErrorFilter:
 
         Returns
         -------
-        FilterState
+        state : FilterState
+        Phi : ndarray, (n, n)
+            How the states went on.
         """
         segment = Segment(self.mechanization, np.concatenate([[state.time], time]), history, rows)
         Phi, Q = self._transition(segment)
-        return FilterState(
+        after = FilterState(
             float(time[-1]),
             mechanization.copy(),
             history[-1],
             self._decayed(state, float(time[-1])),
             self.form.predict(state.covariance, Phi, Q),
         )
+        return after, Phi
 
     def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
         """Go on over motion increments.
@@ -299,16 +307,45 @@ class ErrorFilter:
             Of each observation.
         """
         to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
+        x = np.zeros(to_physical.shape[1])
+        after, x, seen = self.estimate(state, x, observations, rules)
+        return self._fed_back(after, to_physical, x), seen
+
+    def estimate(
+        self,
+        state: FilterState,
+        x: Array,
+        observations: Sequence[Observation],
+        rules: Sequence[UpdateRule | None] | None = None,
+    ) -> tuple[FilterState, Array, list[Innovations]]:
+        """Take the observations of an epoch, and take nothing off.
+
+        Parameters
+        ----------
+        state : FilterState
+        x : ndarray, (n,)
+            States as they are estimated before.
+        observations, rules
+            As `observe`.
+
+        Returns
+        -------
+        state : FilterState
+            With the covariance after.
+        x : ndarray, (n,)
+        innovations : list of Innovations
+        """
+        to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
         covariance, x, seen = self.form.update(
             state.covariance,
-            np.zeros(to_physical.shape[1]),
+            x,
             np.concatenate([one.z for one in observations]),
             np.concatenate([one.H for one in observations]) @ to_physical,
             np.concatenate([one.R for one in observations]),
             self.rule if rules is None else _each(rules, observations),
         )
-        after = self._fed_back(replace(state, covariance=covariance), to_physical, x)
-        return after, _split(seen, [one.z.size for one in observations])
+        sizes = [one.z.size for one in observations]
+        return replace(state, covariance=covariance), x, _split(seen, sizes)
 
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
@@ -385,6 +422,16 @@ class ErrorFilter:
                 at = self.model.layout[name]
                 out[at, at] = turn
         return out
+
+
+def diverged(time: float) -> DivergenceError:
+    """A state left what its mechanization can do, with the sample at this time."""
+    return DivergenceError(
+        f"the state has diverged with the sample at {time:.9g} s",
+        quantity="state",
+        remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+        "gravity, a burst; or begin from a state that is nearer to the truth",
+    )
 
 
 def symmetric(P: Array) -> Array:
