@@ -186,7 +186,7 @@ def simulate_gnss(
     velocity_sd = receiver.stated_velocity_sd or receiver.velocity_noise
     return gnss_table(
         (instants + receiver.time_offset)[kept],
-        _moved(motion, place, off)[kept],
+        moved(motion, place, off)[kept],
         (velocity + fast)[kept],
         position_sd,
         velocity_sd,
@@ -206,7 +206,7 @@ def _antenna(motion: EarthMotion, time: Array, receiver: GnssReceiver) -> tuple[
     )
 
 
-def _moved(motion: EarthMotion, place: Array, off: Array) -> Array:
+def moved(motion: EarthMotion, place: Array, off: Array) -> Array:
     """Places that are wrong by metres north, east, down."""
     from strapdown.earth import radii_of_curvature
 
