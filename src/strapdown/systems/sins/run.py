@@ -90,7 +90,8 @@ def run_navigation(
     state = navigator.begin(start, P)
     for aid in aids:
         if aid.name in source.tables:
-            state = navigator.tell(state, aid.name, source.tables[aid.name])
+            table = source.tables[aid.name]
+            state = navigator.tell(state, aid.name, table[index_of(table) > begin + 1e-6])
     pieces = []
     for at in range(0, len(time), PIECE):
         progress("navigating", 0.2 + 0.6 * at / len(time))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from strapdown.config.navigation import ReceiverTable
 from strapdown.sensors.error_draws import child, normal
 from strapdown.simulation.earth_motion import EarthMotion
-from strapdown.simulation.gnss import GnssReceiver, moved, simulate_gnss
+from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY_SD, gnss_table
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
@@ -61,7 +61,7 @@ def simulated_fixes(
         for part in (way[:, :3], way[:, 3:]):
             part /= np.linalg.norm(part, axis=1, keepdims=True)
         off = asked.outlier_size * struck[:, None] * way
-        place = moved(motion, place, off[:, :3] * place_sd)
+        place = moved_places(place, off[:, :3] * place_sd, motion.ellipsoid)
         velocity = velocity + off[:, 3:] * velocity_sd
     if not asked.velocity:
         velocity_sd = np.full_like(velocity_sd, np.inf)
