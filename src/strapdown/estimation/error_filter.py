@@ -280,7 +280,7 @@ class ErrorFilter:
         self,
         state: FilterState,
         observations: Sequence[Observation],
-        rules: Sequence[UpdateRule | None] | None = None,
+        rules: Sequence[UpdateRule | Sequence[UpdateRule] | None] | None = None,
     ) -> tuple[FilterState, list[Innovations]]:
         """Take the observations of an epoch, and take off what they tell of the errors.
 
@@ -289,8 +289,9 @@ class ErrorFilter:
         state : FilterState
         observations : sequence of Observation
             Of this state, independent of each other.
-        rules : sequence of UpdateRule or None, optional
-            How far each is believed; the filter's own for all, if not given.
+        rules : sequence of UpdateRule, of a sequence of them, or of None, optional
+            How far each is believed, all of its components alike or each by its own rule; the
+            filter's own for all, if not given.
 
         Returns
         -------
@@ -393,16 +394,15 @@ def symmetric(P: Array) -> Array:
 
 
 def _each(
-    rules: Sequence[UpdateRule | None], observations: Sequence[Observation]
+    rules: Sequence[UpdateRule | Sequence[UpdateRule] | None], observations: Sequence[Observation]
 ) -> list[UpdateRule] | None:
     """One rule for each component; none at all where nothing has one."""
     if not any(rules):
         return None
-    return [
-        rule or FullUpdate()
-        for rule, one in zip(rules, observations, strict=True)
-        for _ in range(one.z.size)
-    ]
+    out: list[UpdateRule] = []
+    for rule, one in zip(rules, observations, strict=True):
+        out += rule if isinstance(rule, Sequence) else [rule or FullUpdate()] * one.z.size
+    return out
 
 
 def _split(seen: Innovations, sizes: Sequence[int]) -> list[Innovations]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown._kernels.split_increment import split_increment
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.view import View
+from strapdown.estimation.adaptive_rule import AdaptiveRule, Scales
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.observation import Observation
 from strapdown.exceptions import ConfigError, nearest
@@ -49,6 +50,8 @@ class NavigatorState:
         Of each aid that watches the sensors.
     marked : float, s
         Time of the last mark.
+    scales : mapping of str to tuple of ScaleState
+        By name of an observation whose rule learns: what it has learnt of each component.
     """
 
     filter: FilterState
@@ -61,6 +64,7 @@ class NavigatorState:
     queues: Mapping[str, Epochs]
     memories: Mapping[str, Any]
     marked: float
+    scales: Mapping[str, Scales] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -161,9 +165,10 @@ class Navigator:
         more = aid.epochs(table)
         queue = state.queues[name]
         if queue.time.size:
-            more = Epochs(
-                np.concatenate([queue.time, more.time]), np.concatenate([queue.values, more.values])
-            )
+            # An epoch may be before those of an earlier row: a velocity that comes late.
+            both = np.concatenate([queue.time, more.time])
+            order = np.argsort(both, kind="stable")
+            more = Epochs(both[order], np.concatenate([queue.values, more.values])[order])
         return replace(state, queues={**state.queues, name: more})
 
     def advance(
@@ -210,6 +215,7 @@ class _Going:
         self.queues = dict(state.queues)
         self.memories = dict(state.memories)
         self.marked = state.marked
+        self.scales = dict(state.scales)
         self.times: list[float] = []
         self.history: list[Array] = []
         self.seen: list[Seen] = []
@@ -256,6 +262,7 @@ class _Going:
             queues=self.queues,
             memories=self.memories,
             marked=self.marked,
+            scales=self.scales,
         )
 
     def piece(self) -> NavigationPiece:
@@ -340,7 +347,20 @@ class _Going:
             return
         observations = [one for _, one in told]
         rules = [aid.rule or filter_.rule for aid, _ in told]
-        self.filter, innovations = filter_.observe(self.filter, observations, rules)
+        self.filter, innovations = filter_.observe(
+            self.filter,
+            observations,
+            [
+                rule.rules(self.scales.get(one.name) or rule.begin(one.z.size))
+                if isinstance(rule, AdaptiveRule)
+                else rule
+                for rule, one in zip(rules, observations, strict=True)
+            ],
+        )
+        for rule, one, nu in zip(rules, observations, innovations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                before = self.scales.get(one.name) or rule.begin(one.z.size)
+                self.scales[one.name] = rule.after(before, nu, one.R)
         self.mechanization, self.row = self.filter.mechanization.copy(), self.filter.row
         self._open_anew()
         self.seen += [
