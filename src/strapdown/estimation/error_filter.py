@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown._kernels.compensation import compensate
+from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.level import ALT, AXIS, Q_LB
 from strapdown.earth import gravity
 from strapdown.ellipsoids import find_ellipsoid
@@ -133,9 +133,18 @@ class ErrorFilter:
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
         """Return rows of motion increments without the errors estimated so far, (k, 10)."""
-        stacked = self.model.stacked
         out = np.empty_like(rows)
-        compensate(rows, stacked.gyro, stacked.accel, state.sensors, out)
+        compensate(rows, *self.errors_of_sensors(state), out)
+        return out
+
+    def errors_of_sensors(self, state: FilterState) -> Array:
+        """Return what the estimates say of the readings, (2, 7, 3): gyros, accelerometers.
+
+        A constant part, and parts per rate x, y, z and per force x, y, z.
+        """
+        stacked, out = self.model.stacked, np.empty((2, 7, 3))
+        errors_of_states(stacked.gyro_terms, state.sensors, out[0])
+        errors_of_states(stacked.accel_terms, state.sensors, out[1])
         return out
 
     def advance_compensated(
