@@ -45,7 +45,7 @@ class NavigatorState:
         What followed the last instant of the covariance: ends of the steps, rows of the history,
         increments without the estimated errors.
     queues : mapping of str to Epochs
-        Of each aid with a table, the epochs that are still to come.
+        Of each aid, the epochs that are still to come.
     memories : mapping of str to object
         Of each aid that watches the sensors.
     marked : float, s
@@ -136,7 +136,7 @@ class Navigator:
             open_time=np.empty(0),
             open_history=state.row[None, :],
             open_rows=np.empty((0, 10)),
-            queues={aid.name: nothing for aid in self.aids if isinstance(aid, TableAid)},
+            queues={aid.name: nothing for aid in self.aids},
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
         )
@@ -160,7 +160,7 @@ class Navigator:
             raise ConfigError(
                 f"there is no aid '{name}' with a table",
                 quantity="aiding",
-                remedy=nearest(name, state.queues),
+                remedy=nearest(name, [a.name for a in self.aids if isinstance(a, TableAid)]),
             )
         more = aid.epochs(table)
         queue = state.queues[name]
@@ -224,14 +224,12 @@ class _Going:
 
     def over(self, time: Array, rows: Array) -> None:
         """Go over steps."""
-        watched: dict[str, NDArray[np.bool_]] = {}
         for aid in self.navigator.aids:
             if isinstance(aid, WatchingAid):
-                self.memories[aid.name], watched[aid.name] = aid.watch(
-                    self.memories[aid.name], time, rows
-                )
+                self.memories[aid.name], seen = aid.watch(self.memories[aid.name], time, rows)
+                self.queues[aid.name] = seen
         self._drop_late()
-        for i, (end, row) in enumerate(zip(time.tolist(), rows, strict=True)):
+        for end, row in zip(time.tolist(), rows, strict=True):
             left = row
             while True:
                 at = self._next_epoch()
@@ -240,12 +238,11 @@ class _Going:
                 first, second = np.empty(10), np.empty(10)
                 split_increment(left, at - self.time, first, second)
                 self._step(at, first)
-                self._observe(at, ())
+                self._observe(at)
                 left = second
             self._step(end, left)
-            flagged = tuple(name for name, flags in watched.items() if flags[i])
-            if flagged or self._next_epoch() <= end + SAME_INSTANT:
-                self._observe(end, flagged)
+            if self._next_epoch() <= end + SAME_INSTANT:
+                self._observe(end)
             self.times.append(end)
             self.history.append(self.row)
 
@@ -316,7 +313,7 @@ class _Going:
         self.open_time, self.open_rows = [], []
         self.open_history = [self.row]
 
-    def _observe(self, at: float, flagged: tuple[str, ...]) -> None:
+    def _observe(self, at: float) -> None:
         """Take everything that is observed at an instant."""
         last = self.open_rows[-1] if self.open_rows else None
         self._close()
@@ -335,14 +332,11 @@ class _Going:
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
-            if isinstance(aid, WatchingAid) and aid.name in flagged:
-                told += [(aid, one) for one in aid.observe(view)]
-            elif isinstance(aid, TableAid):
-                queue = self.queues[aid.name]
-                count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
-                for values in queue.values[:count]:
-                    told += [(aid, one) for one in aid.observe(view, values)]
-                self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
+            queue = self.queues[aid.name]
+            count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
+            for values in queue.values[:count]:
+                told += [(aid, one) for one in aid.observe(view, values)]
+            self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
         if not told:
             return
         observations = [one for _, one in told]
