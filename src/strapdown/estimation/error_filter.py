@@ -24,6 +24,8 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
+#: What an observation is believed by: one rule, one for each of its components, or none.
+Rules = UpdateRule | Sequence[UpdateRule] | None
 
 # Part by which noise is larger than what is known of it, so that what is left is no less than zero:
 # of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
@@ -288,7 +290,7 @@ class ErrorFilter:
         self,
         state: FilterState,
         observations: Sequence[Observation],
-        rules: Sequence[UpdateRule | None] | None = None,
+        rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, list[Innovations]]:
         """Take the observations of an epoch, and take off what they tell of the errors.
 
@@ -297,8 +299,9 @@ class ErrorFilter:
         state : FilterState
         observations : sequence of Observation
             Of this state, independent of each other.
-        rules : sequence of UpdateRule or None, optional
-            How far each is believed; the filter's own for all, if not given.
+        rules : sequence of UpdateRule, of a sequence of them, or of None, optional
+            How far each is believed, all of its components alike or each by its own rule; the
+            filter's own for all, if not given.
 
         Returns
         -------
@@ -316,7 +319,7 @@ class ErrorFilter:
         state: FilterState,
         x: Array,
         observations: Sequence[Observation],
-        rules: Sequence[UpdateRule | None] | None = None,
+        rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, Array, list[Innovations]]:
         """Take the observations of an epoch, and take nothing off.
 
@@ -439,17 +442,14 @@ def symmetric(P: Array) -> Array:
     return 0.5 * (P + P.T)
 
 
-def _each(
-    rules: Sequence[UpdateRule | None], observations: Sequence[Observation]
-) -> list[UpdateRule] | None:
+def _each(rules: Sequence[Rules], observations: Sequence[Observation]) -> list[UpdateRule] | None:
     """One rule for each component; none at all where nothing has one."""
     if not any(rules):
         return None
-    return [
-        rule or FullUpdate()
-        for rule, one in zip(rules, observations, strict=True)
-        for _ in range(one.z.size)
-    ]
+    out: list[UpdateRule] = []
+    for rule, one in zip(rules, observations, strict=True):
+        out += rule if isinstance(rule, Sequence) else [rule or FullUpdate()] * one.z.size
+    return out
 
 
 def _split(seen: Innovations, sizes: Sequence[int]) -> list[Innovations]:

@@ -12,13 +12,12 @@ from strapdown._kernels import error_loop as kernel
 from strapdown._kernels.growth import padded
 from strapdown._kernels.level import LEVEL
 from strapdown.estimation.covariance import CovarianceForm, Innovations
-from strapdown.estimation.error_filter import ErrorFilter, diverged
+from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
 from strapdown.estimation.error_model import refuse_damped_height
 from strapdown.estimation.joseph import Joseph, Plain
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.ud import BiermanThornton
-from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.wd import Chernodarov
 from strapdown.exceptions import DivergenceError
 from strapdown.mechanization.ned import NorthEastDown
@@ -169,7 +168,7 @@ class CompiledEngine(Engine):
         self._note()
 
     def observe(
-        self, observations: Sequence[Observation], rules: Sequence[UpdateRule | None]
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
         """Take what is observed now."""
         self.filter, seen = self.navigation.observe(self.filter, observations, rules)

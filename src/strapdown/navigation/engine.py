@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.error_loop import BEYOND
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.estimation.observation import Observation
-from strapdown.estimation.update_rule import UpdateRule
 
 __all__ = ["LARGEST_GROUP", "Engine", "EngineState", "GeneralEngine"]
 
@@ -105,7 +104,7 @@ class Engine(ABC):
 
     @abstractmethod
     def observe(
-        self, observations: Sequence[Observation], rules: Sequence[UpdateRule | None]
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
         """Take what is observed now, after `close`."""
 
@@ -181,7 +180,7 @@ class GeneralEngine(Engine):
         self._open_anew()
 
     def observe(
-        self, observations: Sequence[Observation], rules: Sequence[UpdateRule | None]
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
         """Take what is observed now."""
         if self.feeds_back:

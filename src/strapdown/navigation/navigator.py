@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 from strapdown._kernels.split_increment import split_increment
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.view import View
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.adaptive_rule import AdaptiveRule, Scales
+from strapdown.estimation.covariance import Innovations
+from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled
@@ -40,17 +43,20 @@ class NavigatorState:
     engine : EngineState
         Of mechanization, estimates and covariance.
     queues : mapping of str to Epochs
-        Of each aid with a table, the epochs that are still to come.
+        Of each aid, the epochs that are still to come.
     memories : mapping of str to object
         Of each aid that watches the sensors.
     marked : float, s
         Time of the last mark.
+    scales : mapping of str to tuple of ScaleState
+        By name of an observation whose rule learns: what it has learnt of each component.
     """
 
     engine: EngineState
     queues: Mapping[str, Epochs]
     memories: Mapping[str, Any]
     marked: float
+    scales: Mapping[str, Scales] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -124,7 +130,7 @@ class Navigator:
         nothing = Epochs(np.empty(0), np.empty((0, 0)))
         return NavigatorState(
             engine=begun(self.filter, state),
-            queues={aid.name: nothing for aid in self.aids if isinstance(aid, TableAid)},
+            queues={aid.name: nothing for aid in self.aids},
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
         )
@@ -148,14 +154,15 @@ class Navigator:
             raise ConfigError(
                 f"there is no aid '{name}' with a table",
                 quantity="aiding",
-                remedy=nearest(name, state.queues),
+                remedy=nearest(name, [a.name for a in self.aids if isinstance(a, TableAid)]),
             )
         more = aid.epochs(table)
         queue = state.queues[name]
         if queue.time.size:
-            more = Epochs(
-                np.concatenate([queue.time, more.time]), np.concatenate([queue.values, more.values])
-            )
+            # An epoch may be before those of an earlier row: a velocity that comes late.
+            both = np.concatenate([queue.time, more.time])
+            order = np.argsort(both, kind="stable")
+            more = Epochs(both[order], np.concatenate([queue.values, more.values])[order])
         return replace(state, queues={**state.queues, name: more})
 
     def advance(
@@ -201,6 +208,7 @@ class _Going:
         self.queues = dict(state.queues)
         self.memories = dict(state.memories)
         self.marked = state.marked
+        self.scales = dict(state.scales)
         self.seen: list[Seen] = []
         self.marks: list[Mark] = []
         self.late: list[tuple[str, float]] = []
@@ -209,60 +217,47 @@ class _Going:
 
     def over(self, time: Array, rows: Array) -> None:
         """Go over steps."""
-        watched = self._watch(time, rows)
-        flagged = np.flatnonzero(np.any(list(watched.values()), axis=0)) if watched else None
+        for aid in self.navigator.aids:
+            if isinstance(aid, WatchingAid):
+                self.memories[aid.name], self.queues[aid.name] = aid.watch(
+                    self.memories[aid.name], time, rows
+                )
         self._drop_late()
         rows = rows.copy()
         self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
         at = 0
-        while at < len(time):
+        while True:
             epoch = self._next_epoch()
             if epoch <= self.engine.time + SAME_INSTANT:
-                self._observe(self.engine.time, ())
-                if at:
+                self._observe(self.engine.time)
+                if at and self.engine.time <= time[at - 1] + SAME_INSTANT:
                     self.history[at - 1] = self.engine.shown()
                 continue
+            if at == len(time):
+                break
             # The step at whose end, or within which, something is observed next.
             told = int(np.searchsorted(time, epoch - SAME_INSTANT))
-            within = told < len(time) and time[told] > epoch + SAME_INSTANT
-            seen = len(time)
-            if flagged is not None:
-                next_flag = int(np.searchsorted(flagged, at))
-                seen = int(flagged[next_flag]) if next_flag < flagged.size else seen
-            if within and told <= seen:
+            if told < len(time) and time[told] > epoch + SAME_INSTANT:
                 at = self._steps(at, told, time, rows)
                 first, second = np.empty(10), np.empty(10)
                 split_increment(rows[told], epoch - self.engine.time, first, second)
                 room = np.empty((1, self.history.shape[1]))
                 self._run(np.array([epoch]), first[None, :], room)
                 rows[told] = second
-                self._observe(epoch, ())
-                continue
-            stop = min(seen, told)
-            at = self._steps(at, min(stop + 1, len(time)), time, rows)
-            if stop < len(time):
-                names = tuple(name for name, flags in watched.items() if flags[stop])
-                self._observe(float(time[stop]), names)
-                self.history[stop] = self.engine.shown()
+            else:
+                at = self._steps(at, min(told + 1, len(time)), time, rows)
 
     def state(self) -> NavigatorState:
         """Where it is now."""
-        return NavigatorState(self.engine.state(), self.queues, self.memories, self.marked)
+        return NavigatorState(
+            self.engine.state(), self.queues, self.memories, self.marked, self.scales
+        )
 
     def piece(self) -> NavigationPiece:
         """What came of it."""
         return NavigationPiece(
             self.time, self.history, tuple(self.seen), tuple(self.marks), tuple(self.late)
         )
-
-    def _watch(self, time: Array, rows: Array) -> dict[str, NDArray[np.bool_]]:
-        watched = {}
-        for aid in self.navigator.aids:
-            if isinstance(aid, WatchingAid):
-                self.memories[aid.name], watched[aid.name] = aid.watch(
-                    self.memories[aid.name], time, rows
-                )
-        return watched
 
     def _next_epoch(self) -> float:
         return min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
@@ -288,7 +283,7 @@ class _Going:
             if made < len(time):
                 self._mark()
 
-    def _observe(self, at: float, flagged: tuple[str, ...]) -> None:
+    def _observe(self, at: float) -> None:
         """Take everything that is observed at an instant."""
         engine, filter_ = self.engine, self.navigator.filter
         last = engine.last
@@ -305,23 +300,36 @@ class _Going:
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
-            if isinstance(aid, WatchingAid) and aid.name in flagged:
-                told += [(aid, one) for one in aid.observe(view)]
-            elif isinstance(aid, TableAid):
-                queue = self.queues[aid.name]
-                count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
-                for values in queue.values[:count]:
-                    told += [(aid, one) for one in aid.observe(view, values)]
-                self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
+            queue = self.queues[aid.name]
+            count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
+            for values in queue.values[:count]:
+                told += [(aid, one) for one in aid.observe(view, values)]
+            self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
         if told:
             observations = [one for _, one in told]
-            rules = [aid.rule or filter_.rule for aid, _ in told]
-            innovations = engine.observe(observations, rules)
+            innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
             self.seen += [
                 Seen(at, one.name, one.labels, nu)
                 for one, nu in zip(observations, innovations, strict=True)
             ]
         self._mark()
+
+    def _told(
+        self, rules: list[UpdateRule | None], observations: list[Observation]
+    ) -> list[Innovations]:
+        """Take observations; what their rules learn of them is kept."""
+        asked: list[Rules] = []
+        for rule, one in zip(rules, observations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
+            else:
+                asked.append(rule)
+        innovations = self.engine.observe(observations, asked)
+        for rule, one, nu in zip(rules, observations, innovations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                before = self.scales.get(one.name) or rule.begin(one.z.size)
+                self.scales[one.name] = rule.after(before, nu, one.R)
+        return innovations
 
     def _mark(self) -> None:
         """Note covariance and estimates."""
