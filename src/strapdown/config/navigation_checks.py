@@ -22,7 +22,6 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.stated_states import stated_states
 from strapdown.exceptions import ConfigError
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
 from strapdown.sensors.catalogue import load_sensor

@@ -139,8 +139,7 @@ def chi_square_band(freedom: float) -> tuple[float, float]:
     """Quantiles of 2.5 % and 97.5 % of chi-square."""
     from scipy.stats import chi2
 
-    low, high = chi2.ppf([0.025, 0.975], freedom)
-    return float(low), float(high)
+    return float(chi2.ppf(0.025, freedom)), float(chi2.ppf(0.975, freedom))
 
 
 def chi_square_far(freedom: float) -> float:

@@ -200,4 +200,4 @@ def _along(errors: Array, P: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = size / np.sqrt(squares)
     largest = np.sqrt(np.maximum(np.linalg.eigvalsh(P)[:, -1], 0.0))
-    return np.where(squares > 0.0, reach, largest)
+    return np.asarray(np.where(squares > 0.0, reach, largest))

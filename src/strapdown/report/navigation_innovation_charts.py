@@ -71,7 +71,7 @@ def _some(one: Agreement, k: int, which: NDArray[np.bool_]) -> NDArray[np.bool_]
     with np.errstate(divide="ignore", invalid="ignore"):
         far = np.abs(one.nu[:, k]) > _FAR * one.sd[:, k]
     even = np.arange(one.epochs) % step == 0
-    return which & (far | even)
+    return np.asarray(which & (far | even))
 
 
 def _points(

@@ -138,7 +138,7 @@ def at_marks(record: NavigationRecord, column: str) -> Array:
     values = record.trajectory[column].to_numpy(dtype=np.float64)
     if column == "heading":
         values = unwrapped(values)
-    return np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
+    return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
 
 
 def plane_bound(record: NavigationRecord) -> Array:
