@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -322,6 +322,7 @@ class _Going:
             sensors=self.filter.sensors,
             rate=zero if last is None else last[1:4] / dt,
             force=zero if last is None else last[4:7] / dt,
+            covariance_of=partial(filter_.physical_covariance, self.filter),
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
