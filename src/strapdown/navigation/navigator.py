@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -340,6 +340,7 @@ class _Going:
             sensors=engine.filter.sensors,
             rate=last[1:4] / last[0],
             force=last[4:7] / last[0],
+            covariance_of=partial(filter_.physical_covariance, engine.filter),
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
