@@ -31,6 +31,7 @@ __all__ = [
     "clock_of",
     "clock_of_name",
     "gps_from_unix",
+    "leap_seconds",
     "on_clock_of",
     "unix_from_gps",
     "unrolled",
