@@ -166,7 +166,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
             quantity="time",
             remedy="correct or delete that row, or leave such rows out with repair",
         )
-    keep = np.isfinite(time)
+    keep: NDArray[np.bool_] = np.isfinite(time)
     if fixes.clock.name in (GPS, RELATIVE):
         whole = time.copy()
         whole[keep], weeks = unrolled(time[keep])
@@ -203,7 +203,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
 
 def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bool_]:
     """Rows with a place; those of quality 0 may be without."""
-    there = np.isfinite(fixes.place).all(axis=1)
+    there: NDArray[np.bool_] = np.isfinite(fixes.place).all(axis=1)
     bad = np.flatnonzero(~there & (quality != 0.0))
     if bad.size and not options.repair:
         k = int(bad[0])
@@ -216,7 +216,7 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
             remedy="correct or delete that row, or leave such rows out with repair",
         )
     _say_left_out(fixes, there, "without a place")
-    return np.asarray(there)
+    return there
 
 
 def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], why: str) -> None:
