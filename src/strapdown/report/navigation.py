@@ -94,9 +94,7 @@ def write_navigation(
     file = next((str(i.path) for i in result.inputs if i.role == "configuration"), None)
     configuration = {
         "name": name,
-        "navigation": result.spec.model_dump(
-            mode="json", exclude_none=True, serialize_as_any=True
-        ),
+        "navigation": result.spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True),
         **({} if file is None else {"file_path": file}),
     }
     seals: list[Seal] = []

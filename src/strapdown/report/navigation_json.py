@@ -12,7 +12,7 @@ import pandas as pd
 from strapdown.alignment.alignment import Alignment
 from strapdown.exceptions import Finding
 from strapdown.systems.sins.result import NavigationResult
-from strapdown.tables import EULER, GEODETIC, NED, VELOCITY, VELOCITY_SD
+from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json"]
 
