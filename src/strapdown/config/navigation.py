@@ -8,8 +8,6 @@ from pydantic import Field, StrictBool, StrictInt, model_validator
 
 from strapdown.config.alignment import (
     AxesTable,
-    CoarseSpec,
-    FineSpec,
     LogTable,
     PrefilterSpec,
     SensorsTable,
@@ -17,6 +15,7 @@ from strapdown.config.alignment import (
 from strapdown.config.choice import ChoiceSpec
 from strapdown.config.crash_case import (
     FileName,
+    NotNegative,
     Number,
     OneOrThree,
     Pair,
@@ -30,7 +29,11 @@ from strapdown.config.spec import TableSpec, refuse
 
 __all__ = [
     "AidSpec",
+    "CoarseModeSpec",
+    "CommandTable",
     "FilterSpec",
+    "FineModeSpec",
+    "GapsTable",
     "MechanizationSpec",
     "NavigationOutputTable",
     "NavigationSensorsTable",
@@ -104,6 +107,7 @@ class NavigationSiteTable(TableSpec):
     lon_deg: Number
     alt_m: Number = 0.0
     position_sd_m: OneOrThree = 10.0
+    velocity_sd_m_per_s: OneOrThree = 0.1
 
 
 class NavigationSensorsTable(SensorsTable):
@@ -111,6 +115,46 @@ class NavigationSensorsTable(SensorsTable):
 
     #: Names of blocks of states; biases and their drifts, if not given.
     states: tuple[Word, ...] | None = None
+
+
+class CoarseModeSpec(ChoiceSpec):
+    """The coarse alignment, and what ends it: what comes first."""
+
+    kind: str = "inertial_frame"
+    duration_s: Positive | None = None
+    until_heading_sd_deg: Positive | None = None
+    #: Of the worse of roll and pitch.
+    until_tilt_sd_deg: Positive | None = None
+    #: The newest part that is aligned; all of it, if not given.
+    window_s: Positive | None = None
+
+
+class FineModeSpec(ChoiceSpec):
+    """The fine alignment after it, and what ends it: what comes first."""
+
+    kind: str = "filter"
+    duration_s: Positive | None = None
+    until_heading_sd_deg: Positive | None = None
+    #: Of the worse of roll and pitch.
+    until_tilt_sd_deg: Positive | None = None
+
+
+class CommandTable(TableSpec):
+    """A word to the chain: which mode begins with the first sample at or after an instant."""
+
+    time_s: Number
+    mode: Literal["fine", "navigation", "next"]
+
+
+class GapsTable(TableSpec):
+    """What is done where samples are missing."""
+
+    #: A step of more than so many of the usual ones is a gap.
+    usual: float = Field(default=3.0, gt=1.0, strict=True)
+    #: A longer gap is not bridged.
+    coast_s: NotNegative = 1.0
+    #: What such a one does: ends the run, begins the alignment anew, or is bridged all the same.
+    beyond: Literal["refuse", "align", "coast"] = "refuse"
 
 
 class MechanizationSpec(ChoiceSpec):
@@ -163,8 +207,10 @@ class NavigationSpec(TableSpec):
     prefilter: PrefilterSpec = PrefilterSpec()
     start: StartTable | None = None
     site: NavigationSiteTable | None = None
-    coarse: CoarseSpec = CoarseSpec()
-    fine: FineSpec = FineSpec()
+    coarse: CoarseModeSpec = CoarseModeSpec()
+    fine: FineModeSpec = FineModeSpec()
+    commands: tuple[CommandTable, ...] = ()
+    gaps: GapsTable = GapsTable()
     mechanization: MechanizationSpec = MechanizationSpec()
     filter: FilterSpec = FilterSpec()
     aiding: TableSpec = TableSpec()

@@ -18,6 +18,7 @@ from strapdown.config.crash_checks import Written
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.config.slots import SLOTS
 from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
+from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.stated_states import stated_states
@@ -33,7 +34,9 @@ __all__ = ["TRAJECTORY_FILES", "check_navigation", "given_of", "make_aids", "mak
 WITHOUT = "without that no position has a bound, and no aid a weight"
 #: Forms of a trajectory that a run can write.
 TRAJECTORY_FILES = ("csv", "parquet", "kml", "geojson", "tum")
-#: A heading whose observation has no height in it.
+#: Keys that end an alignment.
+ENDS = ("duration_s", "until_heading_sd_deg", "until_tilt_sd_deg", "window_s")
+#: Aids that observe a height.
 HEIGHTS = ("barometer",)
 
 
@@ -59,24 +62,8 @@ def check_navigation(spec: NavigationSpec, written: Written | None = None) -> No
             one()
         except ConfigError as error:
             found.append(error)
-    if len(found) == 1:
-        raise found[0]
     if found:
-        raise _together(found)
-
-
-def _together(found: list[ConfigError]) -> ConfigError:
-    """Several errors as one."""
-    lines = []
-    for error in sorted(found, key=lambda e: e.finding.line or 0):
-        f = error.finding
-        place = ", ".join(p for p in (f.line and f"line {f.line}", f.quantity) if p)
-        lines += [f"  {place}: {f.what}", f"    {f.remedy}"]
-    return ConfigError(
-        "\n".join([f"{len(found)} things do not fit:", *lines]),
-        file=found[0].finding.file,
-        remedy="mend each of them",
-    )
+        raise together(found)
 
 
 class _Checks(SourceChecks):
@@ -89,6 +76,7 @@ class _Checks(SourceChecks):
         yield partial(self.begins, spec)
         for name in ("prefilter", "coarse", "fine", "mechanization", "filter"):
             yield partial(self.stage, spec, name)
+        yield partial(self.modes, spec)
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
             yield partial(self.aid, spec, name)
@@ -139,9 +127,26 @@ class _Checks(SourceChecks):
             )
 
     def stage(self, spec: NavigationSpec, name: str) -> None:
-        self.told(
-            (name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec))
-        )
+        self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
+
+    def modes(self, spec: NavigationSpec) -> None:
+        """What ends each alignment, and what is said of one that is not there."""
+        for stage in ("coarse", "fine"):
+            given = getattr(spec, stage)
+            ends = [n for n in ENDS if getattr(given, n, None) is not None]
+            if given.kind == "none" and ends:
+                raise self.refuse(
+                    (stage, ends[0]), "there is no such alignment to end", "leave it out"
+                )
+            commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
+            if given.kind != "none" and not [n for n in ends if n != "window_s"]:
+                if commanded:
+                    continue
+                raise self.refuse(
+                    (stage, "duration_s"),
+                    "nothing ends this alignment, and navigation never begins",
+                    "write duration_s = …, until_heading_sd_deg = … or until_tilt_sd_deg = …",
+                )
 
     def alignment(self, spec: NavigationSpec) -> None:
         """What coarse and fine alignment need of one another, and of the aids."""
@@ -150,7 +155,7 @@ class _Checks(SourceChecks):
             raise self.refuse(
                 ("coarse", "kind"),
                 "it takes the course from satellite fixes, and no aid gives them",
-                'write [aiding.gnss] with path = …, or take another kind',
+                "write [aiding.gnss] with path = …, or take another kind",
             )
         if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
             raise self.refuse(
@@ -228,9 +233,7 @@ def _fixes(spec: NavigationSpec) -> list[str]:
 
 
 def _aid(spec: NavigationSpec, name: str) -> Aid:
-    made: Aid = make_choice(
-        aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name}
-    )
+    made: Aid = make_choice(aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name})
     return made
 
 

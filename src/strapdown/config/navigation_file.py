@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError, create_model
 
-from strapdown.config.alignment import CoarseSpec, FineSpec, PrefilterSpec
+from strapdown.config.alignment import PrefilterSpec
 from strapdown.config.case_keys import canonical
 from strapdown.config.case_paths import with_absolute_paths
 from strapdown.config.choice import ChoiceSpec, choice_form, with_kinds
@@ -19,7 +19,9 @@ from strapdown.config.explain import explained
 from strapdown.config.motions import KINDS, MANOEUVRES
 from strapdown.config.navigation import (
     AidSpec,
+    CoarseModeSpec,
     FilterSpec,
+    FineModeSpec,
     MechanizationSpec,
     NavigationSimulationTable,
     NavigationSpec,
@@ -30,6 +32,7 @@ from strapdown.config.navigation_wanted import what_navigation_wants, write_of_n
 from strapdown.config.placeholders import refuse_placeholders
 from strapdown.config.slots import SLOTS
 from strapdown.config.spec import TableSpec
+from strapdown.config.together import together
 from strapdown.config.toml_file import TomlFile, place_of, read_toml
 from strapdown.config.toml_lines import KeyPath
 from strapdown.exceptions import ConfigError
@@ -40,8 +43,8 @@ __all__ = ["NAVIGATION_STAGES", "navigation_spec", "read_navigation_spec", "stag
 #: there where none is named, and whether a chain can do without it, by the kind ``none``.
 NAVIGATION_STAGES: dict[str, tuple[type[ChoiceSpec], str, bool]] = {
     "prefilter": (PrefilterSpec, "none", True),
-    "coarse": (CoarseSpec, "inertial_frame", True),
-    "fine": (FineSpec, "filter", True),
+    "coarse": (CoarseModeSpec, "inertial_frame", True),
+    "fine": (FineModeSpec, "filter", True),
     "mechanization": (MechanizationSpec, "ned", False),
     "filter": (FilterSpec, "error_state", False),
 }
@@ -57,9 +60,7 @@ def stage_default(name: str, table: Mapping[str, Any]) -> str:
     return NAVIGATION_STAGES[name][1]
 
 
-def navigation_form(
-    table: Mapping[str, Any], file: TomlFile | None = None
-) -> type[NavigationSpec]:
+def navigation_form(table: Mapping[str, Any], file: TomlFile | None = None) -> type[NavigationSpec]:
     """The specification with the options of the kinds that a table names.
 
     Raises
@@ -88,9 +89,7 @@ def navigation_form(
 
 def _field(form: type[TableSpec], usual: dict[str, Any]) -> tuple[Any, Any]:
     """A field of a form, which may be left out where nothing in it must be written."""
-    needed = any(
-        one.is_required() for name, one in form.model_fields.items() if name not in usual
-    )
+    needed = any(one.is_required() for name, one in form.model_fields.items() if name not in usual)
     return form, ... if needed else form.model_validate(usual)
 
 
@@ -130,11 +129,8 @@ def _simulation_form(table: Mapping[str, Any], file: TomlFile | None) -> type[Ta
             if file is None:
                 raise ConfigError(what, quantity=place_of(path), remedy=remedy)
             raise file.refuse(path, what, remedy)
-    receivers = create_model(
-        "Receivers",
-        __base__=TableSpec,
-        **{name: (ReceiverTable, ReceiverTable()) for name in sorted(names)},
-    )
+    forms: dict[str, Any] = {name: (ReceiverTable, ReceiverTable()) for name in sorted(names)}
+    receivers = create_model("Receivers", __base__=TableSpec, **forms)
     return create_model(
         "Simulation", __base__=NavigationSimulationTable, gnss=(receivers, receivers())
     )
@@ -212,16 +208,20 @@ def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationS
             whole = spec.model_dump(serialize_as_any=True)
             spec = form(**with_absolute_paths(file, whole, "this file"))
     except ValidationError as error:
-        raise explained(
-            error.errors()[0],
-            file,
-            place=_place,
-            tags={"kind": KINDS, "do": MANOEUVRES},
-            written=written,
-            wanted=write_of_navigation,
-        ) from None
+        raise together([_explained(one, file, written) for one in error.errors()]) from None
     check_navigation(spec, Written(file, written))
     return spec
+
+
+def _explained(error: Any, file: TomlFile, written: Mapping[KeyPath, KeyPath]) -> ConfigError:
+    return explained(
+        error,
+        file,
+        place=_place,
+        tags={"kind": KINDS, "do": MANOEUVRES},
+        written=written,
+        wanted=write_of_navigation,
+    )
 
 
 def _place(parts: KeyPath) -> str:

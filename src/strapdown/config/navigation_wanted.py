@@ -11,7 +11,7 @@ __all__ = ["what_navigation_wants", "write_of_navigation"]
 WANTED: dict[str, str] = {
     "log.path": "the log, from the folder of this file",
     "truth.path": "the reference trajectory, from the folder of this file",
-    "simulation.motion": "[simulation.motion]: the motion, as kind = \"car\" and its keys",
+    "simulation.motion": '[simulation.motion]: the motion, as kind = "car" and its keys',
     "start.lat": "geodetic latitude, north positive",
     "start.lon": "longitude, east positive",
     "start.alt": "height over the ellipsoid",

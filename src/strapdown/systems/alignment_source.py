@@ -14,7 +14,8 @@ from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats import read_log
-from strapdown.formats.named_columns import read_fixes
+from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import ReadOptions, Recording, StatedStart
 from strapdown.results import InputFiles, Reading
 from strapdown.rotation import euler_from_dcm
@@ -85,13 +86,17 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     if spec.log is None:
         return _simulated(spec)
     recording, imu, findings = body_record(spec.log, spec.axes)
+    gnss = None
+    if spec.gnss is not None:
+        gnss, shifted = on_clock_of(read_gnss(spec.gnss.path), recording.imu)
+        findings = (*findings, *gnss.attrs["findings"], *([shifted] if shifted else []))
     return AlignmentSource(
         recording.name,
         "recorded log",
         imu,
         None,
         recording.start,
-        None if spec.gnss is None else read_fixes(spec.gnss.path),
+        gnss,
         recording.readings,
         (
             input_files("log", spec.log.path, recording.files),

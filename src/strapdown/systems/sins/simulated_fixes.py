@@ -73,6 +73,5 @@ def simulated_fixes(
     )
 
 
-
 def _uniform(seed: np.random.SeedSequence, count: int) -> Array:
     return np.random.Generator(np.random.PCG64(seed)).random(count)

@@ -146,7 +146,7 @@ def _simulated(
         name=spec.name,
         what=f"simulated, {Path(sensor).stem}, seed {asked.seed}",
         imu=imu,
-        tables={name: made.get(name, tables.get(name)) for name in aids_of(spec) if name in made or name in tables},
+        tables={**tables, **made},
         truth=exact if truth is None else truth,
         truth_name="the exact truth",
         start=None,
