@@ -132,8 +132,24 @@ def _observations(found: NavigationFound) -> tuple[Block | None, ...]:
     nis = nis_chart(found.record, found.agreements)
     return (
         tables.observation_table(found),
+        *_verdicts(found),
         None if nis is None else ChartBlock(nis),
         *(ChartBlock(innovation_chart(found.record, one)) for one in found.agreements),
+    )
+
+
+def _verdicts(found: NavigationFound) -> tuple[Block, ...]:
+    """What the innovations say against what was stated, beyond what chance makes."""
+    rows = [
+        (f"{one.name}, {verdict.what}", f"{verdict.meaning}.")
+        for one in found.agreements
+        for verdict in one.consistency.verdicts
+    ]
+    if not rows:
+        return (Paragraph("Nothing in them speaks against what was stated of sensors and aids."),)
+    return (
+        Paragraph("What in them is not by chance, and what it may mean:"),
+        Items(tuple(rows)),
     )
 
 

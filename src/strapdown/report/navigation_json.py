@@ -139,7 +139,7 @@ def _against(found: NavigationFound) -> dict[str, Any] | None:
         "from_s": float(errors.time[0]),
         "to_s": float(errors.time[-1]),
         "mean_nees": _number(errors.nees.mean()),
-        "nees_of": int(errors.freedom.max()),
+        "nees_of": errors.freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
     }
 
