@@ -42,8 +42,10 @@ def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, 
     return tuple(out)
 
 
-def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart:
-    """Normalised errors squared of place, velocity and attitude together."""
+def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
+    """Normalised errors squared of place, velocity and attitude; None where no bound is told."""
+    if not found.freedom:
+        return None
     low, high = bounds(found.freedom)
     nees = np.maximum(found.nees, _LEAST)
     panel = Panel(
@@ -55,8 +57,8 @@ def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart:
     return over_time(
         "nees",
         "Normalised errors squared",
-        f"By the covariance of these errors; {found.freedom} is expected, and 95 of 100 runs belong "
-        "between the levels at an instant. The errors of one run are alike from instant to "
+        f"By the covariance of these errors; {found.freedom} is expected, and 95 of 100 runs "
+        "belong between the levels at an instant. The errors of one run are alike from instant to "
         "instant: one that stays outside for a while says less than many runs would.",
         (panel,),
         told.record,

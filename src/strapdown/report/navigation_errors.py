@@ -68,12 +68,14 @@ class NavigationErrors:
     @property
     def nees(self) -> Array:
         """Normalised error squared of place, velocity and attitude, (n,)."""
+        if not self.freedom:
+            return np.full(len(self.time), np.nan)
         return self.comparison.nees["all"].to_numpy(dtype=np.float64)
 
     @property
     def freedom(self) -> int:
-        """Errors that it is of."""
-        return self.comparison.freedom["all"]
+        """Errors that it is of: those of which the run has states."""
+        return self.comparison.freedom.get("all", 0)
 
     def error(self, column: str) -> Array:
         """Errors of a quantity, (n,): m, m/s, deg."""
