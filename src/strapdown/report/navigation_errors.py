@@ -110,7 +110,7 @@ class NavigationErrors:
             return np.asarray(reach)
         length = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(length > 0.0, PLANE_95 * size / length, reach)
+            return np.asarray(np.where(length > 0.0, PLANE_95 * size / length, reach))
 
     def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
         worst = int(np.argmax(np.abs(error)))
