@@ -16,6 +16,17 @@ from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json"]
 
+MODULES = (
+    "prefilter",
+    "coarse",
+    "fine",
+    "mechanization",
+    "filter",
+    "damping",
+    "recorder",
+    "aiding",
+)
+
 POSITION_SD = [f"{name}_sd" for name in NED]
 
 
@@ -88,7 +99,6 @@ def navigation_json(result: NavigationResult) -> dict[str, Any]:
                 for e in result.errors.errors
             },
         },
-        "prefilter": _prefilter(result),
         "method": _method(result),
         "findings": [_finding(f) for f in result.findings],
     }
@@ -98,7 +108,7 @@ def _method(result: NavigationResult) -> dict[str, Any]:
     """The modules and their options; where files stand is no part of it."""
     chosen: dict[str, Any] = result.spec.model_dump(
         mode="json",
-        include={"prefilter", "coarse", "fine", "mechanization", "filter", "aiding"},
+        include=set(MODULES),
         exclude_none=True,
         serialize_as_any=True,
     )
@@ -157,18 +167,6 @@ def _innovations(table: pd.DataFrame) -> dict[str, Any]:
             label: _number(math.sqrt(np.square(nu[used, k]).mean()) if used.any() else math.nan)
             for k, label in enumerate(labels)
         },
-    }
-
-
-def _prefilter(result: NavigationResult) -> dict[str, Any] | None:
-    report = result.prefilter
-    if report is None:
-        return None
-    return {
-        "name": report.name,
-        "delay_s": report.delay,
-        "replaced": len(report.replaced),
-        "share": {k: float(v) for k, v in report.share.items()},
     }
 
 

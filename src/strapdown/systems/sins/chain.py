@@ -176,7 +176,7 @@ class Chain:
             next_try=np.inf,
             kept=GrowingRows.of(KEPT),
             aligned=None,
-            told={name: () for name in self._tables()},
+            told=dict.fromkeys(self._tables(), ()),
             commands=tuple(sorted(self.commands, key=lambda one: one.time)),
             holes=(),
             navigator=None,

@@ -309,6 +309,6 @@ class Going:
         self._state = replace(
             state,
             navigator=navigator,
-            told={name: () for name in state.told},
+            told=dict.fromkeys(state.told, ()),
             deliveries=chain.deliveries.started(state.deliveries, begun.time),
         )
