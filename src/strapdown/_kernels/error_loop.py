@@ -23,6 +23,8 @@ from strapdown._kernels.wander_level import wander_levels
 
 # Mechanizations.
 NED, WANDER = 0, 1
+# Forms of a covariance: the matrix, by two updates; its factors, by two.
+JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
 # What became of a call: all is done; a covariance is to be noted; the mechanization diverged; the
 # covariance is none.
 ALL, NOTE, DIVERGED, BAD = 0, 1, 2, 3
@@ -32,38 +34,31 @@ AT_COVARIANCE, AT_STEP = 0, 1
 BEYOND = 1.000001
 
 
+# A call hands over what belongs together:
+# - kinds: (mechanization, form, whether the height is held);
+# - model: (terms of gyros, terms of accelerometers, decay, drive, noise (2, 3), earth, options);
+# - states: (mechanization, covariance, sensors, times), which go on in place;
+# - group: (rows of the history, the first at its start; increments), of what is not closed yet;
+# - room: arrays to work in.
+
+
 @njit(cache=True, error_model="numpy")
-def close_group(
-    which,
-    factored,
-    held,
-    covariance,
-    sensors,
-    times,
-    count,
-    open_history,
-    open_rows,
-    gyro_terms,
-    accel_terms,
-    decay,
-    drive,
-    noise,
-    earth,
-    room,
-):
+def close_group(kinds, model, states, group, count, room):
     """Take the covariance over the steps of a group; return -1, or the first state gone bad.
 
-    `covariance` is padded (`growth.padded`), or the (n, n) factors; `noise` (2, 3) is of gyros and
-    accelerometers; `room` is a tuple of arrays to work in.
+    The covariance is padded (`growth.padded`), or holds the (n, n) factors.
     """
     if count == 0:
         return -1
+    which, form, held = kinds
+    gyro_terms, accel_terms, decay, drive, noise, earth, _ = model
+    _, covariance, sensors, times = states
+    open_history, open_rows = group
     f, phi, tail, q, work, matrix, level, after, whole, added = room
-    rows = open_rows[:count]
     q_at, up = Q_NB, -1.0
     if which == WANDER:
         q_at, up = Q_WB, 1.0
-    _, dt = means_of_steps(open_history, q_at, rows, 0, math.inf, matrix)
+    _, dt = means_of_steps(open_history, q_at, open_rows[:count], 0, math.inf, matrix)
     middle = count // 2
     if which == WANDER:
         wander_levels(open_history[middle : middle + 1], earth, level)
@@ -84,21 +79,17 @@ def close_group(
     )
     still = HELD_ROWS if held else 0
     growth_of_step(f, decay, dt, matrix, noise[0], noise[1], drive, still, phi, tail, q, work)
-    bad = -1
-    n = CORE + decay.shape[0]
-    if factored:
+    if form < UD:
+        bad = grown_covariance(covariance, phi, tail, q, after, work)
+    else:
+        n = CORE + decay.shape[0]
         for i in range(n):
             for j in range(n):
-                whole[i, j] = 0.0
+                whole[i, j] = phi[i, j] if i < CORE else 0.0
                 added[i, j] = q[i, j]
-            if i < CORE:
-                for j in range(n):
-                    whole[i, j] = phi[i, j]
-            else:
+            if i >= CORE:
                 whole[i, i] = tail[i - CORE]
         bad = udu_predict(covariance, whole, added, after)
-    else:
-        bad = grown_covariance(covariance, phi, tail, q, after, work)
     covariance[:, :] = after
     for j in range(tail.shape[0]):
         sensors[j] *= tail[j]
@@ -109,39 +100,17 @@ def close_group(
 
 
 @njit(cache=True, error_model="numpy")
-def over_steps(
-    which,
-    factored,
-    held,
-    step,
-    note_at,
-    state,
-    covariance,
-    sensors,
-    times,
-    count,
-    open_history,
-    open_rows,
-    time,
-    rows,
-    history,
-    gyro_terms,
-    accel_terms,
-    decay,
-    drive,
-    noise,
-    earth,
-    options,
-    errors,
-    heights,
-    room,
-):
+def over_steps(kinds, model, states, group, count, room, step, note_at, time, rows, history):
     """Go over steps; return what became of it, the steps made, and those of the open group.
 
     `time` are the ends of the steps, `rows` their increments; `history` takes a row after each.
-    A call ends before its steps where a group was closed at `note_at` or later. `errors` (2, 7, 3)
-    is room to work in; `heights` is empty.
+    A call ends before its steps where a group was closed at `note_at` or later. The last array of
+    `room` is of errors of readings, (2, 7, 3).
     """
+    gyro_terms, accel_terms, _, _, _, earth, options = model
+    state, _, sensors, times = states
+    open_history, open_rows = group
+    closing, errors, heights = room
     made = 0
     total = time.shape[0]
     while made < total:
@@ -154,24 +123,7 @@ def over_steps(
         ):
             end += 1
         if end == made:
-            bad = close_group(
-                which,
-                factored,
-                held,
-                covariance,
-                sensors,
-                times,
-                count,
-                open_history,
-                open_rows,
-                gyro_terms,
-                accel_terms,
-                decay,
-                drive,
-                noise,
-                earth,
-                room,
-            )
+            bad = close_group(kinds, model, states, group, count, closing)
             count = 0
             if bad >= 0:
                 return BAD, made, bad
@@ -181,31 +133,15 @@ def over_steps(
         errors_of_states(gyro_terms, sensors, errors[0])
         errors_of_states(accel_terms, sensors, errors[1])
         last = count + end - made
-        compensate(rows[made:end], errors[0], errors[1], open_rows[count:last])
-        if which == WANDER:
-            went, why = wander_advance(
-                state,
-                open_rows[count:last],
-                heights,
-                earth,
-                options,
-                open_history[count + 1 : last + 1],
-            )
+        new, into = open_rows[count:last], open_history[count + 1 : last + 1]
+        compensate(rows[made:end], errors[0], errors[1], new)
+        if kinds[0] == WANDER:
+            went, why = wander_advance(state, new, heights, earth, options, into)
         else:
-            went, why = ned_advance(
-                state,
-                open_rows[count:last],
-                heights,
-                earth,
-                options,
-                open_history[count + 1 : last + 1],
-            )
+            went, why = ned_advance(state, new, heights, earth, options, into)
         if why != 0:
             return DIVERGED, made + went, count
-        for i in range(made, end):
-            at = count + 1 + i - made
-            for j in range(history.shape[1]):
-                history[i, j] = open_history[at, j]
+        history[made:end] = into
         count = last
         made = end
         times[AT_STEP] = time[end - 1]

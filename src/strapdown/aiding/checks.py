@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 from strapdown.aiding.aid import Aid
+from strapdown.aiding.view import View
 from strapdown.exceptions import ConfigError
 from strapdown.tables.checks import is_number
 
-__all__ = ["check_number", "check_numbers"]
+__all__ = ["check_block", "check_number", "check_numbers", "check_other_name"]
 
 
 def check_number(
@@ -71,6 +72,46 @@ def check_numbers(aid: Aid, name: str, count: int, *, low: float = -math.inf) ->
             remedy=f"give {count} numbers in brackets",
         )
     object.__setattr__(aid, name, tuple(float(x) for x in given))
+
+
+def check_block(view: View, name: str) -> None:
+    """Refuse a block of states that the filter does not have.
+
+    Parameters
+    ----------
+    view : View
+    name : str
+
+    Raises
+    ------
+    ConfigError
+        It is not there; what is is named.
+    """
+    view.model.layout[name]
+
+
+def check_other_name(aid: Aid, name: str) -> None:
+    """Refuse an option that is no name of another aid; nothing is one.
+
+    Parameters
+    ----------
+    aid : Aid
+    name : str
+        Of the option.
+
+    Raises
+    ------
+    ConfigError
+        It is no text, or the aid's own name.
+    """
+    value = getattr(aid, name)
+    if not isinstance(value, str) or (value and value == aid.name):
+        raise ConfigError(
+            f"{value!r} is no name of another aid",
+            file=aid.name or None,
+            quantity=name,
+            remedy="name the aid that has the states, or leave it out",
+        )
 
 
 def _range(low: float, high: float, above: bool) -> str:

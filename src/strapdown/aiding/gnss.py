@@ -213,9 +213,16 @@ class Gnss(TableAid):
             lat, lon, alt = values[1:4].tolist()
             measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
             z += displacement_between(view.here, measured, view.ellipsoid)
-            return [Observation(f"{self.name}.position", z, H, values[4:7], PLACE)]
-        z -= values[1:4]
-        return [Observation(f"{self.name}.velocity", z, H, values[4:7], SPEED)]
+        else:
+            z -= values[1:4]
+        name, labels = self.names(values)
+        return [Observation(name, z, H, values[4:7], labels)]
+
+    def names(self, values: Array) -> tuple[str, tuple[str, ...]]:
+        """Return the name of the observation of an epoch, and the labels of its components."""
+        if values[0] == POSITION_CODE:
+            return f"{self.name}.position", PLACE
+        return f"{self.name}.velocity", SPEED
 
     @property
     def _arm(self) -> str:

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.interval_sums import MEMORY, interval_sums
 from strapdown.aiding.aid import Epochs, WatchingAid
-from strapdown.aiding.body_velocity import point_velocity
 from strapdown.aiding.checks import check_number, check_numbers
+from strapdown.aiding.point_velocity import point_velocity
 from strapdown.aiding.vehicle_axes import VehicleAxes
 from strapdown.aiding.view import View
 from strapdown.estimation.observation import Observation
@@ -21,6 +21,9 @@ from strapdown.estimation.sensor_states import SensorStates
 __all__ = ["NoSlip"]
 
 Array = NDArray[np.float64]
+
+# Place of the rotation about the vertical among the physical errors.
+HEADING = 8
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,8 @@ class NoSlip(WatchingAid):
     largest_rate_deg : float, deg/s
         While the vehicle turns faster about its vertical, as it does when it skids, nothing is
         observed.
+    largest_heading_sd_deg : float, deg
+        Nor while the heading is less known than so: a wrong one by so much has no linear errors.
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -77,6 +82,7 @@ class NoSlip(WatchingAid):
     correlation_time: float = 0.5
     interval: float = 0.5
     largest_rate_deg: float = 45.0
+    largest_heading_sd_deg: float = 20.0
 
     kind: ClassVar[str] = "no_slip"
     summary: ClassVar[str] = "wheels that do not slip: no lateral and vertical velocity"
@@ -87,7 +93,9 @@ class NoSlip(WatchingAid):
         check_numbers(self, "mounting_sd_deg", 2, low=0.0)
         for name in ("roll_deg", "pitch_deg", "yaw_deg"):
             check_number(self, name, low=-360.0, high=360.0)
-        for name in ("lateral_sd", "vertical_sd", "interval", "largest_rate_deg"):
+        for name in ("lateral_sd", "vertical_sd", "interval"):
+            check_number(self, name, low=0.0, above=True)
+        for name in ("largest_rate_deg", "largest_heading_sd_deg"):
             check_number(self, name, low=0.0, above=True)
         for name in ("slip", "dive", "correlation_time"):
             check_number(self, name, low=0.0)
@@ -95,7 +103,8 @@ class NoSlip(WatchingAid):
     @property
     def axes(self) -> VehicleAxes:
         """Axes of the vehicle."""
-        return VehicleAxes((self.roll_deg, self.pitch_deg, self.yaw_deg), self.mounting_sd_deg)
+        angles = (self.roll_deg, self.pitch_deg, self.yaw_deg)
+        return VehicleAxes(angles, (0.0, *self.mounting_sd_deg))
 
     def states(self) -> tuple[SensorStates, ...]:
         """Return the states of the mounting, if it has a standard deviation."""
@@ -113,7 +122,11 @@ class NoSlip(WatchingAid):
         return memory, Epochs(time[at[:count]], means[:count])
 
     def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return the lateral and the vertical velocity, unless the vehicle turns too fast."""
+        """Return the lateral and the vertical velocity, or nothing, as the limits say."""
+        # About the third level axis, which is vertical.
+        heading_sd = math.sqrt(view.covariance[HEADING, HEADING])
+        if heading_sd > math.radians(self.largest_heading_sd_deg):
+            return []
         axes = self.axes
         velocity, H = point_velocity(view, self.lever_arm)
         velocity, H = axes.of_vehicle(view, self.name, velocity, H)

@@ -1,4 +1,4 @@
-"""How the inertial sensors stand in their vehicle: assumed, and what may be wrong with it."""
+"""How the inertial sensors stand in a vehicle or an instrument: assumed, and what may be wrong."""
 
 from __future__ import annotations
 
@@ -17,10 +17,12 @@ __all__ = ["VehicleAxes"]
 
 Array = NDArray[np.float64]
 
+ANGLES = ("roll", "pitch", "yaw")
+
 
 @dataclass(frozen=True)
 class VehicleAxes:
-    """Axes of a vehicle, forward, right, down, in which its wheels roll.
+    """Axes of a vehicle, forward, right, down, in which its wheels roll; or of an instrument.
 
     Attributes
     ----------
@@ -29,19 +31,25 @@ class VehicleAxes:
         with a level vehicle that drives north they are roll, pitch and heading of the sensors.
         ``C_vb`` turns the axes of the sensors into those of the vehicle.
     sd_deg : tuple of float, deg
-        Of pitch and of yaw; a roll about the direction of travel is not seen by a velocity along
-        it. Zero both: known, without states.
+        Of roll, pitch and yaw, about the axes of the vehicle; an angle with none is known, and no
+        state. A turn about the direction of travel is not seen by a velocity along it.
     """
 
     angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    sd_deg: tuple[float, float] = (0.0, 0.0)
+    sd_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def states(self, name: str) -> tuple[SensorStates, ...]:
-        """Return the states, if any: assumed pitch and yaw less true, rad."""
-        if not any(self.sd_deg):
+        """Return the states, if any, of an aid: assumed angles less true, rad."""
+        labels = [label for label, sd in zip(ANGLES, self.sd_deg, strict=True) if sd > 0.0]
+        if not labels:
             return ()
-        sd = [math.radians(x) for x in self.sd_deg]
-        return (unseen(f"{name}.mounting", ("pitch", "yaw"), "rad", sd),)
+        sds = [math.radians(sd) for sd in self.sd_deg if sd > 0.0]
+        return (unseen(f"{name}.mounting", labels, "rad", sds),)
+
+    def now(self, view: View, name: str) -> Array:
+        """Return ``C_vb``, (3, 3), without what is estimated of its errors."""
+        # What is estimated comes off the roll, then the pitch, then the yaw.
+        return self._back(view, name)[0] @ rotation.dcm_from_euler(self.angles_deg)
 
     def of_vehicle(self, view: View, name: str, velocity: Array, H: Array) -> tuple[Array, Array]:
         """Turn a velocity in body axes, and what errors do to it, into axes of the vehicle.
@@ -50,7 +58,7 @@ class VehicleAxes:
         ----------
         view : View
         name : str
-            Of the aid.
+            Of the aid that has the states: ``NAME.mounting``.
         velocity : ndarray, (3,)
         H : ndarray, (3, columns)
 
@@ -59,20 +67,23 @@ class VehicleAxes:
         velocity : ndarray, (3,)
         H : ndarray, (3, columns)
         """
-        C_vb = self.now(view, name)
+        back, axes, labels = self._back(view, name)
+        C_vb = back @ rotation.dcm_from_euler(self.angles_deg)
         out, H = C_vb @ velocity, C_vb @ H
-        if any(self.sd_deg):
+        if labels:
             at = view.place(f"{name}.mounting")
-            yaw = float(view.estimate(f"{name}.mounting")[1])
-            of_pitch = [math.sin(yaw), math.cos(yaw), 0.0]
-            H[:, at] = np.column_stack([np.cross(of_pitch, out), np.cross([0.0, 0.0, 1.0], out)])
+            H[:, at] = np.column_stack([np.cross(axes[ANGLES.index(x)], out) for x in labels])
         return out, H
 
-    def now(self, view: View, name: str) -> Array:
-        """Return ``C_vb``, (3, 3), without what is estimated of its errors."""
-        C_vb = rotation.dcm_from_euler(self.angles_deg)
-        if not any(self.sd_deg):
-            return C_vb
-        # What is estimated comes off the pitch first, then off the yaw, as 3-2-1 angles turn.
-        pitch, yaw = np.degrees(view.estimate(f"{name}.mounting")).tolist()
-        return rotation.dcm_from_euler([0.0, -pitch, -yaw]) @ C_vb
+    def _back(self, view: View, name: str) -> tuple[Array, Array, tuple[str, ...]]:
+        """What takes the estimates off, the axes about which the angles then turn, their names."""
+        if not view.has(f"{name}.mounting"):
+            return np.eye(3), np.eye(3), ()
+        labels = view.labels(f"{name}.mounting")
+        found = dict(zip(labels, view.estimate(f"{name}.mounting").tolist(), strict=True))
+        roll, pitch, yaw = (math.degrees(found.get(label, 0.0)) for label in ANGLES)
+        back = rotation.dcm_from_euler([-roll, -pitch, -yaw])
+        axes = np.eye(3)
+        axes[0] = rotation.dcm_from_euler([0.0, -pitch, -yaw])[:, 0]
+        axes[1] = rotation.dcm_from_euler([0.0, 0.0, -yaw])[:, 1]
+        return back, axes, labels

@@ -19,6 +19,9 @@ __all__ = ["LARGEST_GROUP", "Engine", "EngineState", "GeneralEngine"]
 
 Array = NDArray[np.float64]
 
+#: An epoch so near to the end of a step is at it, s: stamps are decimal fractions that were
+#: rounded.
+SAME_INSTANT = 1e-7
 #: Most steps between two instants of the covariance.
 LARGEST_GROUP = 1024
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.split_increment import split_increment
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
+from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.adaptive_rule import AdaptiveRule, Scales
 from strapdown.estimation.covariance import Innovations
@@ -21,17 +22,14 @@ from strapdown.estimation.observation import Observation
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
-from strapdown.navigation.compiled_engine import CompiledEngine, compiled
+from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
 from strapdown.navigation.damping import Damping, Feedback
-from strapdown.navigation.engine import Engine, EngineState, GeneralEngine, begun
+from strapdown.navigation.engine import SAME_INSTANT, Engine, EngineState, GeneralEngine, begun
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 
 __all__ = ["Navigator", "NavigatorState", "with_states"]
 
 Array = NDArray[np.float64]
-
-# An epoch so near to the end of a step is at it, s: stamps are decimal fractions that were rounded.
-SAME_INSTANT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +102,15 @@ class Navigator:
                     quantity="aiding",
                     remedy="give each a name of its own",
                 )
+
+    @cached_property
+    def lone_receiver(self) -> Gnss | None:
+        """The only aid, where it is a receiver whose errors are noise, believed as it says."""
+        if len(self.aids) != 1 or type(self.aids[0]) is not Gnss:
+            return None
+        aid = self.aids[0]
+        plain = aid.rule is None and self.filter.rule is None and not aid.states()
+        return aid if plain and (not aid.use_velocity or not any(aid.lever_arm)) else None
 
     @cached_property
     def by_name(self) -> dict[str, Aid]:
@@ -225,7 +232,7 @@ class _Going:
         self._drop_late()
         rows = rows.copy()
         self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
-        at = 0
+        at = self._fixes(time, rows)
         while True:
             epoch = self._next_epoch()
             if epoch <= self.engine.time + SAME_INSTANT:
@@ -246,6 +253,42 @@ class _Going:
                 rows[told] = second
             else:
                 at = self._steps(at, min(told + 1, len(time)), time, rows)
+
+    def _fixes(self, time: Array, rows: Array) -> int:
+        """Go as far as the fixes of a lone receiver reach; return the steps made."""
+        aid, engine = self.navigator.lone_receiver, self.engine
+        if aid is None or not isinstance(engine, CompiledEngine):
+            return 0
+        made = 0
+        arm = np.asarray(aid.lever_arm, dtype=np.float64)
+        interval = self.navigator.mark_interval * (1.0 - 1e-9)
+        queue = self.queues[aid.name]
+        while queue.time.size and made < len(time):
+            went, fixed, stopped = engine.over_fixes(
+                time[made:],
+                rows[made:],
+                self.history[made:],
+                self.marked + interval,
+                interval,
+                arm,
+                queue,
+            )
+            made += went
+            done = len(fixed.told)
+            self._fixed(aid, queue, fixed)
+            queue = Epochs(queue.time[done:], queue.values[done:])
+            if stopped:
+                self._mark()
+        self.queues[aid.name] = queue
+        return made
+
+    def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
+        """Note what came of fixes."""
+        for i in range(len(fixed.told)):
+            at = float(fixes.time[i])
+            name, labels = aid.names(fixes.values[i])
+            self.seen.append(Seen(at, name, labels, Innovations(*fixed.told[i])))
+            self._add_mark(Mark(at, fixed.covariance[i], fixed.sensors[i], fixed.sensors_sd[i]))
 
     def state(self) -> NavigatorState:
         """Where it is now."""
@@ -297,6 +340,7 @@ class _Going:
             sensors=engine.filter.sensors,
             rate=last[1:4] / last[0],
             force=last[4:7] / last[0],
+            covariance_of=partial(filter_.physical_covariance, engine.filter),
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
@@ -342,10 +386,13 @@ class _Going:
             self.engine.estimates(filter_),
             np.sqrt(np.diagonal(P)[9:]),
         )
-        if self.marks and self.marks[-1].time == state.time:
+        self._add_mark(mark)
+
+    def _add_mark(self, mark: Mark) -> None:
+        if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:
             self.marks.pop()
         self.marks.append(mark)
-        self.marked = state.time
+        self.marked = mark.time
 
 
 def with_states(filter_: ErrorFilter, aids: tuple[Aid, ...]) -> ErrorFilter:

@@ -7,8 +7,14 @@ from typing import Any
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
+from strapdown.report.document_data import draw_stills
+from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document_html import document_page
+from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_files import write_navigation_files
+from strapdown.report.navigation_found import examine
 from strapdown.report.navigation_json import navigation_json
+from strapdown.report.navigation_result import told_of
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.result import NavigationResult
@@ -107,11 +113,14 @@ def write_navigation(
         seals=seals,
     ) as folder:
         progress("writing the tables", 0.82)
-        _write(folder / "navigation.json", to_json(navigation_json(result)))
+        found = examine(told_of(result))
+        write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
         write_navigation_files(result, folder)
+        progress("drawing the figures", 0.86)
+        document = navigation_document(found.told, name, found)
+        stills = draw_stills(document)
+        write_drawings(document, stills, folder / "figures")
+        progress("writing the page", 0.95)
+        write_text(folder / "report.html", document_page(document, stills=stills))
         progress("sealing", 0.97)
     return seals[0]
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

@@ -7,10 +7,18 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.exceptions import Finding
+from strapdown.report.navigation_agreement import Agreement
+from strapdown.report.navigation_conventions import CONVENTIONS
+from strapdown.report.navigation_errors import Score
+from strapdown.report.navigation_found import NavigationFound, examine
+from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_trust import trust
+from strapdown.report.navigation_values import distance_over_ground, plane_bound
+from strapdown.report.navigation_words import cautions, headline, longest_outages
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
@@ -27,15 +35,19 @@ MODULES = (
     "aiding",
 )
 
-POSITION_SD = [f"{name}_sd" for name in NED]
+Array = NDArray[np.float64]
 
 
-def navigation_json(result: NavigationResult) -> dict[str, Any]:
+def navigation_json(
+    result: NavigationResult, found: NavigationFound | None = None
+) -> dict[str, Any]:
     """Return everything that a program would ask of a run of navigation.
 
     Parameters
     ----------
     result : NavigationResult
+    found : NavigationFound, optional
+        Of `examine`, where it was worked out already.
 
     Returns
     -------
@@ -44,7 +56,17 @@ def navigation_json(result: NavigationResult) -> dict[str, Any]:
     """
     record, source = result.record, result.source
     time = record.trajectory.index
+    found = examine(told_of(result)) if found is None else found
+    verdict = trust(found)
     return {
+        "conventions": {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS},
+        "answer": _plain(headline(found)),
+        "trust": {
+            "verdict": verdict.verdict,
+            "for": [_plain(why) for good, why in verdict.reasons if good],
+            "against": [_plain(why) for good, why in verdict.reasons if not good],
+        },
+        "cautions": [_plain(f"{head}: {text}") for head, text in cautions(found)],
         "record": {
             "name": source.name,
             "what": source.what,
@@ -58,14 +80,14 @@ def navigation_json(result: NavigationResult) -> dict[str, Any]:
             "rows": len(time),
             "from_s": float(time[0]),
             "to_s": float(time[-1]),
-            "travelled_m": _travelled(record.trajectory),
+            "travelled_m": distance_over_ground(record.trajectory),
         },
         "alignment": {
             "coarse": _alignment(result.coarse),
             "fine": None if result.fine is None else _alignment(result.fine.alignment),
         },
-        "start": _state(record.trajectory, record.sd, 0),
-        "end": _state(record.trajectory, record.sd, -1),
+        "start": _state(found, 0),
+        "end": _state(found, -1),
         "sensors": {
             str(name): {
                 "unit": record.units.get(str(name), ""),
@@ -74,31 +96,30 @@ def navigation_json(result: NavigationResult) -> dict[str, Any]:
             }
             for name in record.sensors.columns
         },
-        "aids": {name: _innovations(table) for name, table in record.innovations.items()},
-        "outages": {
-            name: [{"from_s": s.begin, "to_s": s.end} for s in spans]
-            for name, spans in record.outages.items()
-        },
+        "observations": {one.name: _innovations(one) for one in found.agreements},
+        "outages": [
+            {
+                "aid": aid,
+                "from_s": span.begin,
+                "to_s": span.end,
+                "largest_horizontal_bound_95_m": _number(bound),
+            }
+            for aid, span, bound in longest_outages(found)
+        ],
+        "withheld": [
+            {
+                "aid": w.aid,
+                "from_s": w.begin,
+                "to_s": w.end,
+                "largest_horizontal_error_m": _number(w.error_m),
+                "bound_95_m": _number(w.bound_m),
+                "inside": w.inside,
+            }
+            for w in found.told.withheld
+        ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [{"time_s": e.time, "kind": e.kind, "what": e.what} for e in record.events],
-        "against": None
-        if result.errors is None
-        else {
-            "name": source.truth_name,
-            "from_s": result.errors.start,
-            "to_s": result.errors.end,
-            "instants": result.errors.samples,
-            "errors": {
-                e.quantity: {
-                    "unit": e.unit,
-                    "rms": _number(e.rms),
-                    "largest": _number(e.largest),
-                    "largest_at_s": _number(e.largest_at),
-                    "final": _number(e.final),
-                }
-                for e in result.errors.errors
-            },
-        },
+        "against": _against(found),
         "method": _method(result),
         "findings": [_finding(f) for f in result.findings],
     }
@@ -117,24 +138,46 @@ def _method(result: NavigationResult) -> dict[str, Any]:
     return chosen
 
 
-def _travelled(trajectory: pd.DataFrame) -> float:
-    """Way over the ground, by the velocity, m."""
-    speed = np.hypot(trajectory["VN"].to_numpy(), trajectory["VE"].to_numpy())
-    time = trajectory.index.to_numpy(dtype=np.float64)
-    return float(np.trapezoid(speed, time))
+def _against(found: NavigationFound) -> dict[str, Any] | None:
+    """Errors beside the truth, at the samples that follow the marks of the covariance."""
+    errors = found.errors
+    if errors is None:
+        return None
+    return {
+        "name": found.told.truth_name,
+        "instants": len(errors.time),
+        "from_s": float(errors.time[0]),
+        "to_s": float(errors.time[-1]),
+        "mean_nees": _number(errors.nees.mean()),
+        "nees_of": int(errors.freedom.max()),
+        "errors": {score.quantity: _score(score) for score in errors.scores},
+    }
 
 
-def _state(trajectory: pd.DataFrame, sd: pd.DataFrame, row: int) -> dict[str, Any]:
+def _score(score: Score) -> dict[str, Any]:
+    unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
+    return {
+        f"rms_{unit}": _number(score.rms),
+        f"largest_{unit}": _number(score.largest),
+        "largest_at_s": score.largest_at,
+        f"bound_95_rms_{unit}": _number(score.bound),
+        "share_within_bound": score.share,
+    }
+
+
+def _state(found: NavigationFound, row: int) -> dict[str, Any]:
     """Place, velocity and attitude with the standard deviations of the nearest mark."""
-    at, how = trajectory.iloc[row], sd.iloc[row]
+    record = found.record
+    at, how = record.trajectory.iloc[row], record.sd.iloc[row]
     units = dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
     units |= {"lat": "deg", "lon": "deg", "alt": "m"} | dict.fromkeys(NED, "m")
     names = [*GEODETIC, *VELOCITY, *EULER]
     return {
-        "time_s": float(trajectory.index[row]),
+        "time_s": float(record.trajectory.index[row]),
         **{f"{n}_{units[n]}": _number(at[n]) for n in names},
-        "sd_at_s": float(sd.index[row]),
+        "sd_at_s": float(record.sd.index[row]),
         **{f"{n}_sd_{units[n]}": _number(how[n]) for n in [*NED, *VELOCITY, *EULER]},
+        "horizontal_bound_95_m": _number(plane_bound(record)[row]),
     }
 
 
@@ -150,24 +193,28 @@ def _alignment(one: Alignment | None) -> dict[str, Any] | None:
     }
 
 
-def _innovations(table: pd.DataFrame) -> dict[str, Any]:
+def _innovations(one: Agreement) -> dict[str, Any]:
     """How often an aid was taken, and how its innovations lie to what was expected of them."""
-    labels = [str(c)[3:] for c in table.columns if str(c).startswith("nu ")]
-    nu, s, weight = (
-        table[[f"{part} {label}" for label in labels]].to_numpy(dtype=np.float64)
-        for part in ("nu", "s", "weight")
-    )
-    used = (weight > 0.0).all(axis=1)
-    nis = np.square(nu) / s
     return {
-        "epochs": len(table),
-        "rejected": int((~used).sum()),
-        "mean_nis_per_component": _number(nis[used].mean() if used.any() else math.nan),
-        "rms": {
-            label: _number(math.sqrt(np.square(nu[used, k]).mean()) if used.any() else math.nan)
-            for k, label in enumerate(labels)
-        },
+        "components": list(one.labels),
+        "epochs": one.epochs,
+        "rejected": one.rejected,
+        "weakened": one.weakened,
+        "rms_in_sd": _number(one.ratio),
+        "mean_nis": _number(one.mean_nis),
+        "mean_nis_expected_95": [_number(x) for x in one.band],
+        "correlation_next_epoch": _number(one.correlation),
+        "correlation_by_chance_95": _number(one.correlation_bound),
+        "rms": {label: _number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)},
     }
+
+
+def _rms(values: Array) -> float:
+    return math.sqrt(float(np.square(values).mean())) if values.size else math.nan
+
+
+def _plain(text: str) -> str:
+    return text.replace("\u00a0", " ")
 
 
 def _number(value: Any) -> float | None:

@@ -1,4 +1,4 @@
-"""A pre-filter within a chain: real stamps around its even grid, lost samples filled along lines."""
+"""A pre-filter within a chain: real stamps on its even grid, lost samples along lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From samples as sensors give them to steps of a navigator: axes, holes, pre-filter, increments."""
+"""From samples of sensors to steps of a navigator: axes, holes, pre-filter, increments."""
 
 from __future__ import annotations
 
