@@ -31,6 +31,7 @@ __all__ = [
     "AidSpec",
     "CoarseModeSpec",
     "CommandTable",
+    "DampingSpec",
     "FilterSpec",
     "FineModeSpec",
     "GapsTable",
@@ -41,6 +42,7 @@ __all__ = [
     "NavigationSiteTable",
     "NavigationSpec",
     "ReceiverTable",
+    "RecorderSpec",
     "StartTable",
     "TruthTable",
     "aids_of",
@@ -169,6 +171,18 @@ class FilterSpec(ChoiceSpec):
     kind: str = "error_state"
 
 
+class DampingSpec(ChoiceSpec):
+    """What becomes of the estimated errors."""
+
+    kind: str = "feedback"
+
+
+class RecorderSpec(ChoiceSpec):
+    """What of the run is kept."""
+
+    kind: str = "interval"
+
+
 class AidSpec(ChoiceSpec):
     """What tells more than the inertial sensors do, under a name of the user's."""
 
@@ -183,11 +197,8 @@ class TruthTable(TableSpec):
 
 
 class NavigationOutputTable(TableSpec):
-    """What is written."""
+    """What is written beside the report."""
 
-    #: Of the trajectory; every sample, if `full_rate` is true.
-    rate_hz: Positive = 10.0
-    full_rate: StrictBool = False
     #: Forms of the trajectory.
     files: tuple[Word, ...] = ("csv", "kml", "geojson")
 
@@ -213,6 +224,8 @@ class NavigationSpec(TableSpec):
     gaps: GapsTable = GapsTable()
     mechanization: MechanizationSpec = MechanizationSpec()
     filter: FilterSpec = FilterSpec()
+    damping: DampingSpec = DampingSpec()
+    recorder: RecorderSpec = RecorderSpec()
     aiding: TableSpec = TableSpec()
     truth: TruthTable | None = None
     output: NavigationOutputTable = NavigationOutputTable()

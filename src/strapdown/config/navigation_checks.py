@@ -23,6 +23,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.stated_states import stated_states
 from strapdown.exceptions import ConfigError
+from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
 from strapdown.sensors.catalogue import load_sensor
@@ -33,7 +34,9 @@ __all__ = ["TRAJECTORY_FILES", "check_navigation", "given_of", "make_aids", "mak
 
 WITHOUT = "without that no position has a bound, and no aid a weight"
 #: Forms of a trajectory that a run can write.
-TRAJECTORY_FILES = ("csv", "parquet", "kml", "geojson", "tum")
+TRAJECTORY_FILES = tuple(TRAJECTORY_WRITERS)
+#: Stages that are modules.
+STAGES = ("prefilter", "coarse", "fine", "mechanization", "filter", "damping", "recorder")
 #: Keys that end an alignment.
 ENDS = ("duration_s", "until_heading_sd_deg", "until_tilt_sd_deg", "window_s")
 #: Aids that observe a height.
@@ -74,7 +77,7 @@ class _Checks(SourceChecks):
         yield partial(self.sensors, spec.sensors, spec.simulation, WITHOUT)
         yield partial(self.times, spec)
         yield partial(self.begins, spec)
-        for name in ("prefilter", "coarse", "fine", "mechanization", "filter"):
+        for name in STAGES:
             yield partial(self.stage, spec, name)
         yield partial(self.modes, spec)
         yield partial(self.alignment, spec)

@@ -20,12 +20,14 @@ from strapdown.config.motions import KINDS, MANOEUVRES
 from strapdown.config.navigation import (
     AidSpec,
     CoarseModeSpec,
+    DampingSpec,
     FilterSpec,
     FineModeSpec,
     MechanizationSpec,
     NavigationSimulationTable,
     NavigationSpec,
     ReceiverTable,
+    RecorderSpec,
 )
 from strapdown.config.navigation_checks import check_navigation
 from strapdown.config.navigation_wanted import what_navigation_wants, write_of_navigation
@@ -47,6 +49,8 @@ NAVIGATION_STAGES: dict[str, tuple[type[ChoiceSpec], str, bool]] = {
     "fine": (FineModeSpec, "filter", True),
     "mechanization": (MechanizationSpec, "ned", False),
     "filter": (FilterSpec, "error_state", False),
+    "damping": (DampingSpec, "feedback", False),
+    "recorder": (RecorderSpec, "interval", False),
 }
 #: Of a start that is known nothing is aligned.
 ALIGNMENTS = ("coarse", "fine")

@@ -21,7 +21,9 @@ from strapdown.estimation.influences import INFLUENCES
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.update_rules import UPDATE_RULES
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.navigation.damping import DAMPINGS, Damping
 from strapdown.navigation.filter_options import FilterOptions
+from strapdown.navigation.recorder import RECORDERS, Recorder
 from strapdown.prefilter import PREFILTERS, Prefilter
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
@@ -63,6 +65,8 @@ SLOTS: dict[str, Slot] = {
     "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
     "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
     "aiding": Slot("aiding", "Aids", Aid, AIDS),
+    "damping": Slot("damping", "Dampings", Damping, DAMPINGS),
+    "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),
 }
 
 #: Fields that a chain fills by itself, and no person writes.

@@ -10,10 +10,9 @@ import pandas as pd
 
 from strapdown.formats import csv
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
-from strapdown.formats.trajectory_parquet import write_parquet
 from strapdown.formats.trajectory_writers import write_trajectory
 from strapdown.systems.sins.result import NavigationResult
-from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
+from strapdown.tables import EULER, NED, VELOCITY
 
 __all__ = ["write_navigation_files"]
 
@@ -35,24 +34,15 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
         ``trajectory.*`` in the forms that are asked for, ``sd.csv``, ``sensor_errors.csv``,
         ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` where the truth is known.
     """
-    record, out = result.record, result.spec.output
-    rate = None if out.full_rate else out.rate_hz
-    trajectory = thinned(record.trajectory, rate)
-    trajectory.attrs = dict(record.trajectory.attrs)
+    record = result.record
     options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
     told = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
-    for form in out.files:
+    for form in result.spec.output.files:
         path = folder / f"trajectory.{form}"
-        if form == "parquet":
-            named = {"time_s": trajectory.index.to_numpy(dtype=np.float64)}
-            for name in (*GEODETIC, *VELOCITY, *EULER):
-                named[f"{name}_{UNITS[name]}"] = trajectory[name].to_numpy(dtype=np.float64)
-            write_parquet(path, named, told)
-        else:
-            write_trajectory(path, trajectory, name=result.source.name, options=options)
+        write_trajectory(path, record.trajectory, name=result.source.name, options=options)
     sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
-    _write(folder / "sd.csv", thinned(sd, rate), told)
-    _write(folder / "sensor_errors.csv", thinned(_sensors(result), rate), told)
+    _write(folder / "sd.csv", sd, told)
+    _write(folder / "sensor_errors.csv", _sensors(result), told)
     if record.innovations:
         (folder / "innovations").mkdir()
         for name, table in record.innovations.items():
@@ -73,19 +63,7 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
             columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
         )
         against = {**told, "against": result.source.truth_name, "sign": "computed less truth"}
-        _write(folder / "errors.csv", thinned(errors, rate), against)
-
-
-def thinned(table: pd.DataFrame, rate: float | None) -> pd.DataFrame:
-    """The first row of each cell of ``1 / rate`` s, and the last row of all."""
-    if rate is None or len(table) < 2:
-        return table
-    time = table.index.to_numpy(dtype=np.float64)
-    cell = np.floor((time - time[0]) * rate + 1e-6)
-    kept = np.concatenate([[True], np.diff(cell) > 0])
-    kept[-1] = True
-    out: pd.DataFrame = table[kept]
-    return out
+        _write(folder / "errors.csv", errors, against)
 
 
 def _sensors(result: NavigationResult) -> pd.DataFrame:

@@ -24,6 +24,17 @@ from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json"]
 
+MODULES = (
+    "prefilter",
+    "coarse",
+    "fine",
+    "mechanization",
+    "filter",
+    "damping",
+    "recorder",
+    "aiding",
+)
+
 Array = NDArray[np.float64]
 
 
@@ -109,7 +120,6 @@ def navigation_json(
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [{"time_s": e.time, "kind": e.kind, "what": e.what} for e in record.events],
         "against": _against(found),
-        "prefilter": _prefilter(result),
         "method": _method(result),
         "findings": [_finding(f) for f in result.findings],
     }
@@ -119,7 +129,7 @@ def _method(result: NavigationResult) -> dict[str, Any]:
     """The modules and their options; where files stand is no part of it."""
     chosen: dict[str, Any] = result.spec.model_dump(
         mode="json",
-        include={"prefilter", "coarse", "fine", "mechanization", "filter", "aiding"},
+        include=set(MODULES),
         exclude_none=True,
         serialize_as_any=True,
     )
@@ -209,18 +219,6 @@ def _rms(values: Array) -> float:
 
 def _plain(text: str) -> str:
     return text.replace("\u00a0", " ")
-
-
-def _prefilter(result: NavigationResult) -> dict[str, Any] | None:
-    report = result.prefilter
-    if report is None:
-        return None
-    return {
-        "name": report.name,
-        "delay_s": report.delay,
-        "replaced": len(report.replaced),
-        "share": {k: float(v) for k, v in report.share.items()},
-    }
 
 
 def _number(value: Any) -> float | None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import pandas as pd
 
@@ -13,9 +12,7 @@ from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import Ellipsoid
 from strapdown.evaluation.trajectory_summary import DifferenceSummary
 from strapdown.exceptions import Finding
-from strapdown.nav_state import NavState
 from strapdown.navigation.record import NavigationRecord
-from strapdown.prefilter import PrefilterReport
 from strapdown.results import InputFiles
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.source import NavigationSource
@@ -34,11 +31,8 @@ class NavigationResult:
     source : NavigationSource
     ellipsoid : Ellipsoid
     sensors : ImuUncertainty
-    prefilter : PrefilterReport or None
     coarse : Alignment or None
     fine : FineResult or None
-    start : NavState
-        Where navigation began.
     record : NavigationRecord
     differences : DataFrame or None
         From the truth, where it is known (`trajectory_differences`).
@@ -52,13 +46,10 @@ class NavigationResult:
     source: NavigationSource
     ellipsoid: Ellipsoid
     sensors: ImuUncertainty
-    prefilter: PrefilterReport | None
     coarse: Alignment | None
     fine: FineResult | None
-    start: NavState
     record: NavigationRecord
     differences: pd.DataFrame | None
     errors: DifferenceSummary | None
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
-    counts: Mapping[str, int] = field(default_factory=dict)
