@@ -136,7 +136,7 @@ class Navigator:
         """Return the state at a state of the filter, as where an alignment ended."""
         nothing = Epochs(np.empty(0), np.empty((0, 0)))
         return NavigatorState(
-            engine=begun(self.filter, state),
+            engine=begun(self.filter, state, self.damping.feeds_back),
             queues={aid.name: nothing for aid in self.aids},
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
