@@ -131,6 +131,11 @@ class Option:
     takes_class: bool = False
     group: type | None = None
 
+    @property
+    def has_default(self) -> bool:
+        """Whether it may be left out."""
+        return self.default is not MISSING
+
 
 def options_of(module: type) -> tuple[Option, ...]:
     """Options of a module, from the fields of its dataclass.

@@ -13,6 +13,7 @@ import pandas as pd
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import Finding
+from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.results import InputFiles, Reading
