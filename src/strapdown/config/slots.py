@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from strapdown.aiding.aid import Aid
+from strapdown.aiding.aids import AIDS
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
@@ -19,6 +21,9 @@ from strapdown.estimation.influences import INFLUENCES
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.update_rules import UPDATE_RULES
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.navigation.damping import DAMPINGS, Damping
+from strapdown.navigation.filter_options import FilterOptions
+from strapdown.navigation.recorder import RECORDERS, Recorder
 from strapdown.prefilter import PREFILTERS, Prefilter
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
@@ -47,20 +52,25 @@ class Slot:
 
 
 FINE_ALIGNMENTS: dict[str, type[FineAlignment]] = {"filter": FineAlignment}
+FILTERS: dict[str, type[FilterOptions]] = {"error_state": FilterOptions}
 
 SLOTS: dict[str, Slot] = {
     "prefilter": Slot("prefilter", "Pre-filters", Prefilter, PREFILTERS),
     "coarse": Slot("coarse", "Coarse alignments", CoarseAlignment, COARSE_ALIGNMENTS),
     "fine": Slot("fine", "Fine alignments", FineAlignment, FINE_ALIGNMENTS),
     "mechanization": Slot("mechanization", "Mechanizations", Mechanization, MECHANIZATIONS),
+    "filter": Slot("filter", "Filters", FilterOptions, FILTERS),
     "error_model": Slot("error_model", "Error models", ErrorModel, ERROR_MODELS),
     "covariance": Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
     "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
     "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
+    "aiding": Slot("aiding", "Aids", Aid, AIDS),
+    "damping": Slot("damping", "Dampings", Damping, DAMPINGS),
+    "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),
 }
 
 #: Fields that a chain fills by itself, and no person writes.
-GIVEN = ("ellipsoid", "gyro_noise", "accel_noise")
+GIVEN = ("ellipsoid", "gyro_noise", "accel_noise", "name")
 _PLAIN = (float, int, bool, str)
 #: Units of options whose names do not have them, as the endings of keys; another module's option
 #: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
@@ -73,6 +83,7 @@ UNITS = {
     "interval": "s",
     "largest_speed": "m_per_s",
     "least_speed": "m_per_s",
+    "lever_arm": "m",
     "rate": "hz",
 }
 
