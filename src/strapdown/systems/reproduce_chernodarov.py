@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from strapdown.estimation.quaternion_model import QuaternionModel
+from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.systems.chernodarov import (
     damping,
     drifts,
@@ -208,6 +209,7 @@ def _drive(drive: Drive) -> Part:
     damped, undamped = (drive.navigate(None, None, damped=which) for which in (True, False))
     clean = made.of(robustness.COARSE, "clean", "plain")
     used = drive.aligned(QuaternionModel).filter.mechanization
+    assert isinstance(used, WanderAzimuth)
     north = drive.truth["VN"].to_numpy(dtype=np.float64)
     levels = used.levels(clean.history)
     return (

@@ -141,7 +141,7 @@ def predicted_at(kept: Kept, kind: str, quantity: str) -> Array:
 
 def table(many: Units) -> Table:
     """Return what was measured beside what the covariance says."""
-    rows = []
+    rows: list[tuple[str, tuple[float | None, ...]]] = []
     for name, kept in (("still", many.still), ("turned", many.turned)):
         for quantity, label in QUANTITIES.items():
             for which in ("damped", "undamped"):
@@ -150,13 +150,10 @@ def table(many: Units) -> Table:
                 expected = predicted_at(kept, which, quantity)
                 values = [v for pair in zip(measured, expected, strict=True) for v in pair]
                 rows.append((f"{name}, {word}, {label}", tuple(float(v) for v in values)))
-            lone = predicted_at(kept, "independent", quantity)
-            rows.append(
-                (
-                    f"{name}, without correlations, {label}",
-                    tuple(v for x in lone for v in (None, float(x))),
-                )
-            )
+            lone: list[float | None] = []
+            for value in predicted_at(kept, "independent", quantity).tolist():
+                lone += [None, value]
+            rows.append((f"{name}, without correlations, {label}", tuple(lone)))
     columns = [f"{t:g} s, {w}" for t in TIMES for w in ("measured", "predicted")]
     return Table(
         "damping",

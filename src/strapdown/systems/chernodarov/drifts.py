@@ -62,6 +62,8 @@ def learnt(fine: FineResult) -> Learnt:
         turn[at : at + 3, at : at + 3] = C
     P = turn @ P @ turn.T
     sd = np.sqrt(np.diagonal(P))
+    # The error model has no height: its error has no standard deviation.
+    sd[sd == 0.0] = 1.0
     R = P / np.outer(sd, sd)
     before = np.sqrt(np.square(C) @ np.square(fine.filter.model.stacked.sd.reshape(2, 3)).T)
     drift, bias = slice(PHYSICAL, PHYSICAL + 3), slice(PHYSICAL + 3, PHYSICAL + 6)

@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 #: Estimates taken off; left on; taken off, and errors taken as independent of each other.
 KINDS = ("damped", "undamped", "independent")
 EVERY = 10.0  # s
+# Attitude and force by their means, s: the table turns by a few degrees in it at most.
+STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +110,7 @@ def predict(fine: FineResult, increments: pd.DataFrame, kind: str) -> Predicted:
     whole[: len(P), : len(P)] = P
     more = slice(len(P), None)
     whole[more, more] = np.diag(np.square(model.stacked.sd[len(P) - PHYSICAL :]))
-    used = ErrorFilter(wander("held"), model, COVARIANCES["joseph"]())
+    used = ErrorFilter(wander("held"), model, COVARIANCES["joseph"](), step=STEP)
     start = fine.filter.mechanization.nav_state(fine.state.mechanization, fine.state.time)
     state = used.begin(start, whole)
     ends, rows = after(increments, state.time)

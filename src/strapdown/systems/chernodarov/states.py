@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,13 @@ from strapdown.systems.reproduction import (
 
 Array = NDArray[np.float64]
 
-#: Mechanization and error model; the quaternions' is of the wander azimuth alone.
+#: Mechanization, error model (the quaternions' is of the wander azimuth alone), covariance.
 CHAINS = (
-    ("wander_azimuth", QuaternionModel),
-    ("wander_azimuth", RotationVectorModel),
-    ("ned", RotationVectorModel),
+    ("wander_azimuth", QuaternionModel, "wd"),
+    ("wander_azimuth", QuaternionModel, "ud"),
+    ("wander_azimuth", QuaternionModel, "joseph"),
+    ("wander_azimuth", RotationVectorModel, "wd"),
+    ("ned", RotationVectorModel, "wd"),
 )
 # Covariances in factors and whole.
 FORMS = ("wd", "ud", "joseph")
@@ -86,14 +89,11 @@ def seventeen_from(states: int, rank: int, told: float, variance: float) -> Stat
 
 
 def chains(made: Bench) -> dict[str, FineResult]:
-    """Align the record of the bench by every mechanization, error model and covariance."""
+    """Align the record of the bench by each of `CHAINS`."""
     found = {}
-    for name, model in CHAINS:
-        for form in FORMS:
-            used = MECHANIZATIONS[name](ellipsoid=ELLIPSOID.name, height="free")
-            found[f"{name}, {model.name}, {form}"] = align(
-                made.imu, made.increments, model, form, used
-            )
+    for name, model, form in CHAINS:
+        used = MECHANIZATIONS[name](ellipsoid=ELLIPSOID.name, height="free")
+        found[f"{name}, {model.name}, {form}"] = align(made.imu, made.increments, model, form, used)
     return found
 
 
@@ -105,9 +105,8 @@ def same_organisation(found: dict[str, FineResult]) -> Statement:
     return same_organisation_from(len(found), heading, float(own.sd_deg[2]), drift)
 
 
-def _spread(found: dict[str, FineResult], of: object) -> float:
-    values = [of(r) for r in found.values()]  # type: ignore[operator]
-    return float(np.ptp(values))
+def _spread(found: dict[str, FineResult], of: Callable[[FineResult], float]) -> float:
+    return float(np.ptp([of(r) for r in found.values()]))
 
 
 def _bias(result: FineResult) -> Array:
