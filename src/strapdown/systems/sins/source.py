@@ -13,7 +13,7 @@ import pandas as pd
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import Finding
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.aid_tables import AID_READERS
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.results import InputFiles, Reading
@@ -86,7 +86,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     inputs: list[InputFiles] = []
     for name, aid in aids_of(spec).items():
         if aid.path is not None:
-            tables[name] = read_gnss(aid.path)
+            tables[name] = AID_READERS[aid.kind](aid.path)
             inputs.append(input_files(name, aid.path, (Path(aid.path),)))
     truth = None
     findings: list[Finding] = []
