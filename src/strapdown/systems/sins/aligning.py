@@ -126,7 +126,7 @@ def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Ar
     if chain.site is not None:
         return chain.site, np.asarray(chain.site_sd, dtype=np.float64)
     ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
-    site, sd = site_of_fixes(_fixes(chain, state), state.time, ellipsoid)
+    site, sd = site_of_fixes(_fixes(chain, state), state.begun, state.time, ellipsoid)
     arm = _lever_arm(chain)
     if q_nb is None or not arm.any():
         return site, sd

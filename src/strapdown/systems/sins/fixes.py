@@ -68,15 +68,16 @@ def fixes_until(tables: Sequence[pd.DataFrame], time: float) -> pd.DataFrame | N
 
 
 def site_of_fixes(
-    fixes: pd.DataFrame | None, time: float, ellipsoid: Ellipsoid
+    fixes: pd.DataFrame | None, begin: float, time: float, ellipsoid: Ellipsoid
 ) -> tuple[Site, Array]:
     """Return where a body stands, by the median of its fixes.
 
     Parameters
     ----------
     fixes : DataFrame or None
-    time : float, s
-        For messages.
+        Until `time`.
+    begin, time : float, s
+        Of the rest. Without a fix in it the newest one before is taken.
     ellipsoid : Ellipsoid
 
     Returns
@@ -90,9 +91,10 @@ def site_of_fixes(
     DataError
         There is no fix with a place.
     """
-    place, sd, _ = _good(fixes, POSITION_SD, time)
-    lat, lon, alt = np.median(place, axis=0).tolist()
-    return Site(lat, lon, alt, ellipsoid), np.asarray(sd.min(axis=0))
+    place, sd, stamps = _good(fixes, POSITION_SD, time)
+    first = min(int(np.searchsorted(stamps, begin)), len(stamps) - 1)
+    lat, lon, alt = np.median(place[first:], axis=0).tolist()
+    return Site(lat, lon, alt, ellipsoid), np.asarray(sd[first:].min(axis=0))
 
 
 def here_by_fix(

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 FIRST = 64
 #: Over which the motion before a gap is judged, s.
 BEFORE = 1.0
+# Stamps are rounded: a step of exactly so many usual ones is no gap.
+ROUNDED = 1.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +217,9 @@ class Intake:
         time = np.concatenate([state.tail_time, time])
         values = np.concatenate([state.tail, values])
         found = []
-        wide = np.flatnonzero(np.diff(time[known:]) > self.gaps.usual * state.usual) + known
+        wide = (
+            np.flatnonzero(np.diff(time[known:]) > self.gaps.usual * ROUNDED * state.usual) + known
+        )
         for k in wide.tolist():
             first = int(np.searchsorted(time, time[k] - BEFORE))
             sides = (float(time[k]), float(time[k + 1]))
