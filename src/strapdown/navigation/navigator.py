@@ -285,7 +285,7 @@ class _Going:
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
         """Note what came of fixes."""
         for i in range(len(fixed.told)):
-            at = float(fixes.time[i])
+            at = float(fixed.time[i])
             name, labels = aid.names(fixes.values[i])
             self.seen.append(Seen(at, name, labels, Innovations(*fixed.told[i])))
             self._add_mark(Mark(at, fixed.covariance[i], fixed.sensors[i], fixed.sensors_sd[i]))
