@@ -118,7 +118,10 @@ def _table(values: Array, time: Array, columns: list[str], state: ChainState) ->
 
 def _fixes(chain: Chain, state: ChainState) -> pd.DataFrame | None:
     name = chain.fixes_from
-    return None if name is None else fixes_until(state.told[name], state.time + INSTANT)
+    if name is None:
+        return None
+    offset = float(getattr(chain.navigator.by_name[name], "time_offset", 0.0))
+    return fixes_until(state.told[name], state.time + INSTANT, offset)
 
 
 def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Array]:

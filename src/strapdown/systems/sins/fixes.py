@@ -42,7 +42,9 @@ class Place:
     covariance: Array
 
 
-def fixes_until(tables: Sequence[pd.DataFrame], time: float) -> pd.DataFrame | None:
+def fixes_until(
+    tables: Sequence[pd.DataFrame], time: float, offset: float = 0.0
+) -> pd.DataFrame | None:
     """Return the fixes up to an instant as one table.
 
     Parameters
@@ -50,16 +52,20 @@ def fixes_until(tables: Sequence[pd.DataFrame], time: float) -> pd.DataFrame | N
     tables : sequence of DataFrame
         Gnss tables, one after the other.
     time : float, s
+    offset : float, s
+        Stamps less the time of the inertial sensors.
 
     Returns
     -------
     DataFrame or None
-        None where there is none.
+        By the time of the inertial sensors; None where there is none.
     """
     if not tables:
         return None
     joined = tables[0] if len(tables) == 1 else pd.concat(tables)
-    out: pd.DataFrame = joined[joined.index <= time]
+    out: pd.DataFrame = joined[joined.index - offset <= time]
+    if offset:
+        out = out.set_axis(out.index - offset)
     out.attrs = dict(tables[0].attrs)
     if out.empty:
         return None

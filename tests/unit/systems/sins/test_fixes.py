@@ -30,6 +30,8 @@ def table(time, place=HERE, velocity=(0.0, 0.0, 0.0), velocity_sd=(0.1,) * 3, qu
 def test_fixes_of_many_tables_up_to_an_instant():
     joined = fixes_until([table([1.0, 2.0]), table([3.0, 4.0])], 3.0)
     assert joined.index.tolist() == [1.0, 2.0, 3.0] and joined.attrs["source"] == "fixes.csv"
+    later = fixes_until([table([1.0, 2.0]), table([3.0, 4.0])], 3.0, 0.5)
+    assert later.index.tolist() == [0.5, 1.5, 2.5] and later.index.name == "time"
     assert fixes_until([], 1.0) is None
     assert fixes_until([table([5.0])], 1.0) is None
 
