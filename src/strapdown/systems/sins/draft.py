@@ -1,4 +1,4 @@
-"""The file of a run of navigation to begin with: what log and fixes tell filled in, the rest asked."""
+"""The file of a run of navigation to begin with: what log and fixes tell, and what is asked."""
 
 from __future__ import annotations
 

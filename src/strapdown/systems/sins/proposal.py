@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
@@ -35,6 +36,8 @@ STANDS, DRIVES = 0.5, 3.0
 NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
 #: Coarse alignment of a rest takes no more than this of it, s.
 COARSE = 100.0
+#: An alignment by a course ends when angles are known so well, deg.
+WELL = 3.0
 #: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
 OFFSET_SD = 0.2
 
@@ -242,8 +245,8 @@ def _alignment(
                 "coarse": {
                     "kind": "gnss_course",
                     "window_s": 60.0,
-                    "until_heading_sd_deg": 3.0,
-                    "until_tilt_sd_deg": 3.0,
+                    "until_heading_sd_deg": WELL,
+                    "until_tilt_sd_deg": _tilt(sensor),
                 },
                 "fine": {"kind": "none"},
             },
@@ -253,6 +256,14 @@ def _alignment(
         {"coarse": {"kind": "known_heading", "duration_s": 10.0}, "fine": {"kind": "none"}},
         "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
     )
+
+
+def _tilt(sensor: str | None) -> float:
+    """A tilt that a course can find, deg: accelerometers leave one of their bias over g."""
+    if sensor is None:
+        return WELL
+    bias = max(ImuUncertainty.of_sensor(load_sensor(sensor)).accel.axis("bias"))
+    return max(WELL, float(math.ceil(2.0 * math.degrees(bias / STANDARD_GRAVITY))))
 
 
 def _finds_north(sensor: str) -> bool:
