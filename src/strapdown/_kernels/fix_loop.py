@@ -148,6 +148,7 @@ def over_fixes(
     fix_time,
     fixes,
     told,
+    noted_at,
     noted,
     noted_sensors,
     noted_sd,
@@ -236,6 +237,7 @@ def over_fixes(
             return BAD_FIX, made, count, done
         take_off(which, state, sensors, earth, x)
         level_place(which, state, turn)
+        noted_at[done] = times[AT_STEP]
         note(
             form,
             covariance,

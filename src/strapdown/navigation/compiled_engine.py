@@ -62,6 +62,8 @@ class Fixed:
 
     Attributes
     ----------
+    time : ndarray, (m,), s
+        When they were taken.
     told : ndarray, (m, 3, 3)
         Innovation, its expected variance, and weight of each component.
     covariance : ndarray, (m, 9, 9)
@@ -69,6 +71,7 @@ class Fixed:
         As of a `Mark`, after each.
     """
 
+    time: Array
     told: Array
     covariance: Array
     sensors: Array
@@ -180,7 +183,7 @@ class CompiledEngine(Engine):
             Whether it stopped for a covariance to be noted.
         """
         size, k = len(fixes.time), self._n - 9
-        told = np.empty((size, fix_kernel.TOLD, 3))
+        told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
         why, made, self._count, done = fix_kernel.over_fixes(
             self._kinds,
@@ -201,6 +204,7 @@ class CompiledEngine(Engine):
             fixes.time,
             fixes.values,
             told,
+            at,
             noted,
             sensors,
             sd,
@@ -208,7 +212,7 @@ class CompiledEngine(Engine):
         if why == fix_kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
-        fixed = Fixed(told[:done], noted[:done], sensors[:done], sd[:done])
+        fixed = Fixed(at[:done], told[:done], noted[:done], sensors[:done], sd[:done])
         return int(made), fixed, why == kernel.NOTE
 
     def close(self) -> None:

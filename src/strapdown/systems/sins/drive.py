@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError
-from strapdown.navigation.navigator import SAME_INSTANT
+from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
 from strapdown.systems.progress import Progress, silent

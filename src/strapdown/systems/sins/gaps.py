@@ -128,7 +128,7 @@ def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> Navigato
         by as much, and the place goes on with that velocity: twice what a constant one would do.
     """
     filter_, model = navigator.filter, navigator.filter.model
-    at = state.filter
+    at = state.engine.filter
     level = filter_.mechanization.levels(at.row[None, :])[0]
     C = rotation.dcm_from_quaternion(level[Q_LB : Q_LB + 4])
     P = np.zeros((model.physical_size,) * 2)
@@ -137,4 +137,5 @@ def widened(navigator: Navigator, state: NavigatorState, hole: Hole) -> Navigato
     E = model.from_physical(filter_.mechanization, at.time, at.row)
     more = symmetric(E @ P @ E.T)
     covariance = filter_.form.predict(at.covariance, np.eye(len(more)), more)
-    return replace(state, filter=replace(at, covariance=covariance))
+    engine = replace(state.engine, filter=replace(at, covariance=covariance))
+    return replace(state, engine=engine)
