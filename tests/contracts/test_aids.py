@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import pickle
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from aid_views import SITUATIONS, Moment, difference_columns, moment_of, view_of
+from aided_drives import drive, gnss_of, increments_of, navigator_of, run
 from strapdown import rotation
 from strapdown.aiding.aid import Aid, TableAid, WatchingAid
 from strapdown.aiding.aids import AIDS
@@ -25,6 +27,10 @@ from strapdown.aiding.odometer import Odometer
 from strapdown.aiding.zero_rate import ZeroRate
 from strapdown.aiding.zero_velocity import ZeroVelocity
 from strapdown.mechanization import MECHANIZATIONS
+from strapdown.simulation.barometer import PressureHeight, simulate_barometer
+from strapdown.simulation.body_velocity import VelocityLog, simulate_body_velocity
+from strapdown.simulation.heading import Compass, simulate_heading
+from strapdown.simulation.odometer import WheelSpeed, simulate_odometer
 from strapdown.tables import (
     barometer_table,
     body_velocity_table,
@@ -184,3 +190,68 @@ def test_every_column_is_how_an_error_changes_the_difference(kind, mechanization
             found = difference_columns(used, aid, moment, values, k, estimated)
             np.testing.assert_allclose(found[:, :3], one.H[:, :3], rtol=1e-6, atol=1e-5)
             np.testing.assert_allclose(found[:, 3:], one.H[:, 3:], rtol=1e-6, atol=2e-6)
+
+
+# --- watching in pieces ------------------------------------------------------------------
+
+WATCHING = [kind for kind in CASE_NAMES if isinstance(CASES[kind].aid, WatchingAid)]
+
+
+@pytest.mark.parametrize("kind", WATCHING)
+def test_samples_watched_in_pieces_tell_the_same_to_the_last_bit(kind):
+    aid = CASES[kind].aid
+    time, rows = increments_of(drive(), 0)
+    _, whole = aid.watch(aid.begin(), time, rows)
+    assert 10 < len(whole.time) < len(time)
+    assert np.isin(whole.time, time).all()
+    for pieces in (np.array_split(np.arange(1500), 11), [[i] for i in range(700)]):
+        memory, told = aid.begin(), []
+        for cut in pieces:
+            before = pickle.dumps(memory)
+            after, epochs = aid.watch(memory, time[cut], rows[cut])
+            assert pickle.dumps(memory) == before
+            memory = after
+            told.append(epochs)
+        upto = np.searchsorted(whole.time, time[pieces[-1][-1]], side="right")
+        np.testing.assert_array_equal(np.concatenate([e.time for e in told]), whole.time[:upto])
+        np.testing.assert_array_equal(np.concatenate([e.values for e in told]), whole.values[:upto])
+
+
+@pytest.mark.parametrize("kind", WATCHING)
+def test_nothing_watched_tells_nothing(kind):
+    aid = CASES[kind].aid
+    _, epochs = aid.watch(aid.begin(), np.empty(0), np.empty((0, 10)))
+    assert len(epochs.time) == len(epochs.values) == 0
+
+
+# --- together ---------------------------------------------------------------------------
+
+
+def of_both(kind):
+    """Two aids of a kind, each with a name, and what both are told of a drive."""
+    one = CASES[kind].aid
+    both = (replace(one, name="first"), replace(one, name="second"))
+    made = {
+        "gnss": lambda: gnss_of(drive(), 0),
+        "odometer": lambda: simulate_odometer(drive(), WheelSpeed(rate=2.0)),
+        "body_velocity": lambda: simulate_body_velocity(drive(), VelocityLog(rate=2.0)),
+        "barometer": lambda: simulate_barometer(drive(), PressureHeight(rate=2.0)),
+        "heading": lambda: simulate_heading(drive(), Compass(rate=2.0)),
+    }
+    return both, {aid.name: made[kind]() for aid in both} if kind in made else {}
+
+
+@pytest.mark.parametrize("kind", CASE_NAMES)
+def test_two_of_a_kind_observe_side_by_side_and_in_pieces(kind):
+    aids, tables = of_both(kind)
+    navigator = navigator_of(aids)
+    whole, pieces = run(navigator, drive(), 0, tables, until=20.0)
+    seen = [one for piece in pieces for one in piece.seen]
+    names = {one.name.split(".")[0] for one in seen}
+    assert names == {"first", "second"}
+    labels = list(navigator.filter.model.layout.labels())
+    assert len(set(labels)) == len(labels)
+    cut, _ = run(navigator, drive(), 0, tables, until=20.0, pieces=13)
+    np.testing.assert_array_equal(cut.mechanization, whole.mechanization)
+    np.testing.assert_array_equal(cut.filter.covariance, whole.filter.covariance)
+    np.testing.assert_array_equal(cut.filter.sensors, whole.filter.sensors)

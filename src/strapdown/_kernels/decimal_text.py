@@ -7,12 +7,13 @@ from numba import njit
 
 # Doubles hold all whole numbers up to here.
 _LARGEST = 9007199254740992.0
-_ZERO, _POINT, _MINUS, _BREAK = 48, 46, 45, 10
+_ZERO, _POINT, _MINUS, _BREAK = np.uint8(48), np.uint8(46), np.uint8(45), np.uint8(10)
+_TEN, _NONE = np.uint64(10), np.uint64(0)
 #: Of one number: a sign, 16 digits and zeros before them, a point, a separator.
 WIDTH = 40
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def decimal_text(values, decimals, separator, text):
     """Write rows of numbers, each column with its number of decimals.
 
@@ -35,29 +36,38 @@ def decimal_text(values, decimals, separator, text):
     n, m = values.shape
     at = 0
     scale = 10.0**decimals
-    reverse = np.zeros(WIDTH, dtype=np.uint8)
     for i in range(n):
         for j in range(m):
             scaled = values[i, j] * scale[j]
             if not abs(scaled) < _LARGEST:
                 return -1
-            whole = np.int64(abs(np.rint(scaled)))
+            left = np.uint64(abs(np.rint(scaled)))
             # No minus before a zero.
-            if scaled < 0.0 and whole > 0:
+            if scaled < 0.0 and left > _NONE:
                 text[at] = _MINUS
                 at += 1
-            count = 0
-            while whole > 0 or count <= decimals[j]:
-                rest = whole // 10
-                reverse[count] = whole - 10 * rest
-                whole = rest
+            count = decimals[j] + 1
+            beyond = np.uint64(scale[j]) * _TEN
+            while left >= beyond:
+                beyond *= _TEN
                 count += 1
-            for k in range(count - 1, -1, -1):
-                text[at] = _ZERO + reverse[k]
-                at += 1
-                if k == decimals[j] and k > 0:
-                    text[at] = _POINT
-                    at += 1
+            # From the last digit on.
+            end = at + count + (1 if decimals[j] > 0 else 0)
+            k = end
+            for _ in range(decimals[j]):
+                tens = left // _TEN
+                k -= 1
+                text[k] = _ZERO + np.uint8(left - _TEN * tens)
+                left = tens
+            if decimals[j] > 0:
+                k -= 1
+                text[k] = _POINT
+            while k > at:
+                tens = left // _TEN
+                k -= 1
+                text[k] = _ZERO + np.uint8(left - _TEN * tens)
+                left = tens
+            at = end
             text[at] = _BREAK if j == m - 1 else separator
             at += 1
     return at

@@ -31,15 +31,18 @@ class VehicleAxes:
         with a level vehicle that drives north they are roll, pitch and heading of the sensors.
         ``C_vb`` turns the axes of the sensors into those of the vehicle.
     sd_deg : tuple of float, deg
-        Of roll, pitch and yaw, about the axes of the vehicle; an angle with none is known, and no
-        state. A turn about the direction of travel is not seen by a velocity along it.
+        Of three angles by which that is wrong, about the axes of the vehicle:
+        ``C_vb true = R_z(-yaw) R_y(-pitch) R_x(-roll) C_vb assumed``. Where zero is assumed they
+        are the assumed angles less the true ones, and else nearly. An angle with no standard
+        deviation is known, and no state. A turn about the direction of travel is not seen by a
+        velocity along it.
     """
 
     angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
     sd_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def states(self, name: str) -> tuple[SensorStates, ...]:
-        """Return the states, if any, of an aid: assumed angles less true, rad."""
+        """Return the states, if any, of an aid: what is wrong with the angles, rad."""
         labels = [label for label, sd in zip(ANGLES, self.sd_deg, strict=True) if sd > 0.0]
         if not labels:
             return ()

@@ -60,4 +60,4 @@ def navigate(
     if len(result.findings) > MOST:
         more = f"{len(result.findings) - MOST} more; all of them are in the report"
         print_findings([Finding(more)])
-    print_seal(seal, "navigation.json")
+    print_seal(seal, "report.html")

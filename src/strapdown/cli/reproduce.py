@@ -12,7 +12,11 @@ EPILOG = "Example: strapdown reproduce alexiev --out alexiev"
 
 def reproduce(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="alexiev: Alexiev (2021); tadic: Tadic (2016).")
+        str,
+        typer.Argument(
+            metavar="PAPER",
+            help="alexiev: Alexiev (2021); tadic: Tadic (2016); chernodarov: Chernodarov (2009).",
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder to make (PAPER-reproduced).")

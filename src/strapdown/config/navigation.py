@@ -188,6 +188,13 @@ class AidSpec(ChoiceSpec):
 
     #: What it measured; where the record is simulated, that is simulated, too.
     path: FileName | None = None
+    #: By quantity the name of its column, where the names do not say it.
+    columns: dict[Word, Word] = Field(default_factory=dict)
+    #: Of fixes, in place of what the file states.
+    position_sd_m: OneOrThree | None = None
+    velocity_sd_m_per_s: OneOrThree | None = None
+    #: Leave out rows that cannot be used, and say so.
+    repair: StrictBool = False
 
 
 class TruthTable(TableSpec):

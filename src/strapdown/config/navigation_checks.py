@@ -192,6 +192,13 @@ class _Checks(SourceChecks):
                 f"it is missing: '{given.kind}' takes what it measured from a file",
                 "write path = …, from the folder of this file",
             )
+        for key in ("position_sd_m", "velocity_sd_m_per_s"):
+            if getattr(given, key) is not None and given.kind != "gnss":
+                raise self.refuse(
+                    ("aiding", name, key),
+                    f"'{given.kind}' takes no fixes",
+                    'leave it out: it belongs to an aid of kind = "gnss"',
+                )
         height = getattr(spec.mechanization, "height", None)
         if given.kind in HEIGHTS and height == "held":
             raise self.refuse(

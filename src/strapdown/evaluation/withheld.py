@@ -26,6 +26,7 @@ __all__ = [
     "WithheldScore",
     "Withholding",
     "score_withheld",
+    "scores_table",
     "spans_to_withhold",
     "without_spans",
 ]
@@ -145,7 +146,7 @@ def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
     table : DataFrame
         By time.
     spans : sequence of Span
-        Ends included.
+        After the begin, up to the end.
 
     Returns
     -------
@@ -159,7 +160,7 @@ def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
     time = index_of(table)
     kept = np.ones(len(time), dtype=np.bool_)
     for span in spans:
-        within = (time >= span.begin) & (time <= span.end)
+        within = (time > span.begin) & (time <= span.end)
         if not within.any():
             raise ConfigError(
                 f"there is nothing to withhold from {span.begin:g} to {span.end:g} s: the table "
@@ -249,6 +250,38 @@ def score_withheld(
         at = first
         found[k] = _score(blind, state, time[first:last], rows[first:last], name, span)
     return tuple(found[k] for k in range(len(spans)))
+
+
+def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
+    """Return scores as a table.
+
+    Parameters
+    ----------
+    scores : sequence of WithheldScore
+
+    Returns
+    -------
+    DataFrame
+        By begin of the span in s: its ``length`` s and ``fixes``; of the largest horizontal error
+        ``error`` m, ``bound`` m (95 %), ``distance`` (Mahalanobis, 2.45 at the bound); ``down``
+        m, the largest error of height; ``inside``, the share of the fixes within their bounds.
+    """
+    rows = []
+    for one in scores:
+        worst = int(np.argmax(one.horizontal))
+        rows.append(
+            {
+                "length": one.span.end - one.span.begin,
+                "fixes": len(one.time),
+                "error": one.largest,
+                "bound": float(one.bound[worst]),
+                "distance": float(one.distance[worst]),
+                "down": float(np.abs(one.error[:, 2]).max()),
+                "inside": float(np.mean(one.distance**2 <= WITHIN_95)),
+            }
+        )
+    begins = pd.Index([one.span.begin for one in scores], name="begin")
+    return pd.DataFrame(rows, index=begins)
 
 
 def _score(

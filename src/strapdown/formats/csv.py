@@ -29,8 +29,8 @@ _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:.*")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 # What of a text is looked at to learn how its table begins, in bytes.
 HEAD = 1 << 16
-# Breaks of lines that few programs write, quotes, and hexadecimal numbers.
-_ODD = (b'"', b"x", b"X", b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
+# Quotes, zeros, and breaks of lines that few programs write.
+_ODD = (b'"', b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 
 
 def detect(path: Path) -> bool:

@@ -30,22 +30,23 @@ def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns |
     Returns
     -------
     list of ndarray, or None
-        As `parsed`. None where a line has another width, none at all, or a comma that could be
-        a decimal sign.
+        As `parsed`. None where a line has another width, is empty, or holds what may be no number.
     """
-    if count < 2 or (separator != "," and b"," in body):
+    # A comma may be a decimal sign, and an x that of a hexadecimal number.
+    if count < 2 or b"x" in body or b"X" in body or (separator != "," and b"," in body):
         return None
     if b"\r" in body:
         body = body.replace(b"\r\n", b"\n")
         if b"\r" in body:
             return None
     columns = _parsed_or_none(body, count, separator or " ")
-    if separator is None and (columns is None or not all(_full(c) for c in columns)):
-        # A value that is missing may be two blanks beside each other.
-        plain = single_blanks(body)
-        if plain is not body:
-            body, columns = plain, _parsed_or_none(plain, count, " ")
-    return columns if columns and columns[0].size == body.count(b"\n") else None
+    if columns is not None and all(_full(c) for c in columns):
+        return columns
+    # A value that is missing may be two blanks beside each other, or a line without any.
+    if separator is None:
+        body = single_blanks(body)
+        columns = _parsed_or_none(body, count, " ")
+    return None if b"\n\n" in body or body.startswith(b"\n") else columns
 
 
 def _parsed_or_none(body: bytes, count: int, delimiter: str) -> Columns | None:

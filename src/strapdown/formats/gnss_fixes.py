@@ -170,7 +170,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
     if fixes.clock.name in (GPS, RELATIVE):
         whole = time.copy()
         whole[keep], weeks = unrolled(time[keep])
-        time = whole
+        time = np.asarray(whole)
         if weeks:
             row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
             fixes.findings.append(
@@ -203,7 +203,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
 
 def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bool_]:
     """Rows with a place; those of quality 0 may be without."""
-    there: NDArray[np.bool_] = np.isfinite(fixes.place).all(axis=1)
+    there = np.asarray(np.isfinite(fixes.place).all(axis=1))
     bad = np.flatnonzero(~there & (quality != 0.0))
     if bad.size and not options.repair:
         k = int(bad[0])

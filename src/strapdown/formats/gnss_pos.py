@@ -215,7 +215,9 @@ def _columns(
                 remedy="correct or delete that row; if the file changes its columns, split it",
             )
     rows = np.array([row for row, _ in plain], dtype=np.int64)
-    body = "".join(f"{' '.join(line.split())}\n" for _, line in plain).encode()
+    text = "".join(f"{' '.join(line.split())}\n" for _, line in plain)
+    # Of whole numbers a zero has no sign, and of degrees it says the hemisphere.
+    body = text.replace(" -0 ", " -0.0 ").encode()
     columns = columns_at_once(body, len(names), None) if body.isascii() else None
     if columns is None or any(c.dtype.kind not in "iuf" for c in columns):
         _refuse_words(plain, names, file)

@@ -74,7 +74,7 @@ def write_csv(
     options : TrajectoryFileOptions, optional
         The ellipsoid and the epoch stand in the comments at the top. Of its `digits`, ``exact``
         writes each number in the fewest that give it back, and ``fixed`` rounds to `DECIMALS`:
-        a micrometre, 10 nm/s, 1e-9 deg of attitude, 1 ns; five times faster.
+        a micrometre, 10 nm/s, 1e-9 deg of attitude, 1 ns; twice as fast.
 
     Raises
     ------

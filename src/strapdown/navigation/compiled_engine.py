@@ -62,6 +62,8 @@ class Fixed:
 
     Attributes
     ----------
+    time : ndarray, (m,), s
+        When they were taken.
     told : ndarray, (m, 3, 3)
         Innovation, its expected variance, and weight of each component.
     covariance : ndarray, (m, 9, 9)
@@ -69,6 +71,7 @@ class Fixed:
         As of a `Mark`, after each.
     """
 
+    time: Array
     told: Array
     covariance: Array
     sensors: Array
@@ -109,7 +112,14 @@ class CompiledEngine(Engine):
         self._sensors = state.filter.sensors.copy()
         self._times = np.array([state.filter.time, state.time])
         self.mechanization = state.mechanization.copy()
-        self._states = (self.mechanization, self._covariance, self._sensors, self._times)
+        self._newest = state.last.copy()
+        self._states = (
+            self.mechanization,
+            self._covariance,
+            self._sensors,
+            self._times,
+            self._newest,
+        )
         self._group = (np.empty((LARGEST_GROUP + 1, used.row)), np.empty((LARGEST_GROUP, 10)))
         closing = (
             np.empty((9, width)),
@@ -180,7 +190,7 @@ class CompiledEngine(Engine):
             Whether it stopped for a covariance to be noted.
         """
         size, k = len(fixes.time), self._n - 9
-        told = np.empty((size, fix_kernel.TOLD, 3))
+        told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
         why, made, self._count, done = fix_kernel.over_fixes(
             self._kinds,
@@ -201,6 +211,7 @@ class CompiledEngine(Engine):
             fixes.time,
             fixes.values,
             told,
+            at,
             noted,
             sensors,
             sd,
@@ -208,7 +219,7 @@ class CompiledEngine(Engine):
         if why == fix_kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
-        fixed = Fixed(told[:done], noted[:done], sensors[:done], sd[:done])
+        fixed = Fixed(at[:done], told[:done], noted[:done], sensors[:done], sd[:done])
         return int(made), fixed, why == kernel.NOTE
 
     def close(self) -> None:
@@ -257,10 +268,9 @@ class CompiledEngine(Engine):
         if why == kernel.BAD:
             raise self._no_covariance()
         self._note()
-        self.time = float(self._times[kernel.AT_STEP])
+        self.time, self.last = float(self._times[kernel.AT_STEP]), self._newest.copy()
         if self._count:
             self.row = self._group[0][self._count].copy()
-            self.last = self._group[1][self._count - 1].copy()
         else:
             self.row = self.filter.row
 

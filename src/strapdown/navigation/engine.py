@@ -57,11 +57,17 @@ class EngineState:
     last: Array
 
 
-def begun(filter_: ErrorFilter, state: FilterState) -> EngineState:
+def begun(filter_: ErrorFilter, state: FilterState, feeds_back: bool = True) -> EngineState:
     """Return the state of an engine at a state of a filter."""
+    errors = np.zeros(filter_.model.layout.size)
+    if not feeds_back:
+        # What an alignment found of the sensors is an error like those that are estimated.
+        E = filter_.model.from_physical(filter_.mechanization, state.time, state.row)
+        errors = E @ np.concatenate([np.zeros(PHYSICAL), state.sensors])
+        state = replace(state, sensors=np.zeros_like(state.sensors))
     return EngineState(
         filter=state,
-        errors=np.zeros(filter_.model.layout.size),
+        errors=errors,
         time=state.time,
         mechanization=state.mechanization,
         row=state.row,

@@ -110,7 +110,7 @@ class Navigator:
             return None
         aid = self.aids[0]
         plain = aid.rule is None and self.filter.rule is None and not aid.states()
-        return aid if plain and (not aid.use_velocity or not any(aid.lever_arm)) else None
+        return aid if plain else None
 
     @cached_property
     def by_name(self) -> dict[str, Aid]:
@@ -136,7 +136,7 @@ class Navigator:
         """Return the state at a state of the filter, as where an alignment ended."""
         nothing = Epochs(np.empty(0), np.empty((0, 0)))
         return NavigatorState(
-            engine=begun(self.filter, state),
+            engine=begun(self.filter, state, self.damping.feeds_back),
             queues={aid.name: nothing for aid in self.aids},
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
@@ -285,7 +285,7 @@ class _Going:
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
         """Note what came of fixes."""
         for i in range(len(fixed.told)):
-            at = float(fixes.time[i])
+            at = float(fixed.time[i])
             name, labels = aid.names(fixes.values[i])
             self.seen.append(Seen(at, name, labels, Innovations(*fixed.told[i])))
             self._add_mark(Mark(at, fixed.covariance[i], fixed.sensors[i], fixed.sensors_sd[i]))

@@ -268,7 +268,9 @@ def strip_range(chart: Chart) -> tuple[float, float] | None:
     strips = [p for p in chart.panels if p.categories]
     if not strips or len(strips) == len(chart.panels):
         return None
-    found = np.concatenate([fill.x for p in strips for fill in p.fills] or [np.empty(0)])
+    drawn = [fill.x for p in strips for fill in p.fills]
+    drawn += [line.x for p in strips for line in p.lines]
+    found = np.concatenate(drawn or [np.empty(0)])
     found = found[np.isfinite(found)]
     if not found.size or not np.ptp(found):
         return None

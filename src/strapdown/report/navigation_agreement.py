@@ -10,10 +10,15 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.nees import band_of_mean
+from strapdown.navigation.consistency import (
+    ComponentConsistency,
+    ObservationConsistency,
+    consistency_of,
+)
 from strapdown.navigation.record import NavigationRecord
 
-__all__ = ["Agreement", "agreements", "chi_square_band", "chi_square_far"]
+__all__ = ["Agreement", "agreements", "chi_square_far"]
 
 Array = NDArray[np.float64]
 
@@ -40,6 +45,8 @@ class Agreement:
     nu, sd : ndarray, (n, m)
     weight : ndarray, (n, m)
         0 where it was rejected.
+    consistency : ObservationConsistency
+        What they say of the filter.
     """
 
     name: str
@@ -48,6 +55,7 @@ class Agreement:
     nu: Array
     sd: Array
     weight: Array
+    consistency: ObservationConsistency
 
     @cached_property
     def used(self) -> NDArray[np.bool_]:
@@ -92,25 +100,28 @@ class Agreement:
         count = int(self.used.sum())
         if not count:
             return math.nan, math.nan
-        low, high = chi_square_band(count * self.freedom)
-        return low / count, high / count
+        return band_of_mean(self.freedom, count)
 
     @property
     def ratio(self) -> float:
         """Root mean square of the innovations in their expected standard deviations."""
         return math.sqrt(self.mean_nis / self.freedom) if self.freedom else math.nan
 
-    @cached_property
+    @property
     def correlation(self) -> float:
-        """Largest correlation of a component with itself an epoch later; NaN for under ten."""
-        unit = (self.nu[self.used] / self.sd[self.used]).T
-        found = [_next(column) for column in unit]
+        """Largest correlation of a component with itself an epoch later; NaN for too few."""
+        found = [float(one.autocorrelation[0]) for one in self._long]
         return max(found, key=abs, default=math.nan)
 
     @property
     def correlation_bound(self) -> float:
         """Below which that is in 95 of 100 cases for each component, where there is no memory."""
-        return TWO_SIDED_95 / math.sqrt(max(1, int(self.used.sum())))
+        return max((one.autocorrelation_bound for one in self._long), default=math.nan)
+
+    @property
+    def _long(self) -> list[ComponentConsistency]:
+        """Components with epochs enough to tell of memory."""
+        return [one for one in self.consistency.components if one.autocorrelation.size]
 
     @property
     def remembers(self) -> bool:
@@ -135,13 +146,6 @@ def agreements(record: NavigationRecord) -> tuple[Agreement, ...]:
     return tuple(one for one in found if one.epochs)
 
 
-def chi_square_band(freedom: float) -> tuple[float, float]:
-    """Quantiles of 2.5 % and 97.5 % of chi-square."""
-    from scipy.stats import chi2
-
-    return float(chi2.ppf(0.025, freedom)), float(chi2.ppf(0.975, freedom))
-
-
 def chi_square_far(freedom: float) -> float:
     """Quantile of chi-square that as few exceed as exceed three standard deviations."""
     from scipy.stats import chi2, norm
@@ -156,12 +160,12 @@ def _agreement(name: str, table: pd.DataFrame) -> Agreement:
         return table[[f"{what} {label}" for label in labels]].to_numpy(dtype=np.float64)
 
     time = table.index.to_numpy(dtype=np.float64)
-    return Agreement(name, labels, time, part("nu"), np.sqrt(part("s")), part("weight"))
-
-
-def _next(series: Array) -> float:
-    if series.size < 10:
-        return math.nan
-    off = series - series.mean()
-    power = float(off @ off)
-    return float(off[1:] @ off[:-1]) / power if power > 0.0 else math.nan
+    return Agreement(
+        name,
+        labels,
+        time,
+        part("nu"),
+        np.sqrt(part("s")),
+        part("weight"),
+        consistency_of(name, table),
+    )

@@ -114,11 +114,8 @@ def _errors(found: NavigationFound) -> tuple[Block | None, ...]:
     if found.errors is None:
         return ()
     drawn = [ChartBlock(c) for c in error_charts(found.told, found.errors)]
-    return (
-        tables.error_table(found),
-        *drawn,
-        ChartBlock(nees_chart(found.told, found.errors)),
-    )
+    nees = nees_chart(found.told, found.errors)
+    return (tables.error_table(found), *drawn, None if nees is None else ChartBlock(nees))
 
 
 def _states(found: NavigationFound) -> tuple[Block | None, ...]:
@@ -132,9 +129,31 @@ def _observations(found: NavigationFound) -> tuple[Block | None, ...]:
     nis = nis_chart(found.record, found.agreements)
     return (
         tables.observation_table(found),
+        *_verdicts(found),
         None if nis is None else ChartBlock(nis),
         *(ChartBlock(innovation_chart(found.record, one)) for one in found.agreements),
     )
+
+
+def _verdicts(found: NavigationFound) -> tuple[Block, ...]:
+    """What the innovations say against what was stated, beyond what chance makes."""
+    rows: list[tuple[str, str]] = []
+    for one in found.agreements:
+        kinds = dict.fromkeys(v.kind for v in one.consistency.verdicts)
+        for kind in kinds:
+            alike = [v for v in one.consistency.verdicts if v.kind == kind]
+            said = "; ".join(v.what for v in alike)
+            rows.append((one.name, f"{said}. {_capital(alike[0].meaning)}."))
+    if not rows:
+        return (Paragraph("Nothing in them speaks against what was stated of sensors and aids."),)
+    return (
+        Paragraph("What in them is not by chance, and what it may mean:"),
+        Items(tuple(rows)),
+    )
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _outages(found: NavigationFound) -> tuple[Block | None, ...]:

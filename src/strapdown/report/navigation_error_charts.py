@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.nees import bounds
 from strapdown.report.chart import AXIS_COLOURS, BLUE, Chart, Level, Panel, curve
-from strapdown.report.navigation_agreement import chi_square_band
 from strapdown.report.navigation_charts import BOUND, over_time
-from strapdown.report.navigation_errors import PHYSICAL, NavigationErrors
+from strapdown.report.navigation_errors import NavigationErrors
 from strapdown.report.navigation_thinning import BUCKETS, thin_fill
 from strapdown.report.navigation_told import NavigationTold
 from strapdown.tables import EULER, NED, VELOCITY
@@ -22,15 +21,14 @@ _NAMES = dict(zip(VELOCITY, NED, strict=True))
 def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, ...]:
     """Errors of place, velocity and attitude within their bounds."""
     out = []
-    for slug, title, columns, unit, first in (
-        ("errors-place", "Errors of place", NED, "m", 0),
-        ("errors-velocity", "Errors of velocity", VELOCITY, "m/s", 3),
-        ("errors-attitude", "Errors of attitude", EULER, "deg", 6),
+    for slug, title, columns, unit in (
+        ("errors-place", "Errors of place", NED, "m"),
+        ("errors-velocity", "Errors of velocity", VELOCITY, "m/s"),
+        ("errors-attitude", "Errors of attitude", EULER, "deg"),
     ):
         panels = []
         for k, column in enumerate(columns):
-            half = TWO_SIDED_95 * found.sd[:, first + k]
-            error = found.errors[column].to_numpy(dtype=np.float64)
+            half, error = found.bound(column), found.error(column)
             panels.append(
                 Panel(
                     f"{_NAMES.get(column, column)}, {unit}",
@@ -44,9 +42,11 @@ def error_charts(told: NavigationTold, found: NavigationErrors) -> tuple[Chart, 
     return tuple(out)
 
 
-def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart:
-    """Normalised errors squared of place, velocity and attitude together."""
-    low, high = chi_square_band(PHYSICAL)
+def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart | None:
+    """Normalised errors squared of place, velocity and attitude; None where no bound is told."""
+    if not found.freedom:
+        return None
+    low, high = bounds(found.freedom)
     nees = np.maximum(found.nees, _LEAST)
     panel = Panel(
         "error squared",
@@ -57,8 +57,8 @@ def nees_chart(told: NavigationTold, found: NavigationErrors) -> Chart:
     return over_time(
         "nees",
         "Normalised errors squared",
-        f"By the covariance of the nine errors; {PHYSICAL} is expected, and 95 of 100 runs belong "
-        "between the levels at an instant. The errors of one run are alike from instant to "
+        f"By the covariance of these errors; {found.freedom} is expected, and 95 of 100 runs "
+        "belong between the levels at an instant. The errors of one run are alike from instant to "
         "instant: one that stays outside for a while says less than many runs would.",
         (panel,),
         told.record,

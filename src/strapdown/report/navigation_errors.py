@@ -6,25 +6,18 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
+from strapdown.evaluation.truth_comparison import TruthComparison, compare_with_truth
 from strapdown.exceptions import Finding
-from strapdown.navigation.record import NavigationRecord
 from strapdown.report.error_envelope import PLANE_95
 from strapdown.report.navigation_told import NavigationTold
 from strapdown.tables import EULER, NED, VELOCITY
 
-__all__ = ["PHYSICAL", "NavigationErrors", "Score", "navigation_errors"]
+__all__ = ["NavigationErrors", "Score", "navigation_errors"]
 
 Array = NDArray[np.float64]
-
-#: Errors of which the covariance of a record is, in its order.
-PHYSICAL = 9
-# Of a correlation matrix: what is less is a direction that is known.
-_KNOWN = 1e-10
 
 
 @dataclass(frozen=True)
@@ -53,53 +46,71 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class NavigationErrors:
-    """Errors at the samples that follow the marks of the covariance.
+    """Errors beside what the run itself claims of them.
 
     Attributes
     ----------
-    errors : DataFrame
-        As `trajectory_differences`, by time.
-    sd : ndarray, (n, 9)
-        Standard deviations of the same: north, east, down m, velocities m/s, roll, pitch,
-        heading deg.
-    plane_sd : ndarray, (n,)
-        Of the horizontal error along itself, m.
-    nees : ndarray, (n,)
-        Normalised error squared of place, velocity and attitude.
-    freedom : ndarray, (n,)
-        Directions in which the covariance does not vanish: those that the sum is over.
-    findings : tuple of Finding
-        Of the comparison.
+    comparison : TruthComparison
     """
 
-    errors: pd.DataFrame
-    sd: Array
-    plane_sd: Array
-    nees: Array
-    freedom: NDArray[np.intp]
-    findings: tuple[Finding, ...]
+    comparison: TruthComparison
 
     @property
     def time(self) -> Array:
-        """Of the samples, (n,), s."""
-        return self.errors.index.to_numpy(dtype=np.float64)
+        """Of the samples that are compared, (n,), s."""
+        return self.comparison.time
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the comparison."""
+        return self.comparison.findings
+
+    @property
+    def nees(self) -> Array:
+        """Normalised error squared of place, velocity and attitude, (n,)."""
+        if not self.freedom:
+            return np.full(len(self.time), np.nan)
+        return self.comparison.nees["all"].to_numpy(dtype=np.float64)
+
+    @property
+    def freedom(self) -> int:
+        """Errors that it is of: those of which the run has states."""
+        return self.comparison.freedom.get("all", 0)
+
+    def error(self, column: str) -> Array:
+        """Errors of a quantity, (n,): m, m/s, deg."""
+        return self.comparison.differences[column].to_numpy(dtype=np.float64)
+
+    def bound(self, column: str) -> Array:
+        """Bounds of 95 % of them, (n,)."""
+        return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
 
     @cached_property
     def scores(self) -> tuple[Score, ...]:
         """Errors of each quantity, and of the horizontal place."""
-        found = [
-            self._score(name, unit, self.errors[name].to_numpy(), TWO_SIDED_95 * self.sd[:, k])
-            for k, (name, unit) in enumerate(
-                [*((n, "m") for n in NED), *((n, "m/s") for n in VELOCITY)]
-                + [(n, "deg") for n in EULER]
-            )
-        ]
-        size = np.hypot(*(self.errors[n].to_numpy() for n in NED[:2]))
-        return self._score("horizontal", "m", size, PLANE_95 * self.plane_sd), *found
+        units = (
+            dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
+        )
+        found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        size = np.hypot(*(self.error(n) for n in NED[:2]))
+        return self._score("horizontal", "m", size, self._plane(size)), *found
 
     def score(self, quantity: str) -> Score:
         """That of one quantity."""
         return next(s for s in self.scores if s.quantity == quantity)
+
+    def _plane(self, size: Array) -> Array:
+        """Reach of the ellipse of 95 % in the direction of the horizontal error, (n,), m.
+
+        The error is within it if and only if it is within the ellipse.
+        """
+        largest = np.linalg.eigvalsh(self.comparison.covariance[:, :2, :2])[:, 1]
+        reach = PLANE_95 * np.sqrt(np.maximum(largest, 0.0))
+        if "horizontal" not in self.comparison.nees:
+            return np.asarray(reach)
+        length = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(length > 0.0, PLANE_95 * size / length, reach))
 
     def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
         worst = int(np.argmax(np.abs(error)))
@@ -129,75 +140,13 @@ def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
     Raises
     ------
     DataError
-        As `trajectory_differences`: the truth has no instant in common with the run.
+        As `truth_comparison.compare_with_truth`: they have no instant in common.
     """
     if told.truth is None:
         return None
     record = told.record
-    rows, marks = _samples_of_marks(record)
-    errors = trajectory_differences(record.trajectory.iloc[rows], told.truth, told.ellipsoid)
-    kept = np.isin(record.trajectory.index.to_numpy()[rows], errors.index.to_numpy())
-    P, sd = record.covariance[marks[kept]], record.sd.to_numpy(dtype=np.float64)[marks[kept]]
-    found = np.column_stack(
-        [
-            errors[[*NED, *VELOCITY]].to_numpy(dtype=np.float64),
-            np.radians(errors[ROTATION_ERROR].to_numpy(dtype=np.float64)),
-        ]
-    )
-    nees, freedom = normalised_squares(found, P)
     return NavigationErrors(
-        errors,
-        sd,
-        _along(found[:, :2], P[:, :2, :2]),
-        nees,
-        freedom,
-        tuple(errors.attrs["findings"]),
+        compare_with_truth(
+            record.trajectory, record.sd.index, record.covariance, told.truth, told.ellipsoid
+        )
     )
-
-
-def _samples_of_marks(record: NavigationRecord) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of the trajectory at or after a mark, and the last mark before each."""
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
-    at = np.searchsorted(time, record.sd.index.to_numpy(dtype=np.float64) - 1e-9)
-    marks = np.flatnonzero(at < len(time))
-    # Of several marks within one step the last counts.
-    last = np.append(np.diff(at[marks]) > 0, True)[: len(marks)]
-    return at[marks][last], marks[last]
-
-
-def normalised_squares(errors: Array, P: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Errors squared by the inverse of their covariance, over what is not known for certain.
-
-    Parameters
-    ----------
-    errors : ndarray, (n, m)
-    P : ndarray, (n, m, m)
-
-    Returns
-    -------
-    squares : ndarray, (n,)
-        ``e' P^-1 e``, or with the pseudoinverse where P is singular.
-    freedom : ndarray of int, (n,)
-    """
-    sd = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), 0.0))
-    scale = np.where(sd > 0.0, sd, 1.0)
-    unit = P / (scale[:, :, None] * scale[:, None, :])
-    values, vectors = np.linalg.eigh(unit)
-    whole = values > _KNOWN
-    along = np.einsum("nji,nj->ni", vectors, errors / scale)
-    squares = np.where(whole, np.square(along) / np.where(whole, values, 1.0), 0.0)
-    return squares.sum(axis=1), whole.sum(axis=1)
-
-
-def _along(errors: Array, P: Array) -> Array:
-    """Reach of an ellipse of one standard deviation in the direction of an error, (n,).
-
-    An error is as many of these as its normalised length, so that comparing it with this is to
-    ask whether it lies in the ellipse.
-    """
-    size = np.hypot(*errors.T)
-    squares, _ = normalised_squares(errors, P)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = size / np.sqrt(squares)
-    largest = np.sqrt(np.maximum(np.linalg.eigvalsh(P)[:, -1], 0.0))
-    return np.asarray(np.where(squares > 0.0, reach, largest))

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.nees import bounds
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, VERMILLION, Chart, Level, Line, Panel
-from strapdown.report.navigation_agreement import Agreement, chi_square_band, chi_square_far
+from strapdown.report.navigation_agreement import Agreement, chi_square_far
 from strapdown.report.navigation_charts import over_time
 from strapdown.report.navigation_thinning import BUCKETS, broken, kept_rows, thin_fill
 
@@ -97,7 +98,7 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
     for k, one in enumerate(found):
         if not one.used.any():
             continue
-        low, high = chi_square_band(one.freedom)
+        low, high = bounds(one.freedom)
         nis = np.maximum(one.nis, _LEAST)
         colour = AXIS_COLOURS[(2 + k) % 3]
         step = max(1, one.epochs // _POINTS)

@@ -148,8 +148,8 @@ def _against(found: NavigationFound) -> dict[str, Any] | None:
         "instants": len(errors.time),
         "from_s": float(errors.time[0]),
         "to_s": float(errors.time[-1]),
-        "mean_nees": _number(errors.nees.mean()),
-        "nees_of": int(errors.freedom.max()),
+        "mean_nees": _number(errors.nees.mean()) if errors.freedom else None,
+        "nees_of": errors.freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
     }
 
@@ -205,6 +205,10 @@ def _innovations(one: Agreement) -> dict[str, Any]:
         "mean_nis_expected_95": [_number(x) for x in one.band],
         "correlation_next_epoch": _number(one.correlation),
         "correlation_by_chance_95": _number(one.correlation_bound),
+        "verdicts": [
+            {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.what}
+            for v in one.consistency.verdicts
+        ],
         "rms": {label: _number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)},
     }
 

@@ -280,10 +280,11 @@ def _ellipses(plane: _Plane, view: View) -> tuple[list[Line], str, list[tuple[in
     out = []
     count = len(along)
     times = f"{factor:,.0f}".replace(",", GAP)
+    named = "" if factor == 1.0 else f" × {times}"
     drawn = "" if factor == 1.0 else f", drawn {times} times as large"
     for name, colour, part in (
-        (f"95{GAP}% ellipse{drawn}", BLUE, slice(0, count)),
-        (f"95{GAP}% ellipse at the end of an outage{drawn}", VERMILLION, slice(count, None)),
+        (f"95{GAP}% ellipse{named}", BLUE, slice(0, count)),
+        (f"95{GAP}% ellipse{named} at the end of an outage", VERMILLION, slice(count, None)),
     ):
         if not rows[part]:
             continue
@@ -364,11 +365,11 @@ def _scale(view: View, path: tuple[Array, Array], unit: str) -> list[Line]:
     up = _ARROW * view.width
     inset = 0.01 * view.width
     left = view.low[0] + inset if not best[0] else view.high[0] - inset - length
-    low = view.low[1] + inset if not best[1] else view.high[1] - inset - 1.9 * up
+    low = view.low[1] + inset if not best[1] else view.high[1] - inset - 2.3 * up
     tick = 0.12 * up
     bar_x = np.array([left, left, left, left + length, left + length, left + length])
     bar_y = low + tick * np.array([1.0, -1.0, 0.0, 0.0, 1.0, -1.0])
-    x, foot = left + 0.5 * length, low + 0.85 * up
+    x, foot = left + 0.5 * length, low + 1.15 * up
     arrow_x = x + up * np.array([0.0, 0.0, -0.18, 0.0, 0.18])
     arrow_y = foot + up * np.array([0.0, 0.8, 0.5, 0.8, 0.5])
     words = f"{length:g}{GAP}{unit}"

@@ -52,11 +52,13 @@ def strip(record: NavigationRecord) -> Panel | None:
     """Modes and aids in rows; None where there is neither."""
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     begins = [float(time[0]), *(m.begin for m in record.modes)]
-    ends = [float(time[-1]), *(m.end for m in record.modes)]
-    whole = Span("", min(begins), max(ends))
+    finishes = [float(time[-1]), *(m.end for m in record.modes)]
+    whole = Span("", min(begins), max(finishes))
     rows: list[str] = []
     fills: list[Fill] = []
-    lines: list[Line] = []
+    # From end to end, whatever stands in the rows.
+    ends = np.array([whole.begin, whole.end])
+    lines = [Line("", ends, np.full(2, np.nan), GREY, points=True, size=0.0, legend=False)]
     if record.modes:
         rows.append("mode")
         fills += _modes(record.modes)

@@ -51,6 +51,8 @@ def figure(chart: Chart) -> dict[str, Any]:
         "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
         "height": _height(chart),
         "hovermode": "closest" if chart.log_x or planes else "x unified",
+        # No letters of thousands: what stands on an axis may be a stamp.
+        "separators": ".",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
         "shapes": [],
         "annotations": [],

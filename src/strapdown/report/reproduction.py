@@ -17,6 +17,7 @@ from strapdown.report.reproduction_charts import chart
 from strapdown.report.svg_chart import draw
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.reproduce_alexiev import reproduce_alexiev
+from strapdown.systems.reproduce_chernodarov import reproduce_chernodarov
 from strapdown.systems.reproduce_tadic import reproduce_tadic
 from strapdown.systems.reproduction import (
     VERDICTS,
@@ -41,6 +42,7 @@ __all__ = [
 REPRODUCTIONS: dict[str, Callable[[Progress], Reproduction]] = {
     "alexiev": reproduce_alexiev,
     "tadic": reproduce_tadic,
+    "chernodarov": reproduce_chernodarov,
 }
 
 

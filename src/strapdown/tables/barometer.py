@@ -125,7 +125,7 @@ def barometer_from_pressure(
         row = int(wrong[0])
         middle = float(np.median(p))
         remedy = "give the static pressure of the air in Pa, below 11 km of height"
-        for unit, factor in (("hPa (mbar)", 100.0), ("kPa", 1000.0), ("mmHg", 133.322)):
+        for unit, factor in (("hPa (mbar)", 100.0), ("kPa", 1000.0)):
             if LEAST_PRESSURE <= factor * middle <= MOST_PRESSURE:
                 remedy = f"this looks like {unit}: multiply by {factor:g}"
                 break

@@ -132,7 +132,8 @@ def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Ar
         return site, sd
     antenna = np.array([site.lat_deg, site.lon_deg, site.alt])
     place = geodetic_from_ned(-rotate(q_nb, arm), antenna, ellipsoid=ellipsoid)
-    return Site(*place.tolist(), ellipsoid), sd
+    lat_deg, lon_deg, alt = place.tolist()
+    return Site(lat_deg, lon_deg, alt, ellipsoid), sd
 
 
 def _lever_arm(chain: Chain) -> Array:

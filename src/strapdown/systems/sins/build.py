@@ -62,15 +62,13 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
     if spec.prefilter.kind != "none":
         prefilter = make_choice(spec.prefilter, SLOTS["prefilter"], given)
     gaps = spec.gaps
-    site, more = None, {}
+    site, site_sd, velocity_sd = None, (1.0, 1.0, 1.0), (0.1, 0.1, 0.1)
     if spec.site is not None:
         site = Site(
             spec.site.lat_deg, spec.site.lon_deg, spec.site.alt_m, find_ellipsoid(spec.ellipsoid)
         )
-        more = {
-            "site_sd": _three(spec.site.position_sd_m),
-            "velocity_sd": _three(spec.site.velocity_sd_m_per_s),
-        }
+        site_sd = _three(spec.site.position_sd_m)
+        velocity_sd = _three(spec.site.velocity_sd_m_per_s)
     return Chain(
         navigator=navigator,
         intake=Intake(prefilter=prefilter, gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond)),
@@ -79,7 +77,8 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
         sensors=sensors,
         site=site,
         commands=tuple(Command(one.time_s, one.mode) for one in spec.commands),
-        **more,
+        site_sd=site_sd,
+        velocity_sd=velocity_sd,
     )
 
 

@@ -142,7 +142,7 @@ class Deliveries:
             if at > state.begun:
                 late[name] = _more(late.get(name), at, 0.0)
         for one in piece.seen:
-            name = one.name.split(".")[0]
+            name = one.name.rpartition(".")[0]
             if name in late:
                 events.append(_late(name, late.pop(name)))
             if not one.innovations.weight.any():

@@ -234,11 +234,13 @@ class Intake:
         last: bool,
     ) -> tuple[IntakeState, Steps]:
         """Make the increments."""
-        if self.prefilter is not None and state.filtering is not None:
+        if self.prefilter is not None:
+            before = state.filtering
+            assert before is not None
             if len(time) and state.stream is None and not state.own and state.first is None:
                 state = replace(state, first=(float(time[0]), values[0].copy()))
             filtering, out = Filtering(self.prefilter).advance(
-                state.filtering, time, values, last, state.source
+                before, time, values, last, state.source
             )
             state = replace(state, filtering=filtering)
             time, values = out.time, out.values

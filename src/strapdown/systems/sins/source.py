@@ -13,7 +13,7 @@ import pandas as pd
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import Finding
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.results import InputFiles, Reading
@@ -22,6 +22,7 @@ from strapdown.sensors.error_draws import child
 from strapdown.simulation import simulate_imu
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.attitude_source import input_files, sensor_file
+from strapdown.systems.sins.aid_files import read_aid
 from strapdown.systems.sins.simulated_fixes import simulated_fixes
 from strapdown.systems.trajectory_source import make_motion, with_key
 
@@ -84,12 +85,13 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     """
     tables: dict[str, pd.DataFrame] = {}
     inputs: list[InputFiles] = []
+    findings: list[Finding] = []
     for name, aid in aids_of(spec).items():
         if aid.path is not None:
-            tables[name] = read_gnss(aid.path)
-            inputs.append(input_files(name, aid.path, (Path(aid.path),)))
+            tables[name] = read_aid(aid)
+            findings += tables[name].attrs.get("findings", ())
+            inputs.append(input_files(f"aid-{name}", aid.path, (Path(aid.path),)))
     truth = None
-    findings: list[Finding] = []
     if spec.truth is not None:
         truth = read_trajectory(spec.truth.path)
         findings += truth.attrs["findings"]
@@ -98,6 +100,9 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     if spec.log is None:
         return _simulated(spec, tables, truth, inputs, findings)
     recording, imu, of_log = body_record(spec.log, spec.axes)
+    for name, table in tables.items():
+        tables[name], shifted = on_clock_of(table, recording.imu)
+        findings += [] if shifted is None else [shifted]
     return NavigationSource(
         name=recording.name,
         what="recorded log",
