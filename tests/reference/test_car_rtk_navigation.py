@@ -16,7 +16,7 @@ recording's description says and what its rest shows, and not from the scores:
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -129,7 +129,8 @@ def begun(drive, clock, *more):
     )
     # The rest need not be where the car stands level, nor the unit point forward.
     angles = np.array([4.0, 4.0, 10.0]) * DEG
-    sd = np.r_[[0.1] * 3, [0.2] * 3, angles, navigator.filter.model.stacked.sd]
+    # The place is that of an instant that is known to 0.1 s, at 10 m/s.
+    sd = np.r_[[1.0] * 3, [0.3] * 3, angles, navigator.filter.model.stacked.sd]
     gnss = drive.gnss[stamps > instant + 0.5]
     return navigator, navigator.begin(start, np.diag(sd**2)), at, gnss
 
@@ -167,8 +168,19 @@ def test_the_filter_finds_what_is_known_of_the_recording(drive, clock):
     state, piece = navigator.advance(state, drive.time[at:], drive.rows[at:])
     last = piece.marks[-1]
     place = navigator.filter.model.columns_of
-    offset = clock[1].offset - last.sensors[place["rtk.time_offset"].start - 9]
-    assert -0.16 < offset < -0.11
+    k = place["rtk.time_offset"].start - 9
+    # Inertial stamps are late by 0.12 to 0.15 s, and drift.
+    settled = [m for m in piece.marks if m.time > drive.time[0] + SETTLED]
+    offsets = [clock[1].offset - m.sensors[k] for m in settled]
+    assert -0.16 < np.median(offsets) < -0.12
+    assert np.ptp(offsets) < 0.04
+    # The same is found from another nominal value, as far as it says.
+    other = replace(clock[1], offset=clock[1].offset + 0.05)
+    navigator, state, at, gnss = begun(drive, (clock[0], other), NO_SLIP)
+    state = navigator.tell(state, "rtk", gnss)
+    again = navigator.advance(state, drive.time[at:], drive.rows[at:])[1].marks[-1]
+    found = other.offset - again.sensors[k]
+    assert found == pytest.approx(offsets[-1], abs=3.0 * again.sensors_sd[k])
     # The yaw of the unit is 5.35 deg, as the description has it: heading less course, straight on.
     row = piece.history[piece.time < drive.time[0] + 170.0][-1]
     heading = rotation.euler_from_quaternion(row[None, 6:10])[0, 2]
@@ -186,16 +198,17 @@ def test_the_filter_finds_what_is_known_of_the_recording(drive, clock):
 
 # Median and worst largest horizontal error of five places in m. Another navigator's on this
 # recording, at five places of its own: 2.8 (8.3), 40 (62), 214 (484), and with the constraint
-# 1.3 (2.6), 4.9 (7.5), 20 (58). Measured here: 1.5 (1.9), 33 (35), 214 (562); 1.2 (1.3), 9 (12),
-# 13 (45). What is asserted leaves a fifth for other places of the spans.
+# 1.3 (2.6), 4.9 (7.5), 20 (58). Measured here: 1.1 (1.4), 25 (32), 223 (571), and 0.95 (1.3),
+# 7.5 (13), 10 (44): nearly all of it along the way, where no constraint holds, by the pitch that
+# the shaking gyro leaves unknown. What is asserted is theirs, or a fifth more than measured.
 @pytest.mark.parametrize(
     ("length", "more", "median", "worst"),
     [
         (10.0, (), 2.8, 8.3),
         (30.0, (), 40.0, 62.0),
         (60.0, (), 260.0, 680.0),
-        (10.0, (NO_SLIP,), 1.5, 2.6),
-        (30.0, (NO_SLIP,), 11.0, 15.0),
+        (10.0, (NO_SLIP,), 1.3, 2.6),
+        (30.0, (NO_SLIP,), 9.0, 15.0),
         (60.0, (NO_SLIP,), 20.0, 58.0),
     ],
     ids=lambda value: f"{value:g}" if isinstance(value, float) else f"{len(value)} more",
@@ -204,7 +217,6 @@ def test_withheld_fixes_are_met_and_errors_within_their_bounds(
     drive, clock, length, more, median, worst
 ):
     table = scores(drive, clock, length, *more)
-    print(length, len(more), table)
     assert table["error"].median() < median
     assert table["error"].max() < worst
     # One of 20 is outside a bound of 95 %; of five, two are with a probability of 2 %.
