@@ -22,7 +22,7 @@ def undrawn(monkeypatch):
     import strapdown.report.alignment as module
 
     monkeypatch.setattr(module, "draw_stills", lambda document: [])
-    monkeypatch.setattr(module, "alignment_charts", lambda document: [])
+    monkeypatch.setattr(module, "write_drawings", lambda document, stills, folder: None)
     monkeypatch.setattr(module, "document_page", lambda document, stills: "<html></html>")
 
 

@@ -8,36 +8,57 @@ from strapdown._kernels.rotation_vector import cross
 
 
 @njit(cache=True, error_model="numpy")
-def compensate(rows, gyro, accel, states, out):
-    """Fill increments without the errors that `states` of couplings (7, 3, k) put into them.
+def errors_of_states(terms, states, out):
+    """Fill (7, 3): what states of couplings, given by their terms, add to a triad's readings."""
+    out[:, :] = 0.0
+    for e in range(terms.shape[0]):
+        m, axis, j = int(terms[e, 0]), int(terms[e, 1]), int(terms[e, 2])
+        out[m, axis] += terms[e, 3] * states[j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def reading(errors, varies, rate, force):
+    """Error of a triad: its constant part, and what rate and force add."""
+    x, y, z = errors[0, 0], errors[0, 1], errors[0, 2]
+    if varies:
+        for m in range(3):
+            a, b = rate[m], force[m]
+            x += a * errors[1 + m, 0] + b * errors[4 + m, 0]
+            y += a * errors[1 + m, 1] + b * errors[4 + m, 1]
+            z += a * errors[1 + m, 2] + b * errors[4 + m, 2]
+    return x, y, z
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def changes(errors):
+    """Whether a triad's error depends on rate or force."""
+    for m in range(1, 7):
+        if errors[m, 0] != 0.0 or errors[m, 1] != 0.0 or errors[m, 2] != 0.0:
+            return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def compensate(rows, gyro, accel, out):
+    """Fill increments without errors (7, 3) of gyros and accelerometers (`errors_of_states`).
 
     To first order in the errors: over a step the body turns by phi, so that a constant error of
     force e adds ``(e + phi x e / 2) dt`` to the velocity in the axes of the start, and one of rate
     d turns it by half of what it turns the body.
     """
-    k = states.size
+    of_gyros, of_accels = changes(gyro), changes(accel)
     for i in range(rows.shape[0]):
         dt = rows[i, 0]
         px, py, pz = rows[i, 1], rows[i, 2], rows[i, 3]
         ux, uy, uz = rows[i, 4], rows[i, 5], rows[i, 6]
-        # The force that the sensors measured, without the turn of the body.
-        tx, ty, tz = cross(px, py, pz, ux, uy, uz)
-        force = (ux - 0.5 * tx, uy - 0.5 * ty, uz - 0.5 * tz)
-        dx = dy = dz = ex = ey = ez = 0.0
-        for m in range(7):
-            weight = 1.0
-            if m > 3:
-                weight = force[m - 4] / dt
-            elif m > 0:
-                weight = rows[i, m] / dt
-            for j in range(k):
-                part = weight * states[j]
-                dx += part * gyro[m, 0, j]
-                dy += part * gyro[m, 1, j]
-                dz += part * gyro[m, 2, j]
-                ex += part * accel[m, 0, j]
-                ey += part * accel[m, 1, j]
-                ez += part * accel[m, 2, j]
+        rate, force = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if of_gyros or of_accels:
+            # The force that the sensors measured, without the turn of the body.
+            tx, ty, tz = cross(px, py, pz, ux, uy, uz)
+            rate = (px / dt, py / dt, pz / dt)
+            force = ((ux - 0.5 * tx) / dt, (uy - 0.5 * ty) / dt, (uz - 0.5 * tz) / dt)
+        dx, dy, dz = reading(gyro, of_gyros, rate, force)
+        ex, ey, ez = reading(accel, of_accels, rate, force)
         dx, dy, dz = dx * dt, dy * dt, dz * dt
         ex, ey, ez = ex * dt, ey * dt, ez * dt
         tx, ty, tz = cross(px, py, pz, ex, ey, ez)

@@ -15,11 +15,13 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
+from strapdown._kernels.growth import CORE, compose_growth, growth_of_step
 from strapdown._kernels.level import ALT, AXIS, OMEGA_EL, Q_LB, curvatures
 from strapdown._kernels.rotation import dcm_from_quat
 from strapdown._kernels.rotation_vector import cross
 
-CORE = 9
+# Vertical displacement and velocity, a bit each: nothing moves them where the height is held.
+HELD_ROWS = (1 << 2) | (1 << 5)
 # Below this cosine of the latitude there is no direction to the north, and no slope along it.
 NO_MERIDIAN = 1e-9
 
@@ -74,27 +76,26 @@ def gravity_gradient(f, row, column, level, up, earth):
 
 
 @njit(cache=True, error_model="numpy")
-def couple(f, row, matrix, coupling, rate, force):
-    """Set the sensors' columns of three rows to ``matrix @ coupling(rate, force)``."""
-    k = coupling.shape[2]
-    for j in range(k):
-        b0 = b1 = b2 = 0.0
-        for i in range(7):
-            weight = 1.0
-            if i > 3:
-                weight = force[i - 4]
-            elif i > 0:
-                weight = rate[i - 1]
-            b0 += weight * coupling[i, 0, j]
-            b1 += weight * coupling[i, 1, j]
-            b2 += weight * coupling[i, 2, j]
+def couple(f, row, matrix, terms, rate, force):
+    """Add to the sensors' columns of three rows ``matrix @ coupling(rate, force)``.
+
+    `terms` lists what is not zero of a coupling: factor (0 none, 1 to 3 rate, 4 to 6 force), axis,
+    state, value.
+    """
+    for e in range(terms.shape[0]):
+        m, axis, j = int(terms[e, 0]), int(terms[e, 1]), CORE + int(terms[e, 2])
+        weight = terms[e, 3]
+        if m > 3:
+            weight *= force[m - 4]
+        elif m > 0:
+            weight *= rate[m - 1]
         for i in range(3):
-            f[row + i, CORE + j] = matrix[i, 0] * b0 + matrix[i, 1] * b1 + matrix[i, 2] * b2
+            f[row + i, j] += weight * matrix[i, axis]
 
 
 @njit(cache=True, error_model="numpy")
 def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held, earth):
-    """Fill the first nine rows of F, (9, 9 + k).
+    """Fill the first nine rows of F, (9, w).
 
     `matrix` is C_lb and `specific` C_lb f, both means; `rate` and `force` are those of the body.
     With a height that is held nothing moves vertically.
@@ -123,122 +124,10 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
 
 
 @njit(cache=True, error_model="numpy")
-def exponential(f, decay, dt, phi, work):
-    """Fill ``phi = exp(F dt)`` to third order in its first nine rows; `decay` is exact.
-
-    Third order, because drift reaches the place through tilt and velocity.
-    """
-    n = f.shape[1]
-    for i in range(n):
-        for j in range(n):
-            phi[i, j] = 1.0 if i == j else 0.0
-    # Of Horner's scheme 1 + F dt (1 + F dt/2 (1 + F dt/3)) the inner brackets. Rows are added to
-    # rows, which a processor does several numbers at a time.
-    for order in range(3, 0, -1):
-        part = dt / order
-        for i in range(CORE):
-            for j in range(CORE):
-                work[i, j] = 0.0
-            for j in range(CORE, n):
-                work[i, j] = part * f[i, j] * phi[j, j]
-            for m in range(CORE):
-                weight = part * f[i, m]
-                if weight != 0.0:
-                    for j in range(n):
-                        work[i, j] += weight * phi[m, j]
-        for i in range(CORE):
-            for j in range(n):
-                phi[i, j] = work[i, j]
-            phi[i, i] += 1.0
-        for j in range(CORE, n):
-            phi[j, j] = 1.0 - part * decay[j - CORE] * phi[j, j]
-    for j in range(CORE, n):
-        phi[j, j] = math.exp(-decay[j - CORE] * dt)
-
-
-@njit(cache=True, error_model="numpy")
-def compose_transition(step, added, phi, q, work):
-    """Let a step follow: ``phi <- step phi`` and ``q <- step q step' + added``.
-
-    Below its first nine rows `step` is diagonal.
-    """
-    n = phi.shape[0]
-    for i in range(CORE):
-        for j in range(n):
-            work[i, j] = 0.0
-        for m in range(n):
-            weight = step[i, m]
-            if weight != 0.0:
-                for j in range(n):
-                    work[i, j] += weight * phi[m, j]
-    for i in range(CORE):
-        for j in range(n):
-            phi[i, j] = work[i, j]
-    for i in range(CORE, n):
-        for j in range(n):
-            phi[i, j] *= step[i, i]
-            work[i, j] = step[i, i] * q[i, j]
-    for i in range(CORE):
-        for j in range(n):
-            work[i, j] = 0.0
-        for m in range(n):
-            weight = step[i, m]
-            if weight != 0.0:
-                for j in range(n):
-                    work[i, j] += weight * q[m, j]
-    for i in range(n):
-        for j in range(i, n):
-            total = added[i, j]
-            if j < CORE:
-                for m in range(n):
-                    total += work[i, m] * step[j, m]
-            else:
-                total += work[i, j] * step[j, j]
-            q[i, j] = total
-    for i in range(n):
-        for j in range(i):
-            q[i, j] = q[j, i]
-
-
-@njit(cache=True, error_model="numpy")
-def noise_of_step(f, matrix, dt, gyro_noise, accel_noise, decay, drive, held, added, gamma, lift):
-    """Fill the covariance that white noise adds over a step.
-
-    The noise enters at the middle of the step, ``exp(F dt/2) G q G' exp(F dt/2)' dt``, which holds
-    its correlations to second order and is positive semidefinite; `gamma` (n, 6 + k) and `lift`
-    (n, n) are room to work in.
-    """
-    n = f.shape[1]
-    k = n - CORE
-    exponential(f, decay, 0.5 * dt, lift, added)
-    gamma[:, :] = 0.0
-    root = math.sqrt(dt)
-    for i in range(n):
-        for j in range(3):
-            a = g = 0.0
-            if i < CORE:
-                for m in range(3):
-                    a += lift[i, 3 + m] * matrix[m, j]
-                    g += lift[i, 6 + m] * matrix[m, j]
-            gamma[i, j] = root * accel_noise[j] * a
-            gamma[i, 3 + j] = root * gyro_noise[j] * g
-        for j in range(k):
-            if i < CORE or i == CORE + j:
-                gamma[i, 6 + j] = root * drive[j] * lift[i, CORE + j]
-    if held:
-        gamma[2, :] = 0.0
-        gamma[5, :] = 0.0
-    for i in range(n):
-        for j in range(i, n):
-            total = 0.0
-            for m in range(6 + k):
-                total += gamma[i, m] * gamma[j, m]
-            added[i, j] = added[j, i] = total
-
-
-@njit(cache=True, error_model="numpy")
-def means_of_steps(levels, rows, at, longest, matrix):
+def means_of_steps(states, q_at, rows, at, longest, matrix):
     """Fill `matrix` (6, 3) with means over the steps from `at` on, up to `longest` seconds.
+
+    `states` hold the quaternion q_lb of each side of the steps from column `q_at` on.
 
     Rows 0 to 2: C_lb; row 3: C_lb f; rows 4 and 5: rate and force of the body. Returns the first
     step that is not among them, and their time.
@@ -249,19 +138,13 @@ def means_of_steps(levels, rows, at, longest, matrix):
     count = rows.shape[0]
     while end < count and (end == at or dt + rows[end, 0] <= longest * 1.000001):
         h = rows[end, 0]
-        a, b = levels[end], levels[end + 1]
+        a, b = states[end, q_at : q_at + 4], states[end + 1, q_at : q_at + 4]
         # Between the two ends; the sign of a quaternion is not its own.
         sign = 1.0
-        if (
-            a[Q_LB] * b[Q_LB]
-            + a[Q_LB + 1] * b[Q_LB + 1]
-            + a[Q_LB + 2] * b[Q_LB + 2]
-            + a[Q_LB + 3] * b[Q_LB + 3]
-            < 0.0
-        ):
+        if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] < 0.0:
             sign = -1.0
-        qw, qx = a[Q_LB] + sign * b[Q_LB], a[Q_LB + 1] + sign * b[Q_LB + 1]
-        qy, qz = a[Q_LB + 2] + sign * b[Q_LB + 2], a[Q_LB + 3] + sign * b[Q_LB + 3]
+        qw, qx = a[0] + sign * b[0], a[1] + sign * b[1]
+        qy, qz = a[2] + sign * b[2], a[3] + sign * b[3]
         norm = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
         c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
         # Velocity increments are in the axes of the start of their step: to those of its middle.
@@ -304,15 +187,18 @@ def psi_transitions(
     q,
     f,
     step,
+    tail,
     added,
-    gamma,
+    room,
     work,
     matrix,
 ):
     """Fill the transition and the covariance of noise over increments `rows`.
 
     `levels` are level rows at both sides of every step; steps are taken together up to `longest`
-    seconds, with the means of attitude, force and rate over them. The rest is room to work in.
+    seconds, with the means of attitude, force and rate over them. `gyro` and `accel` are terms of
+    couplings (`couple`). The rest is room to work in: `f` and `step` (9, w), `tail` (k,), `added`
+    (rows, w), `room` (51, w), `work` (n, n), `matrix` (6, 3).
     """
     n = phi.shape[0]
     for i in range(n):
@@ -321,16 +207,16 @@ def psi_transitions(
             q[i, j] = 0.0
     at = 0
     count = rows.shape[0]
+    still = HELD_ROWS if held else 0
     while at < count:
-        end, dt = means_of_steps(levels, rows, at, longest, matrix)
+        end, dt = means_of_steps(levels, Q_LB, rows, at, longest, matrix)
         # The level row of the middle; attitude and force are means already.
         middle = levels[(at + end) // 2]
         psi_dynamics(
             f, middle, up, matrix, matrix[3], matrix[4], matrix[5], gyro, accel, held, earth
         )
-        noise_of_step(
-            f, matrix, dt, gyro_noise, accel_noise, decay, drive, held, added, gamma, step
+        growth_of_step(
+            f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, step, tail, added, room
         )
-        exponential(f, decay, dt, step, work)
-        compose_transition(step, added, phi, q, work)
+        compose_growth(step, tail, added, phi, q, work)
         at = end

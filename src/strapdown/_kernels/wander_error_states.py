@@ -7,10 +7,11 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import E2, A
+from strapdown._kernels.growth import CORE
 from strapdown._kernels.level import ALT, AXIS, V_L, curvatures
 from strapdown._kernels.rotation import quat_multiply
 from strapdown._kernels.wander import Q_EW, Q_WB, four, put
-from strapdown._kernels.wander_errors import CORE, DV, EPS, THETA
+from strapdown._kernels.wander_errors import DV, EPS, THETA
 
 #: Places of the states: velocity, components of q_ib, components of q_ew; and of the variables
 #: that are nothing physical, after the core: the norms.

@@ -25,17 +25,11 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_parts, radii
-from strapdown._kernels.level import ALT, AXIS, LEVEL, OMEGA_EL, V_L, curvatures
-from strapdown._kernels.psi_model import (
-    compose_transition,
-    couple,
-    exponential,
-    means_of_steps,
-    minus_cross,
-    noise_of_step,
-)
+from strapdown._kernels.growth import compose_growth, growth_of_step
+from strapdown._kernels.level import ALT, AXIS, LEVEL, OMEGA_EL, Q_LB, V_L, curvatures
+from strapdown._kernels.psi_model import couple, means_of_steps, minus_cross
 
-THETA, DV, EPS, CORE = 0, 3, 6, 9
+THETA, DV, EPS = 0, 3, 6
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -172,15 +166,16 @@ def wander_transitions(
     q,
     f,
     step,
+    tail,
     added,
-    gamma,
+    room,
     work,
     matrix,
     level,
 ):
     """Fill the transition and the covariance of noise, as `psi_model.psi_transitions`.
 
-    `matrix` (15, 3) and `level` (one row) are room to work in, too.
+    `gyro` and `accel` are terms; `matrix` (15, 3) and `level` (one row) are room to work in, too.
     """
     n = phi.shape[0]
     for i in range(n):
@@ -191,7 +186,7 @@ def wander_transitions(
         phi[DV + 2, DV + 2] = 0.0
     at = 0
     while at < rows.shape[0]:
-        end, dt = means_of_steps(levels, rows, at, longest, matrix[:6])
+        end, dt = means_of_steps(levels, Q_LB, rows, at, longest, matrix[:6])
         for j in range(LEVEL):
             level[j] = 0.5 * (levels[at, j] + levels[end, j])
         wander_dynamics(
@@ -209,12 +204,11 @@ def wander_transitions(
             matrix[9:12],
             matrix[12:15],
         )
-        noise_of_step(
-            f, matrix, dt, gyro_noise, accel_noise, decay, drive, False, added, gamma, step
+        growth_of_step(
+            f, decay, dt, matrix, gyro_noise, accel_noise, drive, 0, step, tail, added, room
         )
         if held:
             for j in range(n):
                 added[DV + 2, j] = added[j, DV + 2] = 0.0
-        exponential(f, decay, dt, step, work)
-        compose_transition(step, added, phi, q, work)
+        compose_growth(step, tail, added, phi, q, work)
         at = end

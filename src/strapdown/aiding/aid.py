@@ -60,6 +60,18 @@ class Aid(ABC):
         """States that it needs beside those of the inertial sensors, named ``name.block``."""
         return ()
 
+    @abstractmethod
+    def observe(self, view: View, values: Array) -> list[Observation]:
+        """Return what it observes at one of its epochs; nothing, where it tells nothing.
+
+        Parameters
+        ----------
+        view : View
+            Of the navigator at the instant of the epoch.
+        values : ndarray, (m,)
+            Row of `Epochs.values`.
+        """
+
 
 @dataclass(frozen=True)
 class TableAid(Aid):
@@ -83,18 +95,6 @@ class TableAid(Aid):
             The table is not valid; file, row, quantity and remedy are named.
         """
 
-    @abstractmethod
-    def observe(self, view: View, values: Array) -> list[Observation]:
-        """Return what it observes at one of its epochs.
-
-        Parameters
-        ----------
-        view : View
-            Of the navigator at the instant of the epoch.
-        values : ndarray, (m,)
-            Row of `Epochs.values`.
-        """
-
 
 @dataclass(frozen=True)
 class WatchingAid(Aid):
@@ -105,7 +105,7 @@ class WatchingAid(Aid):
         """Return what it remembers before the first sample; never changed in place."""
 
     @abstractmethod
-    def watch(self, memory: Any, time: Array, rows: Array) -> tuple[Any, NDArray[np.bool_]]:
+    def watch(self, memory: Any, time: Array, rows: Array) -> tuple[Any, Epochs]:
         """Look at samples: pieces of any length give the same as the whole.
 
         Parameters
@@ -119,10 +119,6 @@ class WatchingAid(Aid):
         Returns
         -------
         memory : object
-        epochs : ndarray of bool, (k,)
-            Where it observes: at the ends of these steps.
+        epochs : Epochs
+            Where it observes: at the ends of some of these steps; and what it saw up to there.
         """
-
-    @abstractmethod
-    def observe(self, view: View) -> list[Observation]:
-        """Return what it observes at one of its epochs."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -10,14 +11,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Epochs, TableAid
-from strapdown.aiding.view import DISPLACEMENT, ROTATION, VELOCITY, View
+from strapdown.aiding.antenna import Moving, arm_of, moving
+from strapdown.aiding.view import View
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.sensor_blocks import lever_arm, random_walk, time_offset
+from strapdown.estimation.sensor_states import SensorStates
+from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState
-from strapdown.rotation import cross_matrix
 from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, check_gnss
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import index_of, is_number, source_of, values_of
+from strapdown.tables.gnss import QUALITIES
 
 __all__ = ["Gnss"]
 
@@ -25,40 +30,169 @@ Array = NDArray[np.float64]
 
 #: What an epoch is of: the first of its values.
 POSITION_CODE, VELOCITY_CODE = 0.0, 1.0
+PLACE = ("north, m", "east, m", "down, m")
+SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
+#: Beyond this a time offset is a wrong clock, and no longer an arc of the second order, s.
+LARGEST_OFFSET = 2.0
+
+
+def _in(unit: str, default: float = 0.0) -> float:
+    made: float = field(default=default, metadata={"unit": unit})
+    return made
 
 
 @dataclass(frozen=True)
 class Gnss(TableAid):
     """A satellite receiver: places of its antenna, velocities, or both.
 
+    A time offset that is a state is met by the antenna's place, velocity and acceleration at the
+    epoch: what is left out is a sixth of its jerk times the offset's third power. Where a state
+    finds more than 0.1 s, begin again with what was found as `time_offset`.
+
     Attributes
     ----------
     lever_arm : tuple of float, (3,), m
         Of the antenna from the inertial sensors, body axes.
+    lever_arm_sd : float or tuple of float, (3,), m
+        How well it is known. Above zero it is estimated: states ``NAME.lever_arm``, assumed less
+        true.
+    time_offset : float, s
+        Stamps of the aid less the time of the inertial sensors: what is stamped t is of
+        ``t - time_offset``.
+    time_offset_sd : float, s
+        How well that is known. Above zero it is estimated: state ``NAME.time_offset``, assumed less
+        true.
+    time_offset_drift : float, s/√s
+        By which that state walks.
+    velocity_delay : float, s
+        The velocity is of an instant so much before that of the place of the same row: half of
+        the interval where it is a mean over the interval before.
+    use_position, use_velocity : bool
+    position_sd_factor, velocity_sd_factor : float
+        By which the stated standard deviations are multiplied.
+    least_position_sd, least_velocity_sd : float, m and m/s
+        No standard deviation is taken to be less.
+    qualities : tuple of int
+        Of which fixes are used, as NMEA 0183 GGA has them; 6 is what a receiver guesses without
+        satellites.
+
+    Raises
+    ------
+    ConfigError
+        An option is out of range.
     """
 
-    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lever_arm: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), metadata={"unit": "m"})
+    lever_arm_sd: float | tuple[float, float, float] = field(default=0.0, metadata={"unit": "m"})
+    time_offset: float = _in("s")
+    time_offset_sd: float = _in("s")
+    time_offset_drift: float = _in("s_per_sqrt_s")
+    velocity_delay: float = _in("s")
+    use_position: bool = True
+    use_velocity: bool = True
+    position_sd_factor: float = 1.0
+    velocity_sd_factor: float = 1.0
+    least_position_sd: float = _in("m")
+    least_velocity_sd: float = _in("m_per_s")
+    qualities: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 8)
 
     kind: ClassVar[str] = "gnss"
     summary: ClassVar[str] = "places and velocities of a satellite receiver"
-    source: ClassVar[str] = "Chernodarov (2009), Eqs. (19), (20)"
+    source: ClassVar[str] = (
+        "Groves (2013), secs. 14.3.1 and 14.3.2; Chernodarov (2009), Eqs. (19), (20)"
+    )
     columns: ClassVar[tuple[str, ...]] = tuple(GNSS)
+
+    def __post_init__(self) -> None:
+        arm = self.lever_arm
+        if len(arm) != 3 or not all(is_number(x) and math.isfinite(x) for x in arm):
+            raise ConfigError(
+                f"{arm!r} is no lever arm",
+                quantity="lever_arm",
+                remedy="give three numbers in m: forward, right, down from the inertial sensors",
+            )
+        for name, least, most in (
+            ("time_offset", -math.inf, math.inf),
+            ("time_offset_sd", 0.0, LARGEST_OFFSET),
+            ("time_offset_drift", 0.0, math.inf),
+            ("velocity_delay", 0.0, math.inf),
+            ("least_position_sd", 0.0, math.inf),
+            ("least_velocity_sd", 0.0, math.inf),
+            ("position_sd_factor", 1e-6, math.inf),
+            ("velocity_sd_factor", 1e-6, math.inf),
+        ):
+            value = getattr(self, name)
+            if not (is_number(value) and math.isfinite(value) and least <= value <= most):
+                raise ConfigError(
+                    f"{value!r} is out of range",
+                    quantity=name,
+                    remedy="give a finite number"
+                    + (f" from {least:g}" if math.isfinite(least) else "")
+                    + (f" to {most:g}" if math.isfinite(most) else ""),
+                )
+        if not (self.use_position or self.use_velocity):
+            raise ConfigError(
+                "neither places nor velocities are used",
+                quantity="use_position, use_velocity",
+                remedy="use one of them, or leave this aid out",
+            )
+        if not set(self.qualities) <= set(QUALITIES) - {0}:
+            raise ConfigError(
+                f"{self.qualities!r} are no qualities of fixes",
+                quantity="qualities",
+                remedy="choose from 1 to 8: indicators of NMEA 0183 GGA",
+            )
+        if self.time_offset_drift and not self.time_offset_sd:
+            raise ConfigError(
+                "a time offset walks that is not estimated",
+                quantity="time_offset_drift",
+                remedy="give time_offset_sd, too",
+            )
+        lever_arm(self.lever_arm_sd)
+
+    def states(self) -> tuple[SensorStates, ...]:
+        """Errors of the lever arm and of the time offset, where they are not known."""
+        out = []
+        if np.any(np.asarray(self.lever_arm_sd) > 0.0):
+            out.append(lever_arm(self.lever_arm_sd).named(self._arm))
+        if self.time_offset_sd > 0.0:
+            offset = time_offset(self.time_offset_sd).named(self._offset)
+            out.append(random_walk(offset, self.time_offset_drift))
+        return tuple(out)
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
         """Return an epoch for each place and for each velocity; see `TableAid.epochs`."""
         check_gnss(table)
-        time = index_of(table)
-        good = values_of(table, ["quality"])[:, 0] > 0.0
+        time = index_of(table) - self.time_offset
+        good = np.isin(values_of(table, ["quality"])[:, 0], self.qualities)
         times, rows = [], []
-        for code, columns, sds in (
-            (POSITION_CODE, GEODETIC, POSITION_SD),
-            (VELOCITY_CODE, VELOCITY_COLUMNS, VELOCITY_SD),
+        for code, used, columns, sds, delay, factor, least in (
+            (
+                POSITION_CODE,
+                self.use_position,
+                GEODETIC,
+                POSITION_SD,
+                0.0,
+                self.position_sd_factor,
+                self.least_position_sd,
+            ),
+            (
+                VELOCITY_CODE,
+                self.use_velocity,
+                VELOCITY_COLUMNS,
+                VELOCITY_SD,
+                self.velocity_delay,
+                self.velocity_sd_factor,
+                self.least_velocity_sd,
+            ),
         ):
             value, sd = values_of(table, columns), values_of(table, sds)
-            told = good & np.isfinite(sd).all(axis=1)
+            told = good & np.isfinite(sd).all(axis=1) & used
+            sd = np.maximum(factor * sd, least)
+            _refuse_certain(table, told, sd, sds, code)
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
-            times.append(time[told])
+            times.append(time[told] - delay)
             rows.append(np.column_stack([np.full(len(value), code), value, sd**2])[told])
         at = np.concatenate(times)
         order = np.argsort(at, kind="stable")
@@ -66,21 +200,71 @@ class Gnss(TableAid):
 
     def observe(self, view: View, values: Array) -> list[Observation]:
         """Return a place or a velocity, north, east, down, less what was measured."""
-        arm = view.C_lb @ np.asarray(self.lever_arm)
+        arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
+        place, velocity, acceleration = moving(view, arm, self._arm)
+        of_place = values[0] == POSITION_CODE
+        computed = place if of_place else velocity
+        if view.has(self._offset):
+            late = float(view.estimate(self._offset)[0])
+            computed = _later(view, self._offset, late, of_place, place, velocity, acceleration)
         C_nl = view.C_ln.T
-        H = np.zeros((3, view.columns))
-        if values[0] == POSITION_CODE:
+        z, H = C_nl @ computed.value, C_nl @ computed.H
+        if of_place:
             lat, lon, alt = values[1:4].tolist()
             measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
-            z = displacement_between(view.here, measured, view.ellipsoid)
-            z += C_nl @ arm
-            H[:, DISPLACEMENT] = C_nl
-            H[:, ROTATION] = -C_nl @ cross_matrix(arm)
-            return [Observation(f"{self.name}.position", z, H, values[4:7], PLACE)]
-        z = C_nl @ view.velocity - values[1:4]
-        H[:, VELOCITY] = C_nl
-        return [Observation(f"{self.name}.velocity", z, H, values[4:7], SPEED)]
+            z += displacement_between(view.here, measured, view.ellipsoid)
+        else:
+            z -= values[1:4]
+        name, labels = self.names(values)
+        return [Observation(name, z, H, values[4:7], labels)]
+
+    def names(self, values: Array) -> tuple[str, tuple[str, ...]]:
+        """Return the name of the observation of an epoch, and the labels of its components."""
+        if values[0] == POSITION_CODE:
+            return f"{self.name}.position", PLACE
+        return f"{self.name}.velocity", SPEED
+
+    @property
+    def _arm(self) -> str:
+        return f"{self.name}.lever_arm"
+
+    @property
+    def _offset(self) -> str:
+        return f"{self.name}.time_offset"
 
 
-PLACE = ("north, m", "east, m", "down, m")
-SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
+def _later(
+    view: View,
+    name: str,
+    late: float,
+    of_place: bool,
+    place: Moving,
+    velocity: Moving,
+    acceleration: Moving,
+) -> Moving:
+    """Place or velocity so much after the epoch, by which the assumed offset is too large."""
+    speed = velocity.after(acceleration, late)
+    if of_place:
+        out, changes = place.after(velocity, late).after(acceleration, 0.5 * late**2), speed
+    else:
+        out, changes = speed, acceleration
+    H = out.H.copy()
+    H[:, view.place(name)] = -changes.value[:, None]
+    return Moving(out.value, H)
+
+
+def _refuse_certain(
+    table: pd.DataFrame, told: NDArray[np.bool_], sd: Array, columns: list[str], code: float
+) -> None:
+    certain = np.argwhere((sd == 0.0) & told[:, None])
+    if len(certain):
+        row, column = certain[0].tolist()
+        what = "least_position_sd_m" if code == POSITION_CODE else "least_velocity_sd_m_per_s"
+        raise DataError(
+            f"a standard deviation of zero, as of {len(np.unique(certain[:, 0]))} rows: a "
+            "filter would hold such a fix to be true",
+            file=source_of(table),
+            row=row + 1,
+            quantity=columns[column],
+            remedy=f"give {what} of the aid, or inf where nothing was measured",
+        )

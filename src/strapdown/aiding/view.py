@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -43,6 +44,8 @@ class View:
         estimated errors taken off.
     force : ndarray, (3,), m/s²
         Specific force, the same.
+    covariance_of : callable, optional
+        Makes the covariance of the physical errors at this instant; it costs something.
     """
 
     mechanization: Mechanization
@@ -53,6 +56,14 @@ class View:
     sensors: Array
     rate: Array
     force: Array
+    covariance_of: Callable[[], Array] | None = None
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the physical errors, level axes, (columns, columns); zero where it is not known."""
+        if self.covariance_of is None:
+            return np.zeros((self.columns, self.columns))
+        return self.covariance_of()
 
     @cached_property
     def level(self) -> Array:
@@ -102,6 +113,10 @@ class View:
     def place(self, name: str) -> slice:
         """Columns of a block of states of the sensors or of an aid."""
         return self.model.columns_of[name]
+
+    def labels(self, name: str) -> tuple[str, ...]:
+        """Labels of a block of states."""
+        return next(s.block.labels for s in self.model.sensors if s.block.name == name)
 
     def estimate(self, name: str) -> Array:
         """Estimate of a block: error of what was assumed, as its block is defined."""

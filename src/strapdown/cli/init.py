@@ -11,6 +11,7 @@ from strapdown.cli.log_options import AccelUnit, Axes, GyroUnit, Rate, Sampling,
 
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"
+NAVIGATE_EPILOG = "Example: strapdown init navigate log.csv --gnss fixes.csv, then strapdown navigate navigate.toml"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
 
 # Of what was left out.
@@ -140,3 +141,76 @@ def align(
         for one in draft.asked:
             page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
     page.print(f"\nThen   strapdown align {out}")
+
+
+@app.command("navigate", epilog=NAVIGATE_EPILOG)
+def navigate(
+    log: Annotated[
+        Path,
+        typer.Argument(
+            metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
+        ),
+    ],
+    gnss: Annotated[
+        Path | None,
+        typer.Option(metavar="FIXES", help="Fixes of a satellite receiver."),
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="The sensor; the nearest by noise, if not given."),
+    ] = None,
+    gyro_unit: GyroUnit = None,
+    accel_unit: AccelUnit = None,
+    time_unit: TimeUnit = None,
+    axes: Axes = None,
+    rate: Rate = None,
+    sampling: Sampling = None,
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
+        "navigate.toml"
+    ),
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+) -> None:
+    """Write the file of a run of navigation: what log and fixes tell is filled in.
+
+    Then: strapdown navigate navigate.toml
+    """
+    from strapdown.cli.console import console, print_findings, progress
+    from strapdown.config.alignment import LogTable
+    from strapdown.config.spec import specify
+    from strapdown.systems.crash_draft.file import check_free, write_file
+    from strapdown.systems.sins.draft import draft_navigation
+
+    check_free(out, force)
+    table = specify(
+        LogTable,
+        path=str(log),
+        gyro_unit=gyro_unit,
+        accel_unit=accel_unit,
+        time_unit=time_unit,
+        sampling=sampling,
+        rate_hz=rate,
+    )
+    with progress(quiet) as report:
+        report("reading", 0.3)
+        draft = draft_navigation(
+            table, folder=out.absolute().parent, axes=axes, gnss=gnss, sensor=sensor
+        )
+        write_file(out, draft.text, force=force)
+    if quiet:
+        return
+    print_findings(draft.findings)
+    page = console()
+    page.print("Found", style="bold")
+    for line in draft.found:
+        page.print(f"  {line}")
+    page.print(f"\nWrote {out}")
+    if draft.asked:
+        page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
+        for one in draft.asked:
+            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+    if draft.to_check:
+        page.print(f"\nAssumed; if it is not so, correct it in {out}:", style="bold")
+        for one in draft.to_check:
+            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+    page.print(f"\nThen   strapdown navigate {out}")

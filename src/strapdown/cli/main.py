@@ -12,7 +12,18 @@ from typing import NoReturn
 import typer
 
 from strapdown import __version__
-from strapdown.cli import align, attitude, crash, demo, init, modules, reproduce, simulate, verify
+from strapdown.cli import (
+    align,
+    attitude,
+    crash,
+    demo,
+    init,
+    modules,
+    navigate,
+    reproduce,
+    simulate,
+    verify,
+)
 from strapdown.exceptions import Finding, StrapdownError
 
 EXIT_CODES = """
@@ -50,6 +61,7 @@ def main(
 
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
 app.command("align", epilog=align.EPILOG)(align.align)
+app.command("navigate", epilog=navigate.EPILOG)(navigate.navigate)
 app.add_typer(init.app, name="init")
 app.command("crash", epilog=crash.EPILOG)(crash.crash)
 app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)

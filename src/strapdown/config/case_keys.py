@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from types import UnionType
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from strapdown.config.quantities import base_of, converted, keys_of
 from strapdown.config.shown import shown, shown_key
@@ -64,17 +64,26 @@ class _Keys:
             by[name] = key
             inner = table_of(form, name)
             if inner is not None and isinstance(value, dict):
-                found[name] = self._table(value, inner, (*path, key))
+                found[name] = self._part(value, form, name, (*path, key))
             elif inner is not None and isinstance(value, list):
                 found[name] = [
-                    self._table(part, inner, (*path, key, k)) if isinstance(part, dict) else part
-                    for k, part in enumerate(value)
+                    self._part(part, form, name, (*path, key, k)) for k, part in enumerate(value)
                 ]
             else:
                 found[name] = converted(value, key, name)
             if key != name:
                 self.written[*path, name] = (*path, key)
         return found
+
+    def _part(self, value: Any, form: type[TableSpec], name: str, path: KeyPath) -> Any:
+        """One table of a field; of several that it may be the one that its tag names."""
+        if not isinstance(value, dict):
+            return value
+        forms = list(_forms_of(form.model_fields[name].annotation))
+        if len(forms) == 1:
+            return self._table(value, forms[0], path)
+        named = [one for one in forms if _has_tag(one, value)]
+        return self._table(value, named[0], path) if len(named) == 1 else value
 
     def _twice(self, first: str, second: str, table: dict[str, Any], path: KeyPath) -> ConfigError:
         return self.file.refuse(
@@ -128,14 +137,23 @@ def table_of(form: type[TableSpec], name: str) -> type[TableSpec] | None:
 
 
 def _inner(annotation: Any) -> type[TableSpec] | None:
+    return next(_forms_of(annotation), None)
+
+
+def _forms_of(annotation: Any) -> Iterator[type[TableSpec]]:
     if isinstance(annotation, type) and issubclass(annotation, TableSpec):
-        return annotation
-    if get_origin(annotation) in (tuple, Union, UnionType, Annotated):
+        yield annotation
+    elif get_origin(annotation) in (tuple, Union, UnionType, Annotated):
         for part in get_args(annotation):
-            found = _inner(part)
-            if found is not None:
-                return found
-    return None
+            yield from _forms_of(part)
+
+
+def _has_tag(form: type[TableSpec], value: dict[str, Any]) -> bool:
+    """Whether a table says by one of its keys that it is of this form."""
+    return any(
+        get_origin(field.annotation) is Literal and value.get(name) in get_args(field.annotation)
+        for name, field in form.model_fields.items()
+    )
 
 
 def _is_list(annotation: Any) -> bool:

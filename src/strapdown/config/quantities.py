@@ -23,6 +23,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
     },
     "_s": {"_s": (1.0, 1.0), "_ms": (1.0, 1000.0)},
     "_kg": {"_kg": (1.0, 1.0), "_lb": (0.45359237, 1.0)},
+    "_deg_per_s": {"_deg_per_s": (1.0, 1.0)},
     "_deg": {"_deg": (1.0, 1.0)},
     "_hz": {"_hz": (1.0, 1.0)},
 }
@@ -30,7 +31,10 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
 
 def _ending(name: str) -> str | None:
     fits = [ending for ending in UNITS if name.endswith(ending)]
-    return max(fits, key=len, default=None)
+    found = max(fits, key=len, default=None)
+    # The s of a rate or of a square root is no time.
+    of_another = found is not None and name.removesuffix(found).endswith(("_per", "_sqrt"))
+    return None if of_another else found
 
 
 def base_of(name: str) -> str:

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from strapdown.aiding.aid import Aid
+from strapdown.aiding.aids import AIDS
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
@@ -19,6 +21,9 @@ from strapdown.estimation.influences import INFLUENCES
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.update_rules import UPDATE_RULES
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.navigation.damping import DAMPINGS, Damping
+from strapdown.navigation.filter_options import FilterOptions
+from strapdown.navigation.recorder import RECORDERS, Recorder
 from strapdown.prefilter import PREFILTERS, Prefilter
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
@@ -47,33 +52,53 @@ class Slot:
 
 
 FINE_ALIGNMENTS: dict[str, type[FineAlignment]] = {"filter": FineAlignment}
+FILTERS: dict[str, type[FilterOptions]] = {"error_state": FilterOptions}
 
 SLOTS: dict[str, Slot] = {
     "prefilter": Slot("prefilter", "Pre-filters", Prefilter, PREFILTERS),
     "coarse": Slot("coarse", "Coarse alignments", CoarseAlignment, COARSE_ALIGNMENTS),
     "fine": Slot("fine", "Fine alignments", FineAlignment, FINE_ALIGNMENTS),
     "mechanization": Slot("mechanization", "Mechanizations", Mechanization, MECHANIZATIONS),
+    "filter": Slot("filter", "Filters", FilterOptions, FILTERS),
     "error_model": Slot("error_model", "Error models", ErrorModel, ERROR_MODELS),
     "covariance": Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
     "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
     "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
+    "aiding": Slot("aiding", "Aids", Aid, AIDS),
+    "damping": Slot("damping", "Dampings", Damping, DAMPINGS),
+    "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),
 }
 
 #: Fields that a chain fills by itself, and no person writes.
-GIVEN = ("ellipsoid", "gyro_noise", "accel_noise")
+GIVEN = ("ellipsoid", "gyro_noise", "accel_noise", "name")
 _PLAIN = (float, int, bool, str)
 #: Units of options whose names do not have them, as the endings of keys; another module's option
 #: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
 UNITS = {
+    "Barometer.bias_sd": "m",
+    "Barometer.walk": "m_per_sqrt_h",
+    "NoSlip.lateral_sd": "m_per_s",
+    "NoSlip.vertical_sd": "m_per_s",
     "RobustWd.bandwidth": "hz",
+    "ZeroRate.sd_deg": "per_s",
+    "ZeroRate.window": "s",
+    "ZeroVelocity.sd": "m_per_s",
+    "ZeroVelocity.window": "s",
     "attenuation": "db",
+    "correlation_time": "s",
+    "dive": "rad_per_m_per_s2",
+    "force_sd": "m_per_s2",
     "gravity": "m_per_s2",
     "height_limits": "m",
     "height_time_constant": "s",
     "interval": "s",
+    "largest_rate_deg": "per_s",
     "largest_speed": "m_per_s",
     "least_speed": "m_per_s",
+    "lever_arm": "m",
     "rate": "hz",
+    "rate_sd_deg": "per_s",
+    "slip": "rad_per_m_per_s2",
 }
 
 
@@ -105,6 +130,11 @@ class Option:
     slot: Slot | None = None
     takes_class: bool = False
     group: type | None = None
+
+    @property
+    def has_default(self) -> bool:
+        """Whether it may be left out."""
+        return self.default is not MISSING
 
 
 def options_of(module: type) -> tuple[Option, ...]:

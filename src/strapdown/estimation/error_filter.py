@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown._kernels.compensation import compensate
+from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.level import ALT, AXIS, Q_LB
 from strapdown.earth import gravity
 from strapdown.ellipsoids import find_ellipsoid
@@ -24,6 +24,8 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
+#: What an observation is believed by: one rule, one for each of its components, or none.
+Rules = UpdateRule | Sequence[UpdateRule] | None
 
 # Part by which noise is larger than what is known of it, so that what is left is no less than zero:
 # of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
@@ -133,9 +135,19 @@ class ErrorFilter:
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
         """Return rows of motion increments without the errors estimated so far, (k, 10)."""
-        stacked = self.model.stacked
         out = np.empty_like(rows)
-        compensate(rows, stacked.gyro, stacked.accel, state.sensors, out)
+        of_gyros, of_accels = self.errors_of_sensors(state)
+        compensate(rows, of_gyros, of_accels, out)
+        return out
+
+    def errors_of_sensors(self, state: FilterState) -> Array:
+        """Return what the estimates say of the readings, (2, 7, 3): gyros, accelerometers.
+
+        A constant part, and parts per rate x, y, z and per force x, y, z.
+        """
+        stacked, out = self.model.stacked, np.empty((2, 7, 3))
+        errors_of_states(stacked.gyro_terms, state.sensors, out[0])
+        errors_of_states(stacked.accel_terms, state.sensors, out[1])
         return out
 
     def advance_compensated(
@@ -163,16 +175,11 @@ class ErrorFilter:
             mechanization, rows, np.empty(0), self.earth, history
         )
         if why:
-            raise DivergenceError(
-                f"the state has diverged with the sample at {time[made]:.9g} s",
-                quantity="state",
-                remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-                "gravity, a burst; or begin from a state that is nearer to the truth",
-            )
+            raise diverged(float(time[made]))
 
     def follow(
         self, state: FilterState, time: Array, history: Array, rows: Array, mechanization: Array
-    ) -> FilterState:
+    ) -> tuple[FilterState, Array]:
         """Take estimates and covariance over steps that the mechanization has made.
 
         Parameters
@@ -189,17 +196,20 @@ class ErrorFilter:
 
         Returns
         -------
-        FilterState
+        state : FilterState
+        Phi : ndarray, (n, n)
+            How the states went on.
         """
         segment = Segment(self.mechanization, np.concatenate([[state.time], time]), history, rows)
         Phi, Q = self._transition(segment)
-        return FilterState(
+        after = FilterState(
             float(time[-1]),
             mechanization.copy(),
             history[-1],
             self._decayed(state, float(time[-1])),
             self.form.predict(state.covariance, Phi, Q),
         )
+        return after, Phi
 
     def predict(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
         """Go on over motion increments.
@@ -280,7 +290,7 @@ class ErrorFilter:
         self,
         state: FilterState,
         observations: Sequence[Observation],
-        rules: Sequence[UpdateRule | None] | None = None,
+        rules: Sequence[Rules] | None = None,
     ) -> tuple[FilterState, list[Innovations]]:
         """Take the observations of an epoch, and take off what they tell of the errors.
 
@@ -289,8 +299,9 @@ class ErrorFilter:
         state : FilterState
         observations : sequence of Observation
             Of this state, independent of each other.
-        rules : sequence of UpdateRule or None, optional
-            How far each is believed; the filter's own for all, if not given.
+        rules : sequence of UpdateRule, of a sequence of them, or of None, optional
+            How far each is believed, all of its components alike or each by its own rule; the
+            filter's own for all, if not given.
 
         Returns
         -------
@@ -299,16 +310,45 @@ class ErrorFilter:
             Of each observation.
         """
         to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
+        x = np.zeros(to_physical.shape[1])
+        after, x, seen = self.estimate(state, x, observations, rules)
+        return self._fed_back(after, to_physical, x), seen
+
+    def estimate(
+        self,
+        state: FilterState,
+        x: Array,
+        observations: Sequence[Observation],
+        rules: Sequence[Rules] | None = None,
+    ) -> tuple[FilterState, Array, list[Innovations]]:
+        """Take the observations of an epoch, and take nothing off.
+
+        Parameters
+        ----------
+        state : FilterState
+        x : ndarray, (n,)
+            States as they are estimated before.
+        observations, rules
+            As `observe`.
+
+        Returns
+        -------
+        state : FilterState
+            With the covariance after.
+        x : ndarray, (n,)
+        innovations : list of Innovations
+        """
+        to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
         covariance, x, seen = self.form.update(
             state.covariance,
-            np.zeros(to_physical.shape[1]),
+            x,
             np.concatenate([one.z for one in observations]),
             np.concatenate([one.H for one in observations]) @ to_physical,
             np.concatenate([one.R for one in observations]),
             self.rule if rules is None else _each(rules, observations),
         )
-        after = self._fed_back(replace(state, covariance=covariance), to_physical, x)
-        return after, _split(seen, [one.z.size for one in observations])
+        sizes = [one.z.size for one in observations]
+        return replace(state, covariance=covariance), x, _split(seen, sizes)
 
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
@@ -387,22 +427,29 @@ class ErrorFilter:
         return out
 
 
+def diverged(time: float) -> DivergenceError:
+    """A state left what its mechanization can do, with the sample at this time."""
+    return DivergenceError(
+        f"the state has diverged with the sample at {time:.9g} s",
+        quantity="state",
+        remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
+        "gravity, a burst; or begin from a state that is nearer to the truth",
+    )
+
+
 def symmetric(P: Array) -> Array:
     """Return the symmetric part of a square matrix."""
     return 0.5 * (P + P.T)
 
 
-def _each(
-    rules: Sequence[UpdateRule | None], observations: Sequence[Observation]
-) -> list[UpdateRule] | None:
+def _each(rules: Sequence[Rules], observations: Sequence[Observation]) -> list[UpdateRule] | None:
     """One rule for each component; none at all where nothing has one."""
     if not any(rules):
         return None
-    return [
-        rule or FullUpdate()
-        for rule, one in zip(rules, observations, strict=True)
-        for _ in range(one.z.size)
-    ]
+    out: list[UpdateRule] = []
+    for rule, one in zip(rules, observations, strict=True):
+        out += rule if isinstance(rule, Sequence) else [rule or FullUpdate()] * one.z.size
+    return out
 
 
 def _split(seen: Innovations, sizes: Sequence[int]) -> list[Innovations]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from strapdown._kernels import wander_error_states as states
 from strapdown._kernels import wander_errors as kernel
+from strapdown._kernels.growth import padded
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import (
@@ -83,26 +84,28 @@ class QuaternionModel(ErrorModel):
         n = PHYSICAL + k
         levels = used.levels(segment.history)
         phi, q = np.empty((n, n)), np.empty((n, n))
-        gyro, accel, decay, drive, _ = self.stacked
+        sensors = self.stacked
+        rows, width = padded(n)
         earth = find_ellipsoid(used.ellipsoid).parameters()
         kernel.wander_transitions(
             levels,
             segment.increments,
             step,
-            gyro,
-            accel,
-            decay,
-            drive,
+            sensors.gyro_terms,
+            sensors.accel_terms,
+            sensors.decay,
+            sensors.drive,
             np.array(self.gyro_noise),
             np.array(self.accel_noise),
             used.height == "held",
             earth,
             phi,
             q,
-            np.empty((PHYSICAL, n)),
-            np.empty((n, n)),
-            np.empty((n, n)),
-            np.empty((n, 6 + k)),
+            np.empty((PHYSICAL, width)),
+            np.empty((PHYSICAL, width)),
+            np.empty(k),
+            np.empty((rows, width)),
+            np.empty((51, width)),
             np.empty((n, n)),
             np.empty((15, 3)),
             np.empty(LEVEL),

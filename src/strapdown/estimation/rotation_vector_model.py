@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels import psi_model as kernel
+from strapdown._kernels.growth import padded
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import (
     PHYSICAL,
@@ -61,26 +62,28 @@ class RotationVectorModel(ErrorModel):
         n = self.layout.size
         k = n - PHYSICAL
         phi, q = np.empty((n, n)), np.empty((n, n))
-        gyro, accel, decay, drive, _ = self.stacked
+        sensors = self.stacked
+        rows, width = padded(n)
         kernel.psi_transitions(
             used.levels(segment.history),
             segment.increments,
             used.level_up,
             step,
-            gyro,
-            accel,
-            decay,
-            drive,
+            sensors.gyro_terms,
+            sensors.accel_terms,
+            sensors.decay,
+            sensors.drive,
             np.array(self.gyro_noise),
             np.array(self.accel_noise),
             used.height == "held",
             find_ellipsoid(used.ellipsoid).parameters(),
             phi,
             q,
-            np.empty((PHYSICAL, n)),
-            np.empty((n, n)),
-            np.empty((n, n)),
-            np.empty((n, 6 + k)),
+            np.empty((PHYSICAL, width)),
+            np.empty((PHYSICAL, width)),
+            np.empty(k),
+            np.empty((rows, width)),
+            np.empty((51, width)),
             np.empty((n, n)),
             np.empty((6, 3)),
         )

@@ -38,6 +38,7 @@ __all__ = [
     "mounting",
     "random_walk",
     "time_offset",
+    "unseen",
 ]
 
 Array = NDArray[np.float64]
@@ -151,14 +152,14 @@ def g_sensitivity(sd: TriadLike) -> SensorStates:
 
 def lever_arm(sd: TriadLike) -> SensorStates:
     """Return the assumed place of an antenna in body axes less the true one; `sd` in m."""
-    return _unseen("lever_arm", XYZ, "m", _numbers(sd, "lever_arm"))
+    return unseen("lever_arm", XYZ, "m", _numbers(sd, "lever_arm"))
 
 
 def time_offset(sd: float) -> SensorStates:
     """Return the stamps of an aid less the time of the inertial sensors; `sd` in s."""
     if not is_number(sd):
         raise _refused("time_offset", sd, "give one number in s, zero or more")
-    return _unseen("time_offset", ("t",), "s", _numbers(sd, "time_offset")[:1])
+    return unseen("time_offset", ("t",), "s", _numbers(sd, "time_offset")[:1])
 
 
 def mounting(sd: TriadLike) -> SensorStates:
@@ -166,7 +167,41 @@ def mounting(sd: TriadLike) -> SensorStates:
 
     In the axes into which C turns.
     """
-    return _unseen("mounting", XYZ, "rad", _numbers(sd, "mounting"))
+    return unseen("mounting", XYZ, "rad", _numbers(sd, "mounting"))
+
+
+def unseen(name: str, labels: Sequence[str], unit: str, sd: Any) -> SensorStates:
+    """Return constants that act on no inertial sensor, as those of an aid.
+
+    Parameters
+    ----------
+    name : str
+        Of the block.
+    labels : sequence of str
+        One a state.
+    unit : str
+    sd : float or sequence of float
+        One number for all, or one a state.
+
+    Returns
+    -------
+    SensorStates
+
+    Raises
+    ------
+    ConfigError
+        A standard deviation is negative or not finite.
+    """
+    k = len(labels)
+    nothing = np.zeros((COUPLING, 3, k))
+    return SensorStates(
+        StateBlock(name, tuple(labels), unit),
+        _as_many(sd, k, name),
+        nothing,
+        nothing.copy(),
+        math.inf,
+        np.zeros(k),
+    )
 
 
 def random_walk(states: SensorStates, drive: TriadLike) -> SensorStates:
@@ -237,7 +272,7 @@ ERRORS_OF_SENSORS: dict[str, Callable[..., SensorStates]] = {
 
 
 def _bias(name: str, unit: str, sd: TriadLike) -> SensorStates:
-    states = _unseen(name, XYZ, unit, _numbers(sd, name))
+    states = unseen(name, XYZ, unit, _numbers(sd, name))
     (states.gyro if unit == "rad/s" else states.accel)[0] = np.eye(3)
     return states
 
@@ -254,21 +289,12 @@ def _by_terms(
     """States that act on one axis by the rate or force (`source`) of one axis each."""
     by_axis = _numbers(sd, name)
     sds = np.array([by_axis[XYZ.index(term[0])] for term in terms])
-    states = _unseen(name, tuple(labels or terms), unit, sds)
+    states = unseen(name, tuple(labels or terms), unit, sds)
     on_gyros = sensor == "gyro" or (not sensor and source == RATE)
     coupling = states.gyro if on_gyros else states.accel
     for k, term in enumerate(terms):
         coupling[source + XYZ.index(term[1]), XYZ.index(term[0]), k] = 1.0
     return states
-
-
-def _unseen(name: str, labels: tuple[str, ...], unit: str, sd: Array) -> SensorStates:
-    """Constants that act on no inertial sensor."""
-    k = len(labels)
-    nothing = np.zeros((COUPLING, 3, k))
-    return SensorStates(
-        StateBlock(name, labels, unit), sd, nothing, nothing.copy(), math.inf, np.zeros(k)
-    )
 
 
 def _known(terms: Sequence[str]) -> tuple[str, ...]:

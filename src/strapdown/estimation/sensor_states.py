@@ -60,6 +60,8 @@ class Stacked(NamedTuple):
     Attributes
     ----------
     gyro, accel : ndarray, (7, 3, k)
+    gyro_terms, accel_terms : ndarray, (l, 4)
+        What of them is not zero: first, second and third index, and value.
     decay : ndarray, (k,), 1/s
     drive : ndarray, (k,)
     sd : ndarray, (k,)
@@ -67,6 +69,8 @@ class Stacked(NamedTuple):
 
     gyro: Array
     accel: Array
+    gyro_terms: Array
+    accel_terms: Array
     decay: Array
     drive: Array
     sd: Array
@@ -84,17 +88,18 @@ def stack(blocks: tuple[SensorStates, ...]) -> Stacked:
     Stacked
     """
     size = sum(len(one.block) for one in blocks)
-    out = Stacked(
-        np.zeros((COUPLING, 3, size)),
-        np.zeros((COUPLING, 3, size)),
-        np.zeros(size),
-        np.zeros(size),
-        np.zeros(size),
-    )
+    gyro, accel = np.zeros((2, COUPLING, 3, size))
+    decay, drive, sd = np.zeros((3, size))
     at = 0
     for one in blocks:
         end = at + len(one.block)
-        out.gyro[:, :, at:end], out.accel[:, :, at:end] = one.gyro, one.accel
-        out.decay[at:end], out.drive[at:end], out.sd[at:end] = one.decay, one.drive, one.sd
+        gyro[:, :, at:end], accel[:, :, at:end] = one.gyro, one.accel
+        decay[at:end], drive[at:end], sd[at:end] = one.decay, one.drive, one.sd
         at = end
-    return out
+    return Stacked(gyro, accel, _terms(gyro), _terms(accel), decay, drive, sd)
+
+
+def _terms(coupling: Array) -> Array:
+    places = np.argwhere(coupling)
+    values = coupling[tuple(places.T)]
+    return np.column_stack([places.astype(np.float64), values]).reshape(-1, 4)

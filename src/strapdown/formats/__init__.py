@@ -7,13 +7,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.exceptions import ConfigError, DataError, nearest
 from strapdown.formats import (
     broad,
     comma2k19,
     csv,
     hdf5,
     join,
+    kf_gins,
     matlab,
     mpu6050,
     npy_folder,
@@ -21,6 +22,7 @@ from strapdown.formats import (
     parquet,
     phyphox,
     psins,
+    pyins,
     sensor_folder,
     sensor_logger,
     sensorstream,
@@ -55,9 +57,13 @@ READERS: dict[str, Reader] = {
     "sensor-folder": Reader(
         "folder or zip of one text table a sensor", sensor_folder.detect, sensor_folder.read
     ),
+    "kf-gins": Reader(
+        "KF-GINS increments, seven columns without a header", kf_gins.detect, kf_gins.read
+    ),
     "psins": Reader("PSINS increments (.imu)", psins.detect, psins.read),
     "npy-folder": Reader("folder of NumPy arrays (.npy)", npy_folder.detect, npy_folder.read),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, csv.read),
+    "python-ins": Reader("python-ins arrays: time, imu (.npz)", pyins.detect, pyins.read),
     "npz": Reader("NumPy archive (.npz)", npz.detect, npz.read),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, parquet.read),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, hdf5.read),
@@ -65,13 +71,15 @@ READERS: dict[str, Reader] = {
 }
 
 
-def read_raw(path: Path) -> RawLog:
+def read_raw(path: Path, form: str | None = None) -> RawLog:
     """Read a log's columns as they stand in it.
 
     Parameters
     ----------
     path : Path
         A file, or the folder of a known recording.
+    form : str, optional
+        A key of `READERS`; recognised by the file itself where it is left out.
 
     Returns
     -------
@@ -80,7 +88,7 @@ def read_raw(path: Path) -> RawLog:
     Raises
     ------
     ConfigError
-        There is no such file.
+        There is no such file, or no such format.
     DataError
         It is of no known format, or it is damaged.
     """
@@ -96,6 +104,14 @@ def read_raw(path: Path) -> RawLog:
             file=path.name,
             remedy="check that the recording was saved and copied whole",
         )
+    if form is not None:
+        if form not in READERS:
+            raise ConfigError(
+                f"'{form}' is no format of a log",
+                quantity="format",
+                remedy=nearest(form, READERS),
+            )
+        return READERS[form].read(path)
     for reader in READERS.values():
         if reader.detect(path):
             return reader.read(path)
@@ -139,7 +155,7 @@ def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None)
         A log cannot be used, none has a gyro, or their clocks have no time in common.
     """
     asked = options or ReadOptions()
-    logs = [read_raw(Path(path)) for path in paths]
+    logs = [read_raw(Path(path), asked.format) for path in paths]
     if len(logs) == 1:
         return assemble(logs[0], asked)
     raw = join.join(join.with_columns(logs, asked), " + ".join(log.name for log in logs))
@@ -167,4 +183,5 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
     DataError
         The log cannot be used; the message names file, row, quantity and remedy.
     """
-    return assemble(read_raw(Path(path)), options or ReadOptions())
+    asked = options or ReadOptions()
+    return assemble(read_raw(Path(path), asked.format), asked)

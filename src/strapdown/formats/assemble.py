@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.formats.assemble_truth import truth_of_log
+from strapdown.formats.clocks import RELATIVE, Clock, clock_of_name, with_clock
 from strapdown.formats.columns import parse_axes, parse_unit, says_increment
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference, Signals, infer_signals
@@ -111,6 +113,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     imu = imu_table(
         time, body["gyro"], body.get("accel"), body.get("mag"), sampling=sampling, source=raw.name
     )
+    with_clock(imu, _clock(raw, found, stamps, dated))
     truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)
     return Recording(
         name=raw.name,
@@ -374,6 +377,15 @@ def _time_reading(raw: RawLog, found: dict[str, Column], stamps: Stamps, sample:
     value = raw.columns[source][sample]
     first = float(value) if raw.columns[source].dtype.kind in "iufb" else str(value)
     return Reading(source, "time", stamps.unit, f"{found['time'].why}; unit {stamps.why}", first)
+
+
+def _clock(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: bool) -> Clock:
+    if "time" not in found:
+        return Clock(RELATIVE)
+    origin = float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
+    first = origin + float(stamps.seconds[0])
+    name = raw.clock or clock_of_name(found["time"].source, first, dated=dated)
+    return Clock(name, origin)
 
 
 # --- axes and sampling ------------------------------------------------------------------

@@ -85,12 +85,15 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     if not missing:
         return
     left_out = "".join(f"; {f.what}" for f in raw.findings if f.what.startswith("left out"))
+    # Of numbers without names the increments of KF-GINS are the usual layout.
+    seven = len(raw.columns) == 7 and all(name.startswith("column ") for name in raw.columns)
     raise DataError(
         f"no column was recognised as {', '.join(missing)}; it has: "
         f"{', '.join(raw.columns) or 'none'}{left_out}",
         file=raw.name,
         remedy="name them, as in --columns time=t,gyro_x=wx,gyro_y=wy,gyro_z=wz (a number "
-        "counts columns from 1)",
+        "counts columns from 1)"
+        + ("; or state the format, as in kf-gins for increments" if seven else ""),
     )
 
 

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from strapdown.exceptions import DataError, nearest
 from strapdown.formats import read_raw
 from strapdown.formats.recording import RawLog
-from strapdown.tables import NED, POSITION_SD, gnss_table
-from strapdown.tables.columns import GEODETIC, VELOCITY, VELOCITY_SD
+from strapdown.tables import NED, POSITION_SD
 
-__all__ = ["read_fixes", "read_reference_path"]
+__all__ = ["read_reference_path"]
 
 Array = NDArray[np.float64]
 
@@ -74,48 +73,6 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
     table = pd.DataFrame(found, index=pd.Index(time, name="time"))[[*NED, *has_sd]]
     table.attrs["source"] = raw.name
     return table
-
-
-def read_fixes(path: str | Path) -> pd.DataFrame:
-    """Read the fixes of a satellite receiver.
-
-    Parameters
-    ----------
-    path : str or Path
-        A table with the columns of a Gnss table and ``time``: ``lat lon`` deg, ``alt`` m,
-        ``VN VE VD`` m/s, ``north_sd east_sd down_sd`` m, ``VN_sd VE_sd VD_sd`` m/s; ``quality``
-        may be left out.
-
-    Returns
-    -------
-    DataFrame
-        A Gnss table; time as it stands in the file.
-
-    Raises
-    ------
-    ConfigError
-        There is no such file.
-    DataError
-        A column is missing or not understood, or as `gnss_table`.
-    """
-    raw = read_raw(Path(path))
-    units = {"time": "s", "lat": "deg", "lon": "deg", "alt": "m", "quality": ""}
-    units |= dict.fromkeys([*VELOCITY, *VELOCITY_SD], "m/s") | dict.fromkeys(POSITION_SD, "m")
-    wanted = [name for name in units if name != "quality"]
-    found = _columns(raw, units, wanted)
-
-    def block(names: Sequence[str]) -> Array:
-        return np.column_stack([found[name] for name in names])
-
-    return gnss_table(
-        found["time"],
-        block(GEODETIC),
-        block(VELOCITY),
-        block(POSITION_SD),
-        block(VELOCITY_SD),
-        found.get("quality"),
-        source=raw.name,
-    )
 
 
 def _columns(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> dict[str, Array]:

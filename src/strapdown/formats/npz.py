@@ -36,14 +36,30 @@ def read(path: Path) -> RawLog:
     DataError
         It is no archive, is damaged, claims more than it holds, or holds Python objects.
     """
-    arrays: dict[str, NDArray[Any]] = {}
-    meta: dict[str, Any] = {}
+    found = arrays_of(path)
+    arrays = {name: array for name, array in found.items() if array.ndim}
+    meta = {name: array for name, array in found.items() if not array.ndim}
+    return raw_log(path, arrays, {}, meta)
+
+
+def arrays_of(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of an archive by name.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    DataError
+        As `read`.
+    """
+    found: dict[str, NDArray[Any]] = {}
     try:
         with zipfile.ZipFile(path) as archive:
             for info in archive.infolist():
                 if info.filename.endswith(".npy"):
-                    array = _member(archive, info, path.name)
-                    (meta if array.ndim == 0 else arrays)[info.filename[:-4]] = array
+                    found[info.filename[:-4]] = _member(archive, info, path.name)
     except DataError:
         raise
     except Exception as error:  # a damaged archive can break any of the decoders it goes through
@@ -52,7 +68,7 @@ def read(path: Path) -> RawLog:
             file=path.name,
             remedy="copy it again; it must come from numpy.savez, with numbers alone",
         ) from None
-    return raw_log(path, arrays, {}, meta)
+    return found
 
 
 def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> NDArray[Any]:

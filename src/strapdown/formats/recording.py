@@ -40,6 +40,8 @@ class ReadOptions:
         For a log without a time column.
     repair : bool
         Leave out rows that cannot be used, and say how many, instead of refusing the log.
+    format : str, optional
+        A key of `formats.READERS`; recognised by the file itself where it is left out.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -50,6 +52,7 @@ class ReadOptions:
     sampling: str | None = None
     rate: float | None = None
     repair: bool = False
+    format: str | None = None
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,8 @@ class RawLog:
     findings : list of Finding
     start : StatedStart or None
         Where the file states one.
+    clock : str or None
+        What its stamps count (`clocks`), where the format says it.
     """
 
     name: str
@@ -130,6 +135,7 @@ class RawLog:
     truth: TruthInSensorAxes | None = None
     findings: list[Finding] = field(default_factory=list)
     start: StatedStart | None = None
+    clock: str | None = None
 
     def row(self, sample: int) -> int:
         """Row of the file, counted from 1, in which a sample stands."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError, Finding
+from strapdown.formats.clocks import unrolled
 from strapdown.formats.inference.clock import infer_time_unit, wrap_bits
 from strapdown.formats.inference.conclusion import THRESHOLD
 from strapdown.formats.recording import Origin
@@ -94,6 +95,18 @@ def read_stamps(
     findings: list[Finding] = []
     # Small and unsigned integers would overflow where stamps go back.
     stamps = raw.astype(np.int64) if raw.dtype.kind in "iub" else raw.astype(np.float64)
+    if unit in (None, "s"):
+        whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
+        if weeks:
+            stamps, unit = whole, "s"
+            findings.append(
+                Finding(
+                    "the seconds of week begin again; they are counted on",
+                    file=file,
+                    row=row(weeks[0]),
+                    quantity="time",
+                )
+            )
     ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor can round them
     if not repair:
         _refuse_backward(stamps, ticks, file, row)

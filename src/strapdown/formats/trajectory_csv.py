@@ -6,20 +6,26 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
 from strapdown.formats import csv
+from strapdown.formats.decimal_rows import write_decimals
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.tables import (
     EULER,
     NED,
+    TRAJECTORY,
     TRAJECTORY_ERROR,
     VELOCITY,
     check_trajectory,
     check_trajectory_error,
 )
 
-__all__ = ["one_line", "write_csv", "write_error_csv"]
+__all__ = ["DECIMALS", "named_columns", "one_line", "told_of", "write_csv", "write_error_csv"]
+
+#: Of time, latitude, longitude, height, velocity and attitude, where digits are fixed.
+DECIMALS = (9, 11, 11, 6, 8, 8, 8, 9, 9, 9)
 
 _SUFFIX = {
     **dict.fromkeys([*NED, "alt"], "_m"),
@@ -33,10 +39,22 @@ def one_line(text: str) -> str:
     return "".join(c for c in " ".join(text.split()) if c.isprintable())
 
 
-def _write(path: Path, table: pd.DataFrame, columns: list[str], comments: dict[str, str]) -> None:
+def named_columns(table: pd.DataFrame, columns: list[str]) -> dict[str, NDArray[np.float64]]:
+    """Time and columns of a table under names with their units."""
     named = {"time_s": table.index.to_numpy(dtype=np.float64)}
-    named |= {c + _SUFFIX[c]: table[c].to_numpy(dtype=np.float64) for c in columns}
-    csv.write(path, named, comments)
+    return named | {c + _SUFFIX[c]: table[c].to_numpy(dtype=np.float64) for c in columns}
+
+
+def told_of(name: str, options: TrajectoryFileOptions) -> dict[str, str]:
+    """What a file says of the trajectory in it: name, ellipsoid, axes, epoch."""
+    told = {
+        "trajectory": one_line(name),
+        "ellipsoid": options.ellipsoid.name,
+        "place": "geodetic, height over the ellipsoid",
+        "velocity": "relative to the Earth, north east down",
+        "attitude": "body forward-right-down to north-east-down",
+    }
+    return told if options.epoch is None else {**told, "epoch": options.date(0.0)}
 
 
 def write_csv(
@@ -46,7 +64,7 @@ def write_csv(
     name: str = "trajectory",
     options: TrajectoryFileOptions | None = None,
 ) -> None:
-    """Write a Trajectory table as text, each number in the fewest digits that give it back.
+    """Write a Trajectory table as text.
 
     Parameters
     ----------
@@ -54,7 +72,9 @@ def write_csv(
     trajectory : DataFrame
     name : str
     options : TrajectoryFileOptions, optional
-        The ellipsoid and the epoch stand in the comments at the top.
+        The ellipsoid and the epoch stand in the comments at the top. Of its `digits`, ``exact``
+        writes each number in the fewest that give it back, and ``fixed`` rounds to `DECIMALS`:
+        a micrometre, 10 nm/s, 1e-9 deg of attitude, 1 ns; twice as fast.
 
     Raises
     ------
@@ -63,16 +83,19 @@ def write_csv(
     """
     chosen = options or TrajectoryFileOptions()
     check_trajectory(trajectory)
-    comments = {
-        "trajectory": one_line(name),
-        "ellipsoid": chosen.ellipsoid.name,
-        "place": "geodetic, height over the ellipsoid",
-        "velocity": "relative to the Earth, north east down",
-        "attitude": "body forward-right-down to north-east-down",
-    }
-    if chosen.epoch is not None:
-        comments["epoch"] = chosen.date(0.0)
-    _write(path, trajectory, ["lat", "lon", "alt", *VELOCITY, *EULER], comments)
+    columns = named_columns(trajectory, TRAJECTORY)
+    comments = told_of(name, chosen)
+    if chosen.digits == "exact":
+        csv.write(path, columns, comments)
+        return
+    head = "".join(f"# {key}: {value}\n" for key, value in comments.items())
+    write_decimals(
+        path,
+        list(columns.values()),
+        DECIMALS,
+        separator=",",
+        head=f"{head}{','.join(columns)}\n",
+    )
 
 
 def write_error_csv(path: Path, table: pd.DataFrame, *, name: str = "error") -> None:
@@ -95,4 +118,4 @@ def write_error_csv(path: Path, table: pd.DataFrame, *, name: str = "error") -> 
     comments = {"trajectory error": one_line(name), "sign": "estimate minus reference"}
     if more:
         comments["phi"] = "rotation vector of C_est C_ref^T about north, east, down"
-    _write(path, table, [*TRAJECTORY_ERROR, *more], comments)
+    csv.write(path, named_columns(table, [*TRAJECTORY_ERROR, *more]), comments)

@@ -18,6 +18,8 @@ TUM_FRAMES = {
     "ecef": ("earth-centred, earth-fixed", "forward, right, down"),
 }
 
+DIGITS = ("exact", "fixed")
+
 
 @dataclass(frozen=True)
 class TrajectoryFileOptions:
@@ -36,6 +38,9 @@ class TrajectoryFileOptions:
         A KML or GeoJSON file has no more than this; a longer trajectory is thinned.
     tum_frame : {'enu', 'ned', 'ecef'}
         Axes of a TUM file.
+    digits : {'exact', 'fixed'}
+        Of a CSV: the fewest that give each number back, or a fixed number of decimals, which is
+        faster.
 
     Raises
     ------
@@ -48,6 +53,7 @@ class TrajectoryFileOptions:
     geoid_undulation: float | None = None
     most_points: int = 10_000
     tum_frame: str = "enu"
+    digits: str = "exact"
 
     def __post_init__(self) -> None:
         if not isinstance(self.ellipsoid, Ellipsoid):
@@ -86,6 +92,12 @@ class TrajectoryFileOptions:
                 f"'{self.tum_frame}' is no frame of a TUM file",
                 quantity="tum_frame",
                 remedy=nearest(str(self.tum_frame), TUM_FRAMES),
+            )
+        if self.digits not in DIGITS:
+            raise ConfigError(
+                f"'{self.digits}' is no way to write numbers",
+                quantity="digits",
+                remedy=nearest(str(self.digits), DIGITS),
             )
 
     def require_wgs84(self, form: str) -> None:

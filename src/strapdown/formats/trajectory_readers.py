@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.formats import csv
+from strapdown.formats import csv, parquet, pyins, trajectory_nav
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
@@ -25,18 +26,39 @@ from strapdown.tables import trajectory_table
 
 Array = NDArray[np.float64]
 
-__all__ = ["read_trajectory"]
+__all__ = ["TRAJECTORY_READERS", "TrajectoryReader", "read_trajectory"]
+
+
+@dataclass(frozen=True)
+class TrajectoryReader:
+    """How a format without names of columns is recognised and read."""
+
+    title: str
+    detect: Callable[[Path], bool]
+    read: Callable[[Path], pd.DataFrame]
+
+
+#: Tried before a table is read by the names of its columns.
+TRAJECTORY_READERS: dict[str, TrajectoryReader] = {
+    "kf-gins": TrajectoryReader(
+        "KF-GINS, eleven columns (.nav)", trajectory_nav.detect, trajectory_nav.read
+    ),
+    "python-ins": TrajectoryReader(
+        "python-ins arrays: time, truth (.npz)", pyins.detect_truth, pyins.read_truth
+    ),
+}
 
 _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
 
 
 def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) -> pd.DataFrame:
-    """Read a trajectory from a text table.
+    """Read a trajectory.
 
     Parameters
     ----------
     path : str or Path
-        ``.csv``, ``.txt``, ``.tsv`` or ``.dat``, with a header.
+        ``.csv``, ``.txt``, ``.tsv``, ``.dat`` or ``.parquet`` with names of columns, or one of
+        `TRAJECTORY_READERS`.
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat``, ``lon``, ``alt``, ``VN``, ``VE``, ``VD``, ``roll``, ``pitch``,
         ``heading``) to the name of its column, where the names do not say it.
@@ -59,8 +81,12 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         that latitude and longitude are exchanged or in radians, or that the attitude is in
         radians.
     """
-    path = Path(path)
-    raw = _raw(path)
+    path = _there(path)
+    if columns is None or not columns:
+        for reader in TRAJECTORY_READERS.values():
+            if reader.detect(path):
+                return reader.read(path)
+    raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
     values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
     try:
@@ -86,22 +112,27 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         angles_stated=found["lat"].stated and found["lon"].stated,
         euler_stated=found["heading"].stated,
     )
-    stated = _ELLIPSOID.search(path.read_bytes()[:4096].decode("utf-8", "replace"))
+    with path.open("rb") as stream:
+        stated = _ELLIPSOID.search(stream.read(4096).decode("utf-8", "replace"))
     table.attrs["ellipsoid"] = stated.group(1) if stated else None
     table.attrs["findings"] = (*raw.findings, *judged)
     return table
 
 
-def _raw(path: Path) -> RawLog:
+def _there(path: str | Path) -> Path:
+    path = Path(path)
     if not path.exists():
         raise ConfigError("there is no such file", file=str(path), remedy="check the path")
-    if not csv.detect(path):
+    known = (*csv.SUFFIXES, *parquet.SUFFIXES, ".nav", ".npz")
+    if path.is_dir() or path.suffix.lower() not in known:
         raise DataError(
-            "a trajectory is read from a text table alone",
+            "a trajectory is read from a text table alone"
+            if not path.is_dir()
+            else "this is a folder, and a trajectory is read from one file",
             file=path.name,
-            remedy=f"give a file with the ending {', '.join(csv.SUFFIXES)}",
+            remedy=f"give a file with the ending {', '.join(known)}",
         )
-    return csv.read(path)
+    return path
 
 
 def _values(raw: RawLog, quantity: str, column: TrajectoryColumn) -> Array:

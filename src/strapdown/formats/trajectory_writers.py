@@ -11,7 +11,9 @@ from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_csv import write_csv
 from strapdown.formats.trajectory_geojson import write_geojson
 from strapdown.formats.trajectory_kml import write_kml
+from strapdown.formats.trajectory_nav import write_nav
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
+from strapdown.formats.trajectory_parquet import write_parquet
 from strapdown.formats.trajectory_tum import write_tum
 
 __all__ = [
@@ -51,6 +53,8 @@ TRAJECTORY_WRITERS: dict[str, TrajectoryWriter] = {
     "tum": write_tum,
     "kml": write_kml,
     "geojson": write_geojson,
+    "nav": write_nav,
+    "parquet": write_parquet,
 }
 
 

@@ -3,9 +3,12 @@
 from strapdown.increments.accuracy import MotionAccuracy, motion_accuracy
 from strapdown.increments.angle import increments_from_imu
 from strapdown.increments.motion import motion_increments
+from strapdown.increments.stream import IncrementStream, IncrementStreamState
 from strapdown.increments.summed import imu_from_increments
 
 __all__ = [
+    "IncrementStream",
+    "IncrementStreamState",
     "MotionAccuracy",
     "imu_from_increments",
     "increments_from_imu",

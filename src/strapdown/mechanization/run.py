@@ -11,11 +11,19 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding
-from strapdown.increments import motion_increments
+from strapdown.increments.stream import IncrementStream, IncrementStreamState
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-from strapdown.tables import MOTION, PHI, check_motion_increments
-from strapdown.tables.checks import is_number, values_of
+from strapdown.tables import ACCEL, GYRO, MOTION, PHI, check_imu, check_motion_increments
+from strapdown.tables.checks import (
+    check_columns,
+    check_rows,
+    check_time,
+    index_of,
+    is_number,
+    source_of,
+    values_of,
+)
 
 Array = NDArray[np.float64]
 
@@ -169,31 +177,27 @@ def navigate_segments(
     """
     pieces = [segments] if isinstance(segments, pd.DataFrame) else segments
     state = mechanization.begin(start)
-    kept: pd.DataFrame | None = None
+    stream = IncrementStream()
+    steps: IncrementStreamState | None = None
     begun = False
     for segment in pieces:
         if segment.empty:
             continue
-        # Two samples back: the step before tells how a mean rate changes over the next.
-        joined = segment
-        if kept is not None:
-            joined = pd.concat([kept, segment])
-            joined.attrs = dict(segment.attrs)
-        if len(joined) < 2:
-            kept = joined
+        _check_segment(segment, np.empty(0) if steps is None else steps.time[-1:])
+        if steps is None:
+            steps = stream.begin(segment.attrs["sampling"])
+        stamps, values = index_of(segment), values_of(segment, [*GYRO, *ACCEL])
+        steps, ends, rows = stream.advance(steps, stamps, values)
+        if not ends.size:
             continue
-        increments = motion_increments(joined)
+        increments = pd.DataFrame(rows, index=pd.Index(ends, name="time"), columns=MOTION)
+        increments.attrs["source"] = segment.attrs.get("source")
         if not begun:
-            begin = float(increments.index[0] - increments["dt"].iloc[0])
-            _check_start(start, begin, increments)
+            _check_start(start, float(ends[0] - rows[0, 0]), increments)
             begun = True
-        else:
-            increments = increments.iloc[1:]
         _refuse_holes(increments, longest_step)
         state, history = mechanization.advance(state, increments)
-        time = increments.index.to_numpy(dtype=np.float64)
-        yield mechanization.trajectory(time, history, segment.attrs.get("source"))
-        kept = joined.iloc[-2:]
+        yield mechanization.trajectory(ends, history, segment.attrs.get("source"))
 
 
 def check_longest_step(longest: float) -> None:
@@ -204,6 +208,17 @@ def check_longest_step(longest: float) -> None:
             quantity="longest_step",
             remedy="give a time in s above zero; inf allows every step",
         )
+
+
+def _check_segment(segment: pd.DataFrame, newest: Array) -> None:
+    """Refuse a piece that is no Imu table, or does not follow the one before."""
+    source = source_of(segment)
+    check_columns(segment, [*GYRO, *ACCEL], source)
+    if len(segment) > 1:
+        check_imu(segment)
+    else:
+        check_rows(values_of(segment, [*GYRO, *ACCEL]), [*GYRO, *ACCEL], source)
+    check_time(np.concatenate([newest, index_of(segment)]), source)
 
 
 def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -13,19 +13,23 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.split_increment import split_increment
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
+from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.adaptive_rule import AdaptiveRule, Scales
+from strapdown.estimation.covariance import Innovations
+from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
+from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
+from strapdown.navigation.damping import Damping, Feedback
+from strapdown.navigation.engine import SAME_INSTANT, Engine, EngineState, GeneralEngine, begun
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 
 __all__ = ["Navigator", "NavigatorState", "with_states"]
 
 Array = NDArray[np.float64]
-
-# An epoch so near to the end of a step is at it, s: stamps are decimal fractions that were rounded.
-SAME_INSTANT = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,33 +38,28 @@ class NavigatorState:
 
     Attributes
     ----------
-    filter : FilterState
-        At the last instant to which the covariance was taken.
-    time : float, s
-        Of the newest sample.
-    mechanization, row : ndarray
-        State and row of a history at that sample.
-    open_time, open_history, open_rows : ndarray
-        What followed the last instant of the covariance: ends of the steps, rows of the history,
-        increments without the estimated errors.
+    engine : EngineState
+        Of mechanization, estimates and covariance.
     queues : mapping of str to Epochs
-        Of each aid with a table, the epochs that are still to come.
+        Of each aid, the epochs that are still to come.
     memories : mapping of str to object
         Of each aid that watches the sensors.
     marked : float, s
         Time of the last mark.
+    scales : mapping of str to tuple of ScaleState
+        By name of an observation whose rule learns: what it has learnt of each component.
     """
 
-    filter: FilterState
-    time: float
-    mechanization: Array
-    row: Array
-    open_time: Array
-    open_history: Array
-    open_rows: Array
+    engine: EngineState
     queues: Mapping[str, Epochs]
     memories: Mapping[str, Any]
     marked: float
+    scales: Mapping[str, Scales] = field(default_factory=dict)
+
+    @property
+    def time(self) -> float:
+        """Time of the newest sample, s."""
+        return self.engine.time
 
 
 @dataclass(frozen=True)
@@ -80,6 +79,8 @@ class Navigator:
         With names of their own.
     mark_interval : float, s
         Longest time between two marks of the covariance.
+    damping : Damping
+        Whether what is estimated is fed back.
 
     Raises
     ------
@@ -90,6 +91,7 @@ class Navigator:
     filter: ErrorFilter
     aids: tuple[Aid, ...] = ()
     mark_interval: float = 1.0
+    damping: Damping = field(default_factory=Feedback)
 
     def __post_init__(self) -> None:
         names = [aid.name for aid in self.aids]
@@ -100,6 +102,15 @@ class Navigator:
                     quantity="aiding",
                     remedy="give each a name of its own",
                 )
+
+    @cached_property
+    def lone_receiver(self) -> Gnss | None:
+        """The only aid, where it is a receiver whose errors are noise, believed as it says."""
+        if len(self.aids) != 1 or type(self.aids[0]) is not Gnss:
+            return None
+        aid = self.aids[0]
+        plain = aid.rule is None and self.filter.rule is None and not aid.states()
+        return aid if plain and (not aid.use_velocity or not any(aid.lever_arm)) else None
 
     @cached_property
     def by_name(self) -> dict[str, Aid]:
@@ -125,14 +136,8 @@ class Navigator:
         """Return the state at a state of the filter, as where an alignment ended."""
         nothing = Epochs(np.empty(0), np.empty((0, 0)))
         return NavigatorState(
-            filter=state,
-            time=state.time,
-            mechanization=state.mechanization,
-            row=state.row,
-            open_time=np.empty(0),
-            open_history=state.row[None, :],
-            open_rows=np.empty((0, 10)),
-            queues={aid.name: nothing for aid in self.aids if isinstance(aid, TableAid)},
+            engine=begun(self.filter, state, self.damping.feeds_back),
+            queues={aid.name: nothing for aid in self.aids},
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
         )
@@ -156,14 +161,15 @@ class Navigator:
             raise ConfigError(
                 f"there is no aid '{name}' with a table",
                 quantity="aiding",
-                remedy=nearest(name, state.queues),
+                remedy=nearest(name, [a.name for a in self.aids if isinstance(a, TableAid)]),
             )
         more = aid.epochs(table)
         queue = state.queues[name]
         if queue.time.size:
-            more = Epochs(
-                np.concatenate([queue.time, more.time]), np.concatenate([queue.values, more.values])
-            )
+            # An epoch may be before those of an earlier row: a velocity that comes late.
+            both = np.concatenate([queue.time, more.time])
+            order = np.argsort(both, kind="stable")
+            more = Epochs(both[order], np.concatenate([queue.values, more.values])[order])
         return replace(state, queues={**state.queues, name: more})
 
     def advance(
@@ -193,76 +199,107 @@ class Navigator:
         going.over(np.asarray(time, dtype=np.float64), np.ascontiguousarray(rows))
         return going.state(), going.piece()
 
+    def engine(self, state: EngineState) -> Engine:
+        """Return what goes on from a state: compiled, where the modules have that."""
+        if self.damping.feeds_back and compiled(self.filter):
+            return CompiledEngine(self.filter, state)
+        return GeneralEngine(self.filter, state, self.damping.feeds_back)
+
 
 class _Going:
     """A navigator on its way over one piece."""
 
     def __init__(self, navigator: Navigator, state: NavigatorState) -> None:
         self.navigator = navigator
-        self.used = navigator.filter.mechanization
-        self.filter = state.filter
-        self.time = state.time
-        self.mechanization = state.mechanization.copy()
-        self.row = state.row
-        self.open_time = list(state.open_time)
-        self.open_history = list(state.open_history)
-        self.open_rows = list(state.open_rows)
+        self.engine = navigator.engine(state.engine)
         self.queues = dict(state.queues)
         self.memories = dict(state.memories)
         self.marked = state.marked
-        self.times: list[float] = []
-        self.history: list[Array] = []
+        self.scales = dict(state.scales)
         self.seen: list[Seen] = []
         self.marks: list[Mark] = []
         self.late: list[tuple[str, float]] = []
+        self.time: Array = np.empty(0)
+        self.history: Array = np.empty((0, navigator.filter.mechanization.row))
 
     def over(self, time: Array, rows: Array) -> None:
         """Go over steps."""
-        watched: dict[str, NDArray[np.bool_]] = {}
         for aid in self.navigator.aids:
             if isinstance(aid, WatchingAid):
-                self.memories[aid.name], watched[aid.name] = aid.watch(
+                self.memories[aid.name], self.queues[aid.name] = aid.watch(
                     self.memories[aid.name], time, rows
                 )
         self._drop_late()
-        for i, (end, row) in enumerate(zip(time.tolist(), rows, strict=True)):
-            left = row
-            while True:
-                at = self._next_epoch()
-                if at > end - SAME_INSTANT:
-                    break
+        rows = rows.copy()
+        self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
+        at = self._fixes(time, rows)
+        while True:
+            epoch = self._next_epoch()
+            if epoch <= self.engine.time + SAME_INSTANT:
+                self._observe(self.engine.time)
+                if at and self.engine.time <= time[at - 1] + SAME_INSTANT:
+                    self.history[at - 1] = self.engine.shown()
+                continue
+            if at == len(time):
+                break
+            # The step at whose end, or within which, something is observed next.
+            told = int(np.searchsorted(time, epoch - SAME_INSTANT))
+            if told < len(time) and time[told] > epoch + SAME_INSTANT:
+                at = self._steps(at, told, time, rows)
                 first, second = np.empty(10), np.empty(10)
-                split_increment(left, at - self.time, first, second)
-                self._step(at, first)
-                self._observe(at, ())
-                left = second
-            self._step(end, left)
-            flagged = tuple(name for name, flags in watched.items() if flags[i])
-            if flagged or self._next_epoch() <= end + SAME_INSTANT:
-                self._observe(end, flagged)
-            self.times.append(end)
-            self.history.append(self.row)
+                split_increment(rows[told], epoch - self.engine.time, first, second)
+                room = np.empty((1, self.history.shape[1]))
+                self._run(np.array([epoch]), first[None, :], room)
+                rows[told] = second
+            else:
+                at = self._steps(at, min(told + 1, len(time)), time, rows)
+
+    def _fixes(self, time: Array, rows: Array) -> int:
+        """Go as far as the fixes of a lone receiver reach; return the steps made."""
+        aid, engine = self.navigator.lone_receiver, self.engine
+        if aid is None or not isinstance(engine, CompiledEngine):
+            return 0
+        made = 0
+        arm = np.asarray(aid.lever_arm, dtype=np.float64)
+        interval = self.navigator.mark_interval * (1.0 - 1e-9)
+        queue = self.queues[aid.name]
+        while queue.time.size and made < len(time):
+            went, fixed, stopped = engine.over_fixes(
+                time[made:],
+                rows[made:],
+                self.history[made:],
+                self.marked + interval,
+                interval,
+                arm,
+                queue,
+            )
+            made += went
+            done = len(fixed.told)
+            self._fixed(aid, queue, fixed)
+            queue = Epochs(queue.time[done:], queue.values[done:])
+            if stopped:
+                self._mark()
+        self.queues[aid.name] = queue
+        return made
+
+    def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
+        """Note what came of fixes."""
+        for i in range(len(fixed.told)):
+            at = float(fixed.time[i])
+            name, labels = aid.names(fixes.values[i])
+            self.seen.append(Seen(at, name, labels, Innovations(*fixed.told[i])))
+            self._add_mark(Mark(at, fixed.covariance[i], fixed.sensors[i], fixed.sensors_sd[i]))
 
     def state(self) -> NavigatorState:
         """Where it is now."""
         return NavigatorState(
-            filter=self.filter,
-            time=self.time,
-            mechanization=self.mechanization,
-            row=self.row,
-            open_time=np.array(self.open_time),
-            open_history=np.array(self.open_history),
-            open_rows=np.array(self.open_rows).reshape(-1, 10),
-            queues=self.queues,
-            memories=self.memories,
-            marked=self.marked,
+            self.engine.state(), self.queues, self.memories, self.marked, self.scales
         )
 
     def piece(self) -> NavigationPiece:
         """What came of it."""
-        history = np.array(self.history).reshape(-1, self.used.row)
         return NavigationPiece(
-            np.array(self.times), history, tuple(self.seen), tuple(self.marks), tuple(self.late)
+            self.time, self.history, tuple(self.seen), tuple(self.marks), tuple(self.late)
         )
 
     def _next_epoch(self) -> float:
@@ -270,101 +307,92 @@ class _Going:
 
     def _drop_late(self) -> None:
         for name, queue in self.queues.items():
-            count = int(np.searchsorted(queue.time, self.time - SAME_INSTANT))
+            count = int(np.searchsorted(queue.time, self.engine.time - SAME_INSTANT))
             if count:
                 self.late += [(name, float(t)) for t in queue.time[:count]]
                 self.queues[name] = Epochs(queue.time[count:], queue.values[count:])
 
-    def _step(self, end: float, row: Array) -> None:
-        """One step of the mechanization; the covariance follows where enough time has passed."""
-        if self.open_time:
-            begun = self.filter.time
-            if end - begun > self.navigator.filter.step * 1.000001:
-                self._close()
-        filter_ = self.navigator.filter
-        compensated = filter_.compensated(self.filter, row[None, :])
-        history = np.empty((1, self.used.row))
-        filter_.advance_compensated(self.mechanization, np.array([end]), compensated, history)
-        self.time, self.row = end, history[0]
-        self.open_time.append(end)
-        self.open_history.append(self.row)
-        self.open_rows.append(compensated[0])
+    def _steps(self, begin: int, end: int, time: Array, rows: Array) -> int:
+        """Steps from `begin` to before `end`."""
+        self._run(time[begin:end], rows[begin:end], self.history[begin:end])
+        return end
 
-    def _close(self) -> None:
-        """Take the covariance to the newest instant."""
-        if not self.open_time:
-            return
-        self.filter = self.navigator.filter.follow(
-            self.filter,
-            np.array(self.open_time),
-            np.array(self.open_history),
-            np.array(self.open_rows),
-            self.mechanization,
-        )
-        self._open_anew()
-        if self.filter.time - self.marked >= self.navigator.mark_interval * (1.0 - 1e-9):
-            self._mark()
+    def _run(self, time: Array, rows: Array, history: Array) -> None:
+        made = 0
+        while made < len(time):
+            # The interval is one of a decimal clock.
+            note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
+            made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
+            if made < len(time):
+                self._mark()
 
-    def _open_anew(self) -> None:
-        self.open_time, self.open_rows = [], []
-        self.open_history = [self.row]
-
-    def _observe(self, at: float, flagged: tuple[str, ...]) -> None:
+    def _observe(self, at: float) -> None:
         """Take everything that is observed at an instant."""
-        last = self.open_rows[-1] if self.open_rows else None
-        self._close()
-        filter_ = self.navigator.filter
-        dt = 1.0 if last is None else float(last[0])
-        zero = np.zeros(3)
+        engine, filter_ = self.engine, self.navigator.filter
+        last = engine.last
+        engine.close()
         view = View(
-            mechanization=self.used,
+            mechanization=filter_.mechanization,
             model=filter_.model,
             time=at,
-            state=self.mechanization,
-            row=self.row,
-            sensors=self.filter.sensors,
-            rate=zero if last is None else last[1:4] / dt,
-            force=zero if last is None else last[4:7] / dt,
+            state=engine.mechanization,
+            row=engine.row,
+            sensors=engine.filter.sensors,
+            rate=last[1:4] / last[0],
+            force=last[4:7] / last[0],
+            covariance_of=partial(filter_.physical_covariance, engine.filter),
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
-            if isinstance(aid, WatchingAid) and aid.name in flagged:
-                told += [(aid, one) for one in aid.observe(view)]
-            elif isinstance(aid, TableAid):
-                queue = self.queues[aid.name]
-                count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
-                for values in queue.values[:count]:
-                    told += [(aid, one) for one in aid.observe(view, values)]
-                self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
-        if not told:
-            return
-        observations = [one for _, one in told]
-        rules = [aid.rule or filter_.rule for aid, _ in told]
-        self.filter, innovations = filter_.observe(self.filter, observations, rules)
-        self.mechanization, self.row = self.filter.mechanization.copy(), self.filter.row
-        self._open_anew()
-        self.seen += [
-            Seen(at, one.name, one.labels, nu)
-            for one, nu in zip(observations, innovations, strict=True)
-        ]
+            queue = self.queues[aid.name]
+            count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
+            for values in queue.values[:count]:
+                told += [(aid, one) for one in aid.observe(view, values)]
+            self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
+        if told:
+            observations = [one for _, one in told]
+            innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
+            self.seen += [
+                Seen(at, one.name, one.labels, nu)
+                for one, nu in zip(observations, innovations, strict=True)
+            ]
         self._mark()
+
+    def _told(
+        self, rules: list[UpdateRule | None], observations: list[Observation]
+    ) -> list[Innovations]:
+        """Take observations; what their rules learn of them is kept."""
+        asked: list[Rules] = []
+        for rule, one in zip(rules, observations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
+            else:
+                asked.append(rule)
+        innovations = self.engine.observe(observations, asked)
+        for rule, one, nu in zip(rules, observations, innovations, strict=True):
+            if isinstance(rule, AdaptiveRule):
+                before = self.scales.get(one.name) or rule.begin(one.z.size)
+                self.scales[one.name] = rule.after(before, nu, one.R)
+        return innovations
 
     def _mark(self) -> None:
         """Note covariance and estimates."""
-        state = self.filter
-        P = self.navigator.filter.physical_covariance(state)
-        level = self.used.level_from_ned(state.row)
-        turn = np.kron(np.eye(3), level)
+        filter_, state = self.navigator.filter, self.engine.filter
+        P = filter_.physical_covariance(state)
+        turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
         mark = Mark(
             state.time,
             turn.T @ P[:9, :9] @ turn,
-            state.sensors,
+            self.engine.estimates(filter_),
             np.sqrt(np.diagonal(P)[9:]),
         )
-        if self.marks and self.marks[-1].time == state.time:
+        self._add_mark(mark)
+
+    def _add_mark(self, mark: Mark) -> None:
+        if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:
             self.marks.pop()
         self.marks.append(mark)
-        self.marked = state.time
+        self.marked = mark.time
 
 
 def with_states(filter_: ErrorFilter, aids: tuple[Aid, ...]) -> ErrorFilter:

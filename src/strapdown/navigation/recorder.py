@@ -2,21 +2,245 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.piece import NavigationPiece, Seen
-from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.piece import Mark, NavigationPiece, Seen
+from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.tables import EULER, trajectory_error_table
+from strapdown.tables.checks import is_number
 
-__all__ = ["record_of"]
+__all__ = ["RECORDERS", "FullRecorder", "IntervalRecorder", "Recorder", "Tape", "record_of"]
 
 Array = NDArray[np.float64]
+
+# A stamp is at an instant of the grid within this part of its interval.
+NEAR = 1e-6
+
+
+@dataclass(frozen=True)
+class Recorder(ABC):
+    """What of a run is kept; it holds no state of its own."""
+
+    name: ClassVar[str]
+    summary: ClassVar[str]
+    source: ClassVar[str]
+
+    @property
+    @abstractmethod
+    def rate(self) -> float:
+        """Most states and marks a second that are kept; infinite for all of them."""
+
+    def begin(self, navigator: Navigator) -> Tape:
+        """Return an empty tape."""
+        return Tape(navigator, self.rate)
+
+
+@dataclass(frozen=True)
+class FullRecorder(Recorder):
+    """Every sample: 1 kHz makes 0.5 GB an hour."""
+
+    name: ClassVar[str] = "full"
+    summary: ClassVar[str] = "every sample"
+    source: ClassVar[str] = "-"
+
+    @property
+    def rate(self) -> float:
+        """All of them."""
+        return math.inf
+
+
+@dataclass(frozen=True)
+class IntervalRecorder(Recorder):
+    """The first sample, and the first mark, of each interval of an even grid from time zero.
+
+    Attributes
+    ----------
+    rate_hz : float, Hz
+
+    Raises
+    ------
+    ConfigError
+        It is no rate.
+    """
+
+    name: ClassVar[str] = "interval"
+    summary: ClassVar[str] = "the first sample of each interval; all innovations"
+    source: ClassVar[str] = "-"
+
+    rate_hz: float = 10.0
+
+    def __post_init__(self) -> None:
+        if not is_number(self.rate_hz) or not 0.0 < self.rate_hz < math.inf:
+            raise ConfigError(
+                f"{self.rate_hz!r} Hz is no rate of a recorder",
+                quantity="rate_hz",
+                remedy="give Hz above zero, as 10; kind = 'full' keeps every sample",
+            )
+
+    @property
+    def rate(self) -> float:
+        """States a second."""
+        return float(self.rate_hz)
+
+
+#: A new recorder is a class and a line here.
+RECORDERS: dict[str, type[Recorder]] = {"full": FullRecorder, "interval": IntervalRecorder}
+
+
+@dataclass
+class _Observed:
+    """Observations of one name: time, innovations, variances, weights."""
+
+    labels: tuple[str, ...]
+    rows: GrowingRows
+
+
+@dataclass
+class Tape:
+    """What was kept so far of a run.
+
+    Its memory grows with the states and marks that it keeps, and with every observation: three
+    numbers a component, and its time.
+
+    Attributes
+    ----------
+    navigator : Navigator
+    rate : float, Hz
+        Most states and marks a second; infinite for all.
+    """
+
+    navigator: Navigator
+    rate: float = math.inf
+    _states: GrowingRows = field(init=False, repr=False)
+    _marks: GrowingRows = field(init=False, repr=False)
+    _seen: dict[str, _Observed] = field(init=False, repr=False, default_factory=dict)
+    _state_cell: float = field(init=False, repr=False, default=-math.inf)
+    _mark_cell: float = field(init=False, repr=False, default=-math.inf)
+    _newest_mark: Array | None = field(init=False, repr=False, default=None)
+
+    def __post_init__(self) -> None:
+        count = self.navigator.filter.model.stacked.sd.size
+        self._states = GrowingRows.of(1 + self.navigator.filter.mechanization.row)
+        self._marks = GrowingRows.of(1 + 81 + 2 * count)
+
+    def take(self, piece: NavigationPiece) -> None:
+        """Take what came of a further piece."""
+        cells = self._cells(piece.time)
+        first = np.diff(cells, prepend=self._state_cell) > 0.0
+        if len(cells):
+            self._state_cell = float(cells[-1])
+        rows = np.column_stack([piece.time[first], piece.history[first]])
+        self._states = self._states.and_then(rows)
+        for mark in piece.marks:
+            self._mark(mark)
+        for one in piece.seen:
+            self._observed(one)
+
+    def record(
+        self,
+        source: str | None = None,
+        events: tuple[Event, ...] = (),
+        modes: tuple[Span, ...] = (),
+        outages: Mapping[str, tuple[Span, ...]] | None = None,
+    ) -> NavigationRecord:
+        """Return it as tables.
+
+        Parameters
+        ----------
+        source : str, optional
+            Name for messages.
+        events, modes, outages
+            As of `NavigationRecord`.
+
+        Returns
+        -------
+        NavigationRecord
+
+        Raises
+        ------
+        DataError
+            Nothing was taken.
+        """
+        states = self._states.rows
+        if not len(states):
+            raise DataError(
+                "navigation made no step",
+                file=source,
+                quantity="time",
+                remedy="give samples beyond the end of the alignment",
+            )
+        used, model = self.navigator.filter.mechanization, self.navigator.filter.model
+        trajectory = used.trajectory(states[:, 0].copy(), states[:, 1:].copy(), source)
+        marks = self._marks.rows
+        if self._newest_mark is not None:
+            marks = np.vstack([marks, self._newest_mark])
+        time = pd.Index(marks[:, 0], name="time")
+        covariance = marks[:, 1:82].reshape(-1, 9, 9)
+        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
+        euler = trajectory[EULER].to_numpy()[nearest]
+        count = model.stacked.sd.size
+        labels = list(model.layout.labels())[model.layout.size - count :]
+        units = [one.block.unit for one in model.sensors for _ in one.block.labels]
+        return NavigationRecord(
+            trajectory=trajectory,
+            sd=trajectory_error_table(
+                time,
+                sd[:, :3],
+                sd[:, 3:6],
+                rotation.euler_sd(euler, covariance[:, 6:, 6:]),
+                source,
+            ),
+            covariance=covariance.copy(),
+            sensors=pd.DataFrame(marks[:, 82 : 82 + count].copy(), index=time, columns=labels),
+            sensors_sd=pd.DataFrame(marks[:, 82 + count :].copy(), index=time, columns=labels),
+            units=dict(zip(labels, units, strict=True)),
+            innovations={name: _table(one) for name, one in self._seen.items()},
+            events=events,
+            modes=modes,
+            outages=dict(outages or {}),
+        )
+
+    def _cells(self, time: Array) -> Array:
+        """Number of the interval in which each stamp lies."""
+        if math.isinf(self.rate):
+            return time
+        return np.floor(time * self.rate + NEAR)
+
+    def _mark(self, mark: Mark) -> None:
+        row = np.concatenate([[mark.time], mark.covariance.ravel(), mark.sensors, mark.sensors_sd])[
+            None, :
+        ]
+        cell = float(self._cells(np.array([mark.time]))[0])
+        # The newest one is kept beside, so that the last of a run is always there.
+        if cell > self._mark_cell:
+            self._marks = self._marks.and_then(row)
+            self._mark_cell, self._newest_mark = cell, None
+        elif mark.time == self._marks.rows[-1, 0]:
+            self._marks.rows[-1] = row
+        else:
+            self._newest_mark = row
+
+    def _observed(self, one: Seen) -> None:
+        known = self._seen.get(one.name)
+        if known is None:
+            known = _Observed(one.labels, GrowingRows.of(1 + 3 * len(one.labels)))
+            self._seen[one.name] = known
+        seen = one.innovations
+        row = np.concatenate([[one.time], seen.nu, seen.s, seen.weight])
+        known.rows = known.rows.and_then(row[None, :])
 
 
 def record_of(
@@ -36,47 +260,16 @@ def record_of(
     -------
     NavigationRecord
     """
-    used, model = navigator.filter.mechanization, navigator.filter.model
-    trajectory = used.trajectory(
-        np.concatenate([p.time for p in pieces]),
-        np.concatenate([p.history for p in pieces]),
-        source,
-    )
-    marks = [mark for piece in pieces for mark in piece.marks]
-    time = pd.Index([mark.time for mark in marks], name="time")
-    covariance = np.array([mark.covariance for mark in marks])
-    sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
-    euler = trajectory[EULER].to_numpy()[nearest]
-    labels = list(model.layout.labels())[-model.stacked.sd.size :]
-    units = [one.block.unit for one in model.sensors for _ in one.block.labels]
-    return NavigationRecord(
-        trajectory=trajectory,
-        sd=trajectory_error_table(
-            time, sd[:, :3], sd[:, 3:6], rotation.euler_sd(euler, covariance[:, 6:, 6:]), source
-        ),
-        covariance=covariance,
-        sensors=pd.DataFrame([m.sensors for m in marks], index=time, columns=labels),
-        sensors_sd=pd.DataFrame([m.sensors_sd for m in marks], index=time, columns=labels),
-        units=dict(zip(labels, units, strict=True)),
-        innovations=innovations_by_name([one for piece in pieces for one in piece.seen]),
-    )
+    tape = FullRecorder().begin(navigator)
+    for piece in pieces:
+        tape.take(piece)
+    return tape.record(source)
 
 
-def innovations_by_name(seen: Sequence[Seen]) -> dict[str, pd.DataFrame]:
-    """Return innovations as tables, by name of the observation."""
-    out = {}
-    for name in dict.fromkeys(one.name for one in seen):
-        those = [one for one in seen if one.name == name]
-        labels = those[0].labels
-        out[name] = pd.DataFrame(
-            np.hstack(
-                [
-                    np.array([getattr(one.innovations, part) for one in those])
-                    for part in ("nu", "s", "weight")
-                ]
-            ),
-            index=pd.Index([one.time for one in those], name="time"),
-            columns=[f"{part} {label}" for part in ("nu", "s", "weight") for label in labels],
-        )
-    return out
+def _table(one: _Observed) -> pd.DataFrame:
+    rows = one.rows.rows
+    return pd.DataFrame(
+        rows[:, 1:].copy(),
+        index=pd.Index(rows[:, 0].copy(), name="time"),
+        columns=[f"{part} {label}" for part in ("nu", "s", "weight") for label in one.labels],
+    )

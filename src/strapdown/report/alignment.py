@@ -10,14 +10,11 @@ import pandas as pd
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config.alignment_file import alignment_spec, read_alignment_spec
-from strapdown.report.alignment_document import (
-    CONVENTIONS,
-    alignment_charts,
-    alignment_document,
-)
+from strapdown.report.alignment_document import CONVENTIONS, alignment_document
 from strapdown.report.alignment_json import alignment_json
 from strapdown.report.crash_csv import write_table
 from strapdown.report.document_data import draw_stills
+from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
@@ -117,18 +114,16 @@ def write_alignment(
         force=force,
         seals=seals,
     ) as folder:
-        _write(folder / "align.json", to_json(alignment_json(result)))
+        write_text(folder / "align.json", to_json(alignment_json(result)))
         told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
         write_table(_attitude(result), folder / "attitude.csv", told)
         if result.fine is not None:
             write_table(_history(result.fine.history), folder / "fine.csv", told)
         progress("drawing the figures", 0.75)
         stills = draw_stills(document)
-        (folder / "figures").mkdir()
-        for chart, still in zip(alignment_charts(document), stills, strict=True):
-            _write(folder / "figures" / f"{chart.slug}.svg", still)
+        write_drawings(document, stills, folder / "figures")
         progress("writing the page", 0.9)
-        _write(folder / "report.html", document_page(document, stills=stills))
+        write_text(folder / "report.html", document_page(document, stills=stills))
     return seals[0]
 
 
@@ -157,7 +152,3 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
     out = history.rename(columns=names)
     out.insert(0, "time_s", out.index.to_numpy())
     return out.reset_index(drop=True)
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

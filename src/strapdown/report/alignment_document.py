@@ -13,7 +13,6 @@ from strapdown.report.alignment_tables import (
 )
 from strapdown.report.alignment_trust import trust
 from strapdown.report.alignment_words import headline, key_figures, limits
-from strapdown.report.chart import Chart
 from strapdown.report.document import (
     Block,
     ChartBlock,
@@ -27,7 +26,7 @@ from strapdown.report.document import (
 )
 from strapdown.systems.alignment_run import AlignmentResult
 
-__all__ = ["CONVENTIONS", "alignment_charts", "alignment_document"]
+__all__ = ["CONVENTIONS", "alignment_document"]
 
 CONVENTIONS = (
     ("Body axes", "forward, right, down; local level: north, east, down"),
@@ -86,12 +85,6 @@ def alignment_document(result: AlignmentResult, name: str) -> Document:
     )
     title = result.spec.title or f"Alignment of {result.source.name}"
     return Document(title, headline(result), facts, front, sections, title)
-
-
-def alignment_charts(document: Document) -> list[Chart]:
-    """The charts of a report, in the order in which they are drawn."""
-    blocks = [*document.front, *(b for s in document.sections for b in s.blocks)]
-    return [b.chart for b in blocks if isinstance(b, ChartBlock)]
 
 
 def _sensors(result: AlignmentResult) -> str:

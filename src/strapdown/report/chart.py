@@ -55,7 +55,7 @@ class Line:
     hollow : bool
         Points are drawn as outlines.
     size : float
-        Of a point, in pixels.
+        Of a point, in pixels; 0 for a label alone.
     labels : tuple of str
         One a point, or none.
     places : tuple of (int, int)
@@ -184,7 +184,8 @@ class Panel:
     title : str
     levels : tuple of Level
     categories : tuple of str
-        Names on the vertical axis at 0, 1, …, from the top.
+        Names on the vertical axis at 0, 1, …, from the top. Where other panels of the chart have
+        none, this one is as high as `height` says.
     x_label : str
         With its unit, of a plane: both axes have one scale, and the horizontal one is the panel's
         own, without marks and bands. Empty where the panel shares the chart's horizontal axis.
@@ -260,6 +261,20 @@ def steady_range(panel: Panel) -> tuple[float, float] | None:
         return None
     middle = 0.5 * float(found.min() + found.max())
     return middle - 0.5, middle + 0.5
+
+
+def strip_range(chart: Chart) -> tuple[float, float] | None:
+    """Ends of the horizontal axis where a strip of categories stands above other panels."""
+    strips = [p for p in chart.panels if p.categories]
+    if not strips or len(strips) == len(chart.panels):
+        return None
+    drawn = [fill.x for p in strips for fill in p.fills]
+    drawn += [line.x for p in strips for line in p.lines]
+    found = np.concatenate(drawn or [np.empty(0)])
+    found = found[np.isfinite(found)]
+    if not found.size or not np.ptp(found):
+        return None
+    return float(found.min()), float(found.max())
 
 
 def runs(*columns: Array) -> list[slice]:

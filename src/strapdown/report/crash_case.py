@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,12 @@ from strapdown.config.crash_case_file import read_case_spec
 from strapdown.formats.mme_writer import write_mme
 from strapdown.report.crash_assumptions import CONVENTIONS
 from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
-from strapdown.report.crash_document import crash_document, drawings
+from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_figures import crash_figures
 from strapdown.report.crash_json import crash_json
 from strapdown.report.crash_signal_record import signal_record
-from strapdown.report.document import Animation, ChartBlock, Document, Picture
 from strapdown.report.document_data import draw_stills
+from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
 from strapdown.systems.crash_case import CaseResult, run_case
@@ -120,17 +119,16 @@ def write_crash(
         _write_numbers(result, folder)
         progress("drawing the figures", 0.65)
         stills = draw_stills(document)
-        (folder / "figures").mkdir()
-        _keep(document, stills, folder / "figures")
+        write_drawings(document, stills, folder / "figures")
         progress("writing the page", 0.85)
-        _write(folder / "report.html", document_page(document, stills=stills))
+        write_text(folder / "report.html", document_page(document, stills=stills))
         progress("setting the PDF", 0.9)
         write_pdf(document, folder / "report.pdf", stills=stills)
     return seals[0]
 
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:
-    _write(folder / "crash.json", to_json(crash_json(result)))
+    write_text(folder / "crash.json", to_json(crash_json(result)))
     told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
     main = result.reconstruction.main
     write_table(trajectory_table(main.path), folder / "trajectory.csv", told)
@@ -161,20 +159,3 @@ def file_name(name: str, made: set[str]) -> str:
         own, number = f"{plain}-{number}", number + 1
     made.add(own)
     return own
-
-
-def _keep(document: Document, stills: Sequence[str], folder: Path) -> None:
-    """Put every picture of the report among the figures."""
-    drawn = iter(stills)
-    for block in drawings(document):
-        match block:
-            case ChartBlock(chart=chart):
-                _write(folder / f"{chart.slug}.svg", next(drawn))
-            case Picture() as picture:
-                _write(folder / f"{picture.slug}.svg", picture.svg)
-            case Animation(stills=picture):
-                _write(folder / f"{picture.slug}.svg", picture.svg)
-
-
-def _write(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8", newline="\n")

@@ -14,7 +14,6 @@ from strapdown.report.crash_notes import notes, record_facts
 from strapdown.report.crash_values import GAP, plain
 from strapdown.report.crash_words import headline, key_figures, lead
 from strapdown.report.document import (
-    Animation,
     Block,
     ChartBlock,
     Document,
@@ -22,14 +21,13 @@ from strapdown.report.document import (
     Items,
     KeyFigures,
     Paragraph,
-    Picture,
     Section,
     TableBlock,
 )
 from strapdown.systems.case_words import in_case_words
 from strapdown.systems.crash_case import CaseResult
 
-__all__ = ["crash_document", "drawings"]
+__all__ = ["crash_document"]
 
 SIGNALS = (
     "Specific force is what an accelerometer feels: −1 g downward at rest, 1 g = 9.80665 m/s². It "
@@ -255,14 +253,3 @@ def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
         Paragraph(command, "mono"),
         sources.inputs_table(result),
     )
-
-
-def drawings(document: Document) -> list[ChartBlock | Picture | Animation]:
-    """Return every chart, picture and animation, in the order of the report."""
-    found: list[ChartBlock | Picture | Animation] = []
-    for block in (*document.front, *(b for s in document.sections for b in s.blocks)):
-        if isinstance(block, ChartBlock | Picture | Animation):
-            found.append(block)
-        elif isinstance(block, KeyFigures):
-            found += block.pictures
-    return found

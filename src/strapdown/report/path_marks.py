@@ -40,12 +40,20 @@ class View:
     high: Array
 
     @classmethod
-    def of(cls, paths: list[Path]) -> View:
-        """The least view of all paths in which the panel is neither too low nor too high."""
+    def of(cls, paths: list[Path], most: float = _MOST) -> View:
+        """The least view of all paths in which the panel is neither too low nor too high.
+
+        Parameters
+        ----------
+        paths : list of (ndarray, ndarray)
+            East and north of each.
+        most : float
+            Height of the panel over its width, for one as wide as the picture.
+        """
         points = np.hstack([np.vstack(path) for path in paths])
         low, high = points.min(axis=1), points.max(axis=1)
         east, north = high - low
-        share = np.clip(north / east if east > 0.0 else np.inf, _LEAST, _MOST)
+        share = np.clip(north / east if east > 0.0 else np.inf, _LEAST, most)
         width = max(east, north / share)
         half = 0.5 * np.array([width, width * share])
         return cls(0.5 * (low + high) - half, 0.5 * (low + high) + half)

@@ -8,7 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.report.chart import Array, Chart, Line, Mark, Panel, short_span, steady_range
+from strapdown.report.chart import (
+    Array,
+    Chart,
+    Line,
+    Mark,
+    Panel,
+    short_span,
+    steady_range,
+    strip_range,
+)
 from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.plotly_areas import bar_labels, bar_traces, fill_traces, see_through
 from strapdown.report.plotly_numbers import numbers
@@ -42,6 +51,8 @@ def figure(chart: Chart) -> dict[str, Any]:
         "margin": {"l": 70, "r": 18, "t": 34, "b": 54},
         "height": _height(chart),
         "hovermode": "closest" if chart.log_x or planes else "x unified",
+        # No letters of thousands: what stands on an axis may be a stamp.
+        "separators": ".",
         "legend": {"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0},
         "shapes": [],
         "annotations": [],
@@ -76,7 +87,11 @@ def figure(chart: Chart) -> dict[str, Any]:
                 beyond = rows if panel.title else rows - 1
                 layout["margin"]["t"] += max(0, 15 * beyond)
         if panel.x_label:
-            layout[f"yaxis{suffix}"] |= {"scaleanchor": f"x{x_suffix}", "scaleratio": 1}
+            layout[f"yaxis{suffix}"] |= {
+                "scaleanchor": f"x{x_suffix}",
+                "scaleratio": 1,
+                "exponentformat": "none",
+            }
         lifted = 6 + (15 * rows if number == planes else 0)
         _decorate(layout, panel, f"x{x_suffix}", f"y{suffix}", chart.log_x, lifted)
         axes = (f"x{x_suffix}", f"y{suffix}")
@@ -91,12 +106,12 @@ def figure(chart: Chart) -> dict[str, Any]:
 
 
 def _height(chart: Chart) -> int:
-    rows = max(len(panel.categories) for panel in chart.panels)
+    rows = min(len(panel.categories) for panel in chart.panels)
     if rows:
-        return 150 + _ROW * rows
+        return 150 + _ROW * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
         return 440
-    if len(chart.panels) == 1:
+    if len(chart.panels) == 1 and not chart.panels[0].x_label:
         return 400
     return 150 + round(190 * sum(panel.height for panel in chart.panels))
 
@@ -147,11 +162,15 @@ def _x_axis(chart: Chart, domain: tuple[float, float], panel: Panel) -> dict[str
         "gridcolor": _GRID,
         "zeroline": False,
         "domain": list(domain),
+        # Stamps, and metres, in all of their digits.
+        "exponentformat": "none",
     }
     if panel.bars and panel.categories:
         axis |= {"zeroline": True, "zerolinecolor": _INK, "zerolinewidth": 1}
     if panel.x_step:
         axis["dtick"] = panel.x_step
+    if (ends := strip_range(chart)) is not None:
+        axis["range"] = list(ends)
     if panel.x_label or not chart.log_x:
         return axis
     values = [_all(p.lines, what) for p in chart.panels for what in ("x", "low", "high")]
@@ -295,6 +314,13 @@ def _decorate(
         )
 
 
+def _mode(line: Line) -> str:
+    if line.points:
+        # Points without a size are labels alone.
+        return "markers" if line.size else "none"
+    return "lines+markers" if line.dots else "lines"
+
+
 def _labels(line: Line, x: str, y: str, log: tuple[bool, bool]) -> list[dict[str, Any]]:
     """Return the labels of points as annotations, a thin line leading to those farther off."""
     found = []
@@ -332,7 +358,7 @@ def _traces(panel: Panel, x_axis: str, y_axis: str, named: set[str]) -> list[dic
             named.add(name)
         trace: dict[str, Any] = {
             "type": "scatter",
-            "mode": "markers" if line.points else "lines+markers" if line.dots else "lines",
+            "mode": _mode(line),
             "name": name,
             "legendgroup": name,
             "showlegend": shown,

@@ -10,7 +10,7 @@ from textwrap import fill
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from strapdown.report.chart import Chart, Line, Panel, steady_range
+from strapdown.report.chart import Chart, Line, Panel, steady_range, strip_range
 from strapdown.report.mark_places import LONGEST_BESIDE, label_rows, label_side
 from strapdown.report.svg_areas import draw_bars, draw_fills, fill_outline, set_ticks
 
@@ -184,9 +184,8 @@ def _axes(chart: Chart, figure: Figure) -> list[Axes]:
 
 
 def _height(chart: Chart) -> float:
-    rows = max(len(panel.categories) for panel in chart.panels)
-    if rows:
-        return 1.5 + 0.3 * rows
+    if min(len(panel.categories) for panel in chart.panels):
+        return 1.5 + 0.3 * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
         return 4.6
     return 1.4 + 2.0 * sum(panel.height for panel in chart.panels) + (len(chart.panels) == 1)
@@ -194,9 +193,8 @@ def _height(chart: Chart) -> float:
 
 def _paper_height(chart: Chart) -> float:
     """Of a chart in a column of print: two of three panels, with what is said, fill a page."""
-    rows = max(len(panel.categories) for panel in chart.panels)
-    if rows:
-        return 0.8 + 0.19 * rows
+    if min(len(panel.categories) for panel in chart.panels):
+        return 0.8 + 0.19 * max(len(panel.categories) for panel in chart.panels)
     if chart.beside:
         return 3.2
     titles = 0.18 * sum(bool(panel.title) for panel in chart.panels)
@@ -271,6 +269,8 @@ def _draw_panel(panel: Panel, axis: Axes, chart: Chart) -> None:
     set_ticks(panel, axis)
     if panel.steady:
         axis.ticklabel_format(axis="y", useOffset=False)
+    if (span := strip_range(chart)) is not None:
+        axis.set_xlim(*span)
     if panel.x_label:
         axis.set_xlabel(panel.x_label)
         axis.set_aspect("equal", adjustable="datalim")

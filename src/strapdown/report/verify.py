@@ -39,6 +39,7 @@ from strapdown.report.attitude import write_attitude
 from strapdown.report.changed_case import changed_case
 from strapdown.report.crash_case import rerun_crash
 from strapdown.report.crash_simulation import write_crash_simulation
+from strapdown.report.navigation import rerun_navigation
 from strapdown.report.reproduction import make_reproduction, write_reproduction
 from strapdown.report.simulation import write_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
@@ -102,10 +103,15 @@ def _rerun_alignment(configuration: dict[str, Any], out: Path, sealed: set[str])
     return rerun_alignment(configuration, out)
 
 
+def _rerun_navigation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    return rerun_navigation(configuration, out)
+
+
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "align": _rerun_alignment,
     "attitude": _rerun_attitude,
     "crash": _rerun_crash,
+    "navigate": _rerun_navigation,
     "reproduce": _rerun_reproduction,
     "simulate": _rerun_simulation,
 }
@@ -221,7 +227,7 @@ def _difference(a: Path, b: Path) -> float | None:
             if len(leaves[0]) != len(leaves[1]):
                 return math.inf
             return max(map(_leaf_difference, *leaves), default=0.0)
-        if a.suffix in (".csv", ".npz", ".h5", ".mat"):
+        if a.suffix in (".csv", ".npz", ".h5", ".mat", ".parquet"):
             return _column_difference(read_raw(a).columns, read_raw(b).columns)
     except (ValueError, RecursionError, StrapdownError):
         return math.inf

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.exceptions import ConfigError
 from strapdown.sensors.antenna import antenna_motion
 from strapdown.sensors.error_draws import Seed, child, gauss_markov, normal
@@ -186,7 +187,7 @@ def simulate_gnss(
     velocity_sd = receiver.stated_velocity_sd or receiver.velocity_noise
     return gnss_table(
         (instants + receiver.time_offset)[kept],
-        _moved(motion, place, off)[kept],
+        moved_places(place, off, motion.ellipsoid)[kept],
         (velocity + fast)[kept],
         position_sd,
         velocity_sd,
@@ -206,11 +207,11 @@ def _antenna(motion: EarthMotion, time: Array, receiver: GnssReceiver) -> tuple[
     )
 
 
-def _moved(motion: EarthMotion, place: Array, off: Array) -> Array:
-    """Places that are wrong by metres north, east, down."""
+def moved_places(place: Array, off: Array, ellipsoid: Ellipsoid = WGS84) -> Array:
+    """Return places that are wrong by metres north, east, down, (n, 3)."""
     from strapdown.earth import radii_of_curvature
 
-    meridian, transverse = radii_of_curvature(place[:, 0], ellipsoid=motion.ellipsoid)
+    meridian, transverse = radii_of_curvature(place[:, 0], ellipsoid=ellipsoid)
     out = place.copy()
     out[:, 0] += np.degrees(off[:, 0] / (meridian + place[:, 2]))
     parallel = (transverse + place[:, 2]) * np.cos(np.radians(place[:, 0]))

@@ -19,7 +19,7 @@ from strapdown.sensors.axes_matrix import NAMED_AXES
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, number, string
 
-__all__ = ["AlignmentDraft", "draft_alignment"]
+__all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "toml_value"]
 
 #: Of the catalogue those that can find north, or nearly.
 GRADES = ("navigation", "tactical")
@@ -166,11 +166,11 @@ def _sensors(page: Page) -> None:
 
 
 def _stage(page: Page, slot: Slot, default: str, empty: bool) -> None:
-    page.table(f"[{slot.name}]", f"{slot.title}:", *_listed(slot, empty))
+    page.table(f"[{slot.name}]", f"{slot.title}:", *listed_kinds(slot, empty))
     page.key("kind", string(default))
     if default in slot.entries:
         for option in options_of(slot.entries[default]):
-            value = _toml(option.default)
+            value = toml_value(option.default)
             if option.slot is not None:
                 choices = ", ".join(option.slot.entries)
                 said = value if option.default is not None else '"none"'
@@ -181,8 +181,8 @@ def _stage(page: Page, slot: Slot, default: str, empty: bool) -> None:
         page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
 
 
-def _listed(slot: Slot, empty: bool) -> list[str]:
-    """One line a kind."""
+def listed_kinds(slot: Slot, empty: bool) -> list[str]:
+    """One line a kind of a slot, for comments; with ``none``, where it may stay empty."""
     kinds = {kind: _summary(entry) for kind, entry in slot.entries.items()}
     if empty:
         kinds["none"] = "left out"
@@ -195,7 +195,7 @@ def _summary(entry: type) -> str:
     return str(said).rstrip(".")
 
 
-def _toml(value: Any) -> str | None:
+def toml_value(value: Any) -> str | None:
     """A plain value of TOML; None for what is none."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -204,7 +204,7 @@ def _toml(value: Any) -> str | None:
     if isinstance(value, str):
         return string(value)
     if isinstance(value, tuple | list):
-        parts = [_toml(v) for v in value]
+        parts = [toml_value(v) for v in value]
         return f"[{', '.join(p for p in parts if p is not None)}]"
     if isinstance(value, Mapping) or value is MISSING:
         return None

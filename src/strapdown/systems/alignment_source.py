@@ -14,7 +14,8 @@ from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats import read_log
-from strapdown.formats.named_columns import read_fixes
+from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import ReadOptions, Recording, StatedStart
 from strapdown.results import InputFiles, Reading
 from strapdown.rotation import euler_from_dcm
@@ -30,7 +31,7 @@ from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = ["AlignmentSource", "read_alignment_source"]
+__all__ = ["AlignmentSource", "body_record", "read_alignment_source"]
 
 Array = NDArray[np.float64]
 
@@ -84,9 +85,54 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     """
     if spec.log is None:
         return _simulated(spec)
-    gyro, accel = _matrices(spec.axes)
-    letters, turn = axes_letters(gyro) if gyro is not None else (spec.axes.axes, None)
-    recording = read_log(spec.log.path, _options(spec.log, letters))
+    recording, imu, findings = body_record(spec.log, spec.axes)
+    gnss = None
+    if spec.gnss is not None:
+        gnss, shifted = on_clock_of(read_gnss(spec.gnss.path), recording.imu)
+        findings = (*findings, *gnss.attrs["findings"], *([shifted] if shifted else []))
+    return AlignmentSource(
+        recording.name,
+        "recorded log",
+        imu,
+        None,
+        recording.start,
+        gnss,
+        recording.readings,
+        (
+            input_files("log", spec.log.path, recording.files),
+            *(() if spec.gnss is None else (_fixes(spec.gnss.path),)),
+            *_sensor_file(spec),
+        ),
+        findings,
+    )
+
+
+def body_record(
+    log: LogTable, axes: AxesTable
+) -> tuple[Recording, pd.DataFrame, tuple[Finding, ...]]:
+    """Read a log, turn it into body axes, and cut it to the span that is used.
+
+    Parameters
+    ----------
+    log : LogTable
+    axes : AxesTable
+
+    Returns
+    -------
+    recording : Recording
+        As it was read: all of it.
+    imu : DataFrame
+        Imu table of the span, body axes.
+    findings : tuple of Finding
+
+    Raises
+    ------
+    DataError, ConfigError
+        It cannot be used; the message names file, row and remedy.
+    """
+    gyro, accel = _matrices(axes)
+    letters, turn = axes_letters(gyro) if gyro is not None else (axes.axes, None)
+    recording = read_log(log.path, _options(log, letters))
     findings = list(recording.findings)
     imu = recording.imu
     if gyro is not None and accel is not None and turn is not None:
@@ -96,22 +142,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
         if ACCEL[0] in imu.columns:
             force = values_of(imu, ACCEL).mean(axis=0)
             findings += report_transposed(accel, force, recording.name)
-    imu = _span(imu, spec.log, recording.name)
-    return AlignmentSource(
-        recording.name,
-        "recorded log",
-        imu,
-        None,
-        recording.start,
-        None if spec.gnss is None else read_fixes(spec.gnss.path),
-        recording.readings,
-        (
-            input_files("log", spec.log.path, recording.files),
-            *(() if spec.gnss is None else (_fixes(spec.gnss.path),)),
-            *_sensor_file(spec),
-        ),
-        tuple(findings),
-    )
+    return recording, _span(imu, log, recording.name), tuple(findings)
 
 
 def _fixes(path: str) -> InputFiles:

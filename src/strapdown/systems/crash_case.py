@@ -15,7 +15,8 @@ from strapdown.crash.path import CrashPath
 from strapdown.exceptions import Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
-from strapdown.formats.named_columns import read_fixes, read_reference_path
+from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.named_columns import read_reference_path
 from strapdown.results import InputFiles
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.systems.attitude_source import input_files, sensor_file
@@ -205,7 +206,7 @@ def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
     if entry.kind == "gnss":
         assert entry.path is not None
         return GnssEntry(
-            read_fixes(entry.path),
+            read_gnss(entry.path),
             impact=entry.time_s,
             antenna=entry.antenna_m or (0.0, 0.0, 0.0),
             priors={"antenna_sd": entry.antenna_sd_m},

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -79,7 +80,7 @@ def simulate_trajectory(
         names the key.
     """
     errors = ImuErrors() if spec.sensor is None else load_sensor(spec.sensor).draw(spec.seed)
-    try:
+    with with_key(f"{spec.name}.toml"):
         motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
         imu, attitude = simulate_imu(
             motion,
@@ -90,8 +91,6 @@ def simulate_trajectory(
             source=spec.name,
         )
         trajectory = motion.trajectory(imu.index.to_numpy(dtype=np.float64), source=spec.name)
-    except ConfigError as error:
-        raise _with_key(error, f"{spec.name}.toml") from None
     return motion, errors, imu, attitude, trajectory
 
 
@@ -224,6 +223,21 @@ def _waypoints(spec: motions.WaypointsSpec, ellipsoid: Ellipsoid) -> EarthMotion
 
 def _angle_waves(waves: Iterable[motions.AngleWaveSpec]) -> tuple[Wave, ...]:
     return tuple(Wave(w.amplitude_deg, w.period_s, w.phase_deg) for w in waves)
+
+
+@contextmanager
+def with_key(name: str) -> Iterator[None]:
+    """Tell errors with the keys of a file in place of the simulation's own words.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        raise _with_key(error, name) from None
 
 
 def _with_key(error: ConfigError, name: str) -> ConfigError:

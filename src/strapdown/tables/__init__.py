@@ -27,6 +27,11 @@ Gnss                    ``time`` s             ``lat lon`` deg, ``alt`` m, ``VN 
                                                antenna; ``north_sd east_sd down_sd`` m, ``VN_sd
                                                VE_sd VD_sd`` m/s: inf where not measured;
                                                ``quality``: 0 no fix, else as NMEA 0183 GGA
+Odometer                ``time`` s             ``speed speed_sd`` m/s, forward positive
+Barometer               ``time`` s             ``height height_sd`` m
+Heading                 ``time`` s             ``heading heading_sd`` deg
+BodyVelocity            ``time`` s             ``vx vy vz vx_sd vy_sd vz_sd`` m/s, axes of the
+                                               instrument
 Attitude                ``time`` s             ``q_w q_x q_y q_z`` (body to local level) and
                                                ``roll pitch heading`` deg
 References              none                   ``time`` s, ``kind`` (``known``, ``tilt``,
@@ -38,6 +43,17 @@ References              none                   ``time`` s, ``kind`` (``known``, 
 from __future__ import annotations
 
 from strapdown.tables.attitude import attitude_table, check_attitude
+from strapdown.tables.barometer import (
+    BAROMETER,
+    barometer_from_pressure,
+    barometer_table,
+    check_barometer,
+)
+from strapdown.tables.body_velocity import (
+    BODY_VELOCITY,
+    body_velocity_table,
+    check_body_velocity,
+)
 from strapdown.tables.columns import (
     ACCEL,
     DR,
@@ -58,12 +74,19 @@ from strapdown.tables.columns import (
 )
 from strapdown.tables.gaps import Gap, find_gaps
 from strapdown.tables.gnss import GNSS, check_gnss, gnss_table
+from strapdown.tables.heading import HEADING, check_heading, heading_table
 from strapdown.tables.imu import SAMPLINGS, check_imu, imu_table
 from strapdown.tables.increments import check_increments, increments_table
 from strapdown.tables.motion_increments import (
     MOTION,
     check_motion_increments,
     motion_increments_table,
+)
+from strapdown.tables.odometer import (
+    ODOMETER,
+    check_odometer,
+    odometer_from_distance,
+    odometer_table,
 )
 from strapdown.tables.references import REFERENCE_KINDS, check_references, references_table
 from strapdown.tables.trajectory import TRAJECTORY, check_trajectory, places_of, trajectory_table
@@ -76,6 +99,8 @@ from strapdown.tables.trajectory_errors import (
 
 __all__ = [
     "ACCEL",
+    "BAROMETER",
+    "BODY_VELOCITY",
     "DR",
     "DTHETA",
     "DV",
@@ -83,9 +108,11 @@ __all__ = [
     "GEODETIC",
     "GNSS",
     "GYRO",
+    "HEADING",
     "MAG",
     "MOTION",
     "NED",
+    "ODOMETER",
     "PHI",
     "POSITION_SD",
     "QUATERNION",
@@ -99,20 +126,30 @@ __all__ = [
     "VELOCITY_SD",
     "Gap",
     "attitude_table",
+    "barometer_from_pressure",
+    "barometer_table",
+    "body_velocity_table",
     "check_attitude",
+    "check_barometer",
+    "check_body_velocity",
     "check_gnss",
+    "check_heading",
     "check_imu",
     "check_increments",
     "check_motion_increments",
+    "check_odometer",
     "check_references",
     "check_trajectory",
     "check_trajectory_error",
     "check_trajectory_sd",
     "find_gaps",
     "gnss_table",
+    "heading_table",
     "imu_table",
     "increments_table",
     "motion_increments_table",
+    "odometer_from_distance",
+    "odometer_table",
     "places_of",
     "references_table",
     "trajectory_error_table",

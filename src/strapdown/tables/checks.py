@@ -86,6 +86,21 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
         )
 
 
+def check_positive_sd(table: pd.DataFrame, columns: Sequence[str], source: str | None) -> None:
+    """Standard deviations are above zero: infinite ones are of rows that say nothing."""
+    values = values_of(table, columns)
+    bad = ~(values > 0.0)
+    if bad.any():
+        row, column = (int(i) for i in np.argwhere(bad)[0])
+        raise DataError(
+            f"{values[row, column]:.9g} is no standard deviation",
+            file=source,
+            row=row + 1,
+            quantity=columns[column],
+            remedy="give a number above zero, and inf where nothing was measured",
+        )
+
+
 def check_time(time: Array, source: str | None) -> None:
     """Stamps are finite and advance."""
     check_rows(time[:, None], ["time"], source)

@@ -190,6 +190,9 @@ def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
         "they are km/h: divide them by 3.6": misfit(told / kmh),
         "they are knots: multiply them by 0.514444": misfit(told / knots),
         "north and east are exchanged: exchange VN and VE": misfit(told[:, ::-1]),
+        "latitude and longitude are degrees and minutes: make ddmm.mmmm to dd + mm.mmmm / 60": (
+            misfit(told, track / 0.6)
+        ),
     }
     if np.abs(place[:, 1]).max() < 90.0:
         other = place_difference(place[apart:][:, [1, 0, 2]], place[:-apart][:, [1, 0, 2]])[:, :2]

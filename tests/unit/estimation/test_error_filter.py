@@ -84,7 +84,7 @@ def test_errors_that_samples_have_are_taken_off_increments():
     _, wanted = increments_of(true)
     _, given = increments_of(wrong)
     out = np.empty_like(given)
-    compensate(given, gyro, accel, states, out)
+    compensate(given, gyro @ states, accel @ states, out)
     # What is left: the change of the errors within a step of 0.01 s, its twelfth times the turn
     # (0.3 rad/s) times 3e-2 m/s², and the square of the errors in the cross terms, 3e-4 x 9.8
     # times dt²: 1e-8 m/s of 3e-4 m/s that was taken off.

@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from strapdown._kernels import psi_model
 from strapdown._kernels.compensation import compensate
+from strapdown._kernels.level import Q_LB
 from strapdown.ellipsoids import WGS84, find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.joseph import Joseph
@@ -48,11 +49,11 @@ def by_vectors(segment, step):
     """The psi-angle model with a vertical displacement of zero, each group by expm (Van Loan)."""
     used, rows = segment.mechanization, segment.increments
     n = len(SIZE)
-    gyro, accel, decay, drive, _ = stack(BLOCKS)
+    _, _, gyro, accel, decay, drive, _ = stack(BLOCKS)
     earth, levels = find_ellipsoid(used.ellipsoid).parameters(), used.levels(segment.history)
     Phi, Q, matrix, at = np.eye(n), np.zeros((n, n)), np.empty((6, 3)), 0
     while at < len(rows):
-        end, dt = psi_model.means_of_steps(levels, rows, at, step, matrix)
+        end, dt = psi_model.means_of_steps(levels, Q_LB, rows, at, step, matrix)
         F = np.zeros((n, n))
         psi_model.psi_dynamics(
             F[:9],
@@ -147,7 +148,7 @@ def test_two_filters_tell_the_same():
     gyro, accel, *_ = stack(BLOCKS)
     wrong = np.empty_like(rows)
     put_on = np.array([1e-6, -2e-6, 1e-6, 1e-3, 2e-3, -1e-3, 1e-4, -2e-4, 1e-4])
-    compensate(rows, gyro, accel, -put_on, wrong)
+    compensate(rows, -gyro @ put_on, -accel @ put_on, wrong)
     sd = np.concatenate([[20.0, 20.0, 0.0, 0.2, 0.2, 0.0], [1e-3] * 3, [1e-6] * 3, [1e-3] * 3])
     P = np.diag(np.concatenate([sd, [1e-4] * 3]) ** 2)
     seen = [0, 1, 3, 4]

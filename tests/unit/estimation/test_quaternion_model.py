@@ -185,7 +185,7 @@ def test_sensors_act_as_in_the_mechanization(case):
             states, wrong = np.zeros(k), np.empty_like(rows)
             # So small that tilts stay under 1e-4; taken off with the other sign, it is put on.
             states[j] = -sign * 1e-6
-            compensate(rows, gyro, accel, states, wrong)
+            compensate(rows, gyro @ states, accel @ states, wrong)
             ends[j, sign] = physical_error(run(mechanization, begin, wrong)[-1], history[-1], WGS84)
     found = np.stack([(ends[j, 1.0] - ends[j, -1.0]) / 2e-6 for j in range(k)], axis=1)
     # Means over h = 0.02 s leave out of a product, as of attitude and rate, h²/12 of what both

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from strapdown.exceptions import DataError
-from strapdown.formats.named_columns import read_fixes, read_reference_path
+from strapdown.formats.named_columns import read_reference_path
 from strapdown.tables import NED
 
 
@@ -71,11 +71,3 @@ def test_refused(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(DataError) as error:
         read_reference_path(written(tmp_path, text))
     assert message in str(error.value)
-
-
-def test_fixes(tmp_path: Path) -> None:
-    head = "time,lat,lon,alt,VN,VE,VD,north_sd,east_sd,down_sd,VN_sd,VE_sd,VD_sd"
-    row = "45.0,15.0,100,10,0,0,1,1,2,0.1,0.1,0.2"
-    table = read_fixes(written(tmp_path, f"{head}\n-1.0,{row}\n-0.9,{row}\n"))
-    assert table["VN"].tolist() == [10.0, 10.0]
-    assert table["quality"].tolist() == [1, 1]

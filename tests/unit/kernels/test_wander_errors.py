@@ -110,11 +110,13 @@ def test_every_entry_is_the_derivative_of_the_equations(seed, alt, pole):
     Y, t, rate, force = drawn(seed, pole)
     blocks = (gyro_bias(1), accel_bias(1), gyro_scale(1), accel_misalignment(1), g_sensitivity(1))
     k = sum(len(b.block) for b in blocks)
-    gyro, accel, *_ = stack(blocks)
+    gyro, accel, gyro_terms, accel_terms, *_ = stack(blocks)
     level, C = level_row(Y, t, alt)
     F = np.empty((9, 9 + k))
     rooms = [np.empty((3, 3)) for _ in range(3)]
-    kernel.wander_dynamics(F, level, C, C @ force, rate, force, gyro, accel, False, EARTH, *rooms)
+    kernel.wander_dynamics(
+        F, level, C, C @ force, rate, force, gyro_terms, accel_terms, False, EARTH, *rooms
+    )
 
     S = variables(Y, t)
     dY = equations(Y, t, alt, rate, force)
@@ -165,7 +167,7 @@ def test_with_a_held_height_nothing_moves_vertically():
     Y, t, rate, force = drawn(0, pole=False)
     level, C = level_row(Y, t, 0.0)
     blocks = (gyro_bias(1), accel_bias(1))
-    gyro, accel, *_ = stack(blocks)
+    _, _, gyro, accel, *_ = stack(blocks)
     free, held = np.empty((9, 15)), np.empty((9, 15))
     for F, hold in ((free, False), (held, True)):
         rooms = [np.empty((3, 3)) for _ in range(3)]

@@ -1,0 +1,148 @@
+"""A mechanization and the covariance of its errors, over the steps between two epochs.
+
+Steps are taken together to groups of up to a given time; the mechanization goes from step to step,
+the covariance from group to group. What is left of a group when a piece of a log ends is kept,
+so that a log may be cut anywhere.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+from strapdown._kernels.compensation import compensate, errors_of_states
+from strapdown._kernels.factors import udu_predict
+from strapdown._kernels.growth import CORE, grown_covariance, growth_of_step
+from strapdown._kernels.ned import Q as Q_NB
+from strapdown._kernels.ned import ned_advance
+from strapdown._kernels.ned_level import ned_levels
+from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
+from strapdown._kernels.wander import Q_WB, wander_advance
+from strapdown._kernels.wander_level import wander_levels
+
+# Mechanizations.
+NED, WANDER = 0, 1
+# Forms of a covariance: the matrix, by two updates; its factors, by two.
+JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
+# What became of a call: all is done; a covariance is to be noted; the mechanization diverged; the
+# covariance is none.
+ALL, NOTE, DIVERGED, BAD = 0, 1, 2, 3
+# Places in the times of a loop: of the covariance, of the newest step.
+AT_COVARIANCE, AT_STEP = 0, 1
+# A group ends before it is longer than this many steps of its time.
+BEYOND = 1.000001
+
+
+# A call hands over what belongs together:
+# - kinds: (mechanization, form, whether the height is held);
+# - model: (terms of gyros, terms of accelerometers, decay, drive, noise (2, 3), earth, options);
+# - states: (mechanization, covariance, sensors, times), which go on in place;
+# - group: (rows of the history, the first at its start; increments), of what is not closed yet;
+# - room: arrays to work in.
+
+
+@njit(cache=True, error_model="numpy")
+def close_group(kinds, model, states, group, count, room):
+    """Take the covariance over the steps of a group; return -1, or the first state gone bad.
+
+    The covariance is padded (`growth.padded`), or holds the (n, n) factors.
+    """
+    if count == 0:
+        return -1
+    which, form, held = kinds
+    gyro_terms, accel_terms, decay, drive, noise, earth, _ = model
+    _, covariance, sensors, times = states
+    open_history, open_rows = group
+    f, phi, tail, q, work, matrix, level, after, whole, added = room
+    q_at, up = Q_NB, -1.0
+    if which == WANDER:
+        q_at, up = Q_WB, 1.0
+    _, dt = means_of_steps(open_history, q_at, open_rows[:count], 0, math.inf, matrix)
+    middle = count // 2
+    if which == WANDER:
+        wander_levels(open_history[middle : middle + 1], earth, level)
+    else:
+        ned_levels(open_history[middle : middle + 1], earth, level)
+    psi_dynamics(
+        f,
+        level[0],
+        up,
+        matrix,
+        matrix[3],
+        matrix[4],
+        matrix[5],
+        gyro_terms,
+        accel_terms,
+        held,
+        earth,
+    )
+    still = HELD_ROWS if held else 0
+    growth_of_step(f, decay, dt, matrix, noise[0], noise[1], drive, still, phi, tail, q, work)
+    if form < UD:
+        bad = grown_covariance(covariance, phi, tail, q, after, work)
+    else:
+        n = CORE + decay.shape[0]
+        for i in range(n):
+            for j in range(n):
+                whole[i, j] = phi[i, j] if i < CORE else 0.0
+                added[i, j] = q[i, j]
+            if i >= CORE:
+                whole[i, i] = tail[i - CORE]
+        bad = udu_predict(covariance, whole, added, after)
+    covariance[:, :] = after
+    for j in range(tail.shape[0]):
+        sensors[j] *= tail[j]
+    for j in range(open_history.shape[1]):
+        open_history[0, j] = open_history[count, j]
+    times[AT_COVARIANCE] = times[AT_STEP]
+    return bad
+
+
+@njit(cache=True, error_model="numpy")
+def over_steps(kinds, model, states, group, count, room, step, note_at, time, rows, history):
+    """Go over steps; return what became of it, the steps made, and those of the open group.
+
+    `time` are the ends of the steps, `rows` their increments; `history` takes a row after each.
+    A call ends before its steps where a group was closed at `note_at` or later. The last array of
+    `room` is of errors of readings, (2, 7, 3).
+    """
+    gyro_terms, accel_terms, _, _, _, earth, options = model
+    state, _, sensors, times = states
+    open_history, open_rows = group
+    closing, errors, heights = room
+    made = 0
+    total = time.shape[0]
+    while made < total:
+        end = made
+        begun = times[AT_COVARIANCE]
+        while (
+            end < total
+            and count + end - made < open_rows.shape[0]
+            and (time[end] - begun <= step * BEYOND or count + end - made == 0)
+        ):
+            end += 1
+        if end == made:
+            bad = close_group(kinds, model, states, group, count, closing)
+            count = 0
+            if bad >= 0:
+                return BAD, made, bad
+            if times[AT_COVARIANCE] >= note_at:
+                return NOTE, made, count
+            continue
+        errors_of_states(gyro_terms, sensors, errors[0])
+        errors_of_states(accel_terms, sensors, errors[1])
+        last = count + end - made
+        new, into = open_rows[count:last], open_history[count + 1 : last + 1]
+        compensate(rows[made:end], errors[0], errors[1], new)
+        if kinds[0] == WANDER:
+            went, why = wander_advance(state, new, heights, earth, options, into)
+        else:
+            went, why = ned_advance(state, new, heights, earth, options, into)
+        if why != 0:
+            return DIVERGED, made + went, count
+        history[made:end] = into
+        count = last
+        made = end
+        times[AT_STEP] = time[end - 1]
+    return ALL, made, count

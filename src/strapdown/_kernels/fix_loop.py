@@ -1,0 +1,258 @@
+"""The loop of `error_loop` with fixes of a satellite receiver whose errors are its noise alone."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from strapdown._kernels.covariance import dense_update
+from strapdown._kernels.earth import E2, A
+from strapdown._kernels.error_loop import (
+    ALL,
+    AT_COVARIANCE,
+    AT_STEP,
+    BAD,
+    PLAIN,
+    UD,
+    WANDER,
+    WD,
+    close_group,
+    over_steps,
+)
+from strapdown._kernels.factored_update import ud_update, wd_epoch
+from strapdown._kernels.factors import udu_matrix
+from strapdown._kernels.geodetic import displacement
+from strapdown._kernels.ned import ALT as NED_ALT
+from strapdown._kernels.ned import COSINE, LAT, LON, PRIME, SINE
+from strapdown._kernels.ned import Q as Q_NB
+from strapdown._kernels.ned import V as V_N
+from strapdown._kernels.ned_level import ned_correct
+from strapdown._kernels.rotation import dcm_from_quat
+from strapdown._kernels.split_increment import split_increment
+from strapdown._kernels.wander import ALT as WANDER_ALT
+from strapdown._kernels.wander import Q_WB
+from strapdown._kernels.wander import V as V_W
+from strapdown._kernels.wander_level import geodetic_from_wander, wander_correct
+
+# Of a fix: what it is of, three numbers, three variances.
+CODE, VALUE, VARIANCE = 0, 1, 4
+# What an observation tells: innovation, its expected variance, weight.
+TOLD = 3
+# An observation that is none; beside what became of a call in `error_loop`.
+BAD_FIX = 4
+
+
+@njit(cache=True, error_model="numpy")
+def level_place(which, state, turn):
+    """Latitude, longitude and height; fills C_nl, level to north-east-down, (3, 3)."""
+    turn[:, :] = 0.0
+    if which == WANDER:
+        lat, lon, angle = geodetic_from_wander(state[0], state[1], state[2], state[3])
+        s, c = math.sin(angle), math.cos(angle)
+        turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1], turn[2, 2] = s, c, c, -s, -1.0
+        return lat, lon, state[WANDER_ALT]
+    turn[0, 0] = turn[1, 1] = turn[2, 2] = 1.0
+    return state[LAT], state[LON], state[NED_ALT]
+
+
+@njit(cache=True, error_model="numpy")
+def meet_fix(which, state, earth, arm, of_place, fix, turn, z, H, R):
+    """Fill the observation of a fix: computed less measured, north, east, down.
+
+    A place is that of an antenna `arm` away, body axes; a velocity is that of the sensors.
+    """
+    q_at, v_at = (Q_WB, V_W) if which == WANDER else (Q_NB, V_N)
+    lat, lon, alt = level_place(which, state, turn)
+    H[:, :] = 0.0
+    R[:] = fix[VARIANCE : VARIANCE + 3]
+    if not of_place:
+        for i in range(3):
+            z[i] = -fix[VALUE + i]
+            for j in range(3):
+                z[i] += turn[i, j] * state[v_at + j]
+                H[i, 3 + j] = turn[i, j]
+        return
+    z[0], z[1], z[2] = displacement(
+        lat, lon, alt, fix[VALUE], fix[VALUE + 1], fix[VALUE + 2], earth[A], earth[E2]
+    )
+    c = dcm_from_quat(state[q_at], state[q_at + 1], state[q_at + 2], state[q_at + 3])
+    x = c[0] * arm[0] + c[1] * arm[1] + c[2] * arm[2]
+    y = c[3] * arm[0] + c[4] * arm[1] + c[5] * arm[2]
+    w = c[6] * arm[0] + c[7] * arm[1] + c[8] * arm[2]
+    for i in range(3):
+        a, b, d = turn[i, 0], turn[i, 1], turn[i, 2]
+        z[i] += a * x + b * y + d * w
+        H[i, 0], H[i, 1], H[i, 2] = a, b, d
+        # -C_nl [arm x]
+        H[i, 6] = d * y - b * w
+        H[i, 7] = a * w - d * x
+        H[i, 8] = b * x - a * y
+
+
+@njit(cache=True, error_model="numpy")
+def take_off(which, state, sensors, earth, x):
+    """Take an estimate off a state and add it to those of the sensors."""
+    if which == WANDER:
+        wander_correct(state, x[:9], earth)
+    else:
+        ned_correct(state, x[:9], earth)
+        s = math.sin(state[LAT])
+        state[SINE], state[COSINE] = s, math.cos(state[LAT])
+        state[PRIME] = 1.0 / math.sqrt(1.0 - earth[E2] * s * s)
+    for j in range(sensors.shape[0]):
+        sensors[j] += x[9 + j]
+
+
+@njit(cache=True, error_model="numpy")
+def note(form, covariance, sensors, turn, P, noted, noted_sensors, noted_sd):
+    """Fill a mark: covariance of nine in north-east-down, estimates, and their deviations."""
+    if form >= UD:
+        udu_matrix(covariance, P)
+    else:
+        for i in range(P.shape[0]):
+            for j in range(P.shape[1]):
+                P[i, j] = covariance[i, j]
+    for a in range(0, 9, 3):
+        for b in range(0, 9, 3):
+            for i in range(3):
+                for j in range(3):
+                    total = 0.0
+                    for m in range(3):
+                        for k in range(3):
+                            total += turn[i, m] * P[a + m, b + k] * turn[j, k]
+                    noted[a + i, b + j] = total
+    for j in range(sensors.shape[0]):
+        noted_sensors[j] = sensors[j]
+        noted_sd[j] = math.sqrt(P[9 + j, 9 + j])
+
+
+@njit(cache=True, error_model="numpy")
+def over_fixes(
+    kinds,
+    model,
+    states,
+    group,
+    count,
+    room,
+    step,
+    note_at,
+    interval,
+    time,
+    rows,
+    history,
+    same,
+    arm,
+    place_code,
+    fix_time,
+    fixes,
+    told,
+    noted_at,
+    noted,
+    noted_sensors,
+    noted_sd,
+):
+    """Go over steps and fixes, to the end of either.
+
+    `rows` are changed where a fix cuts a step. Return what became of it, the steps made, those of
+    the open group, and the fixes taken; where a covariance is to be noted it ends as `over_steps`.
+    An instant within `same` seconds of another is the same.
+    """
+    which, form, _ = kinds
+    state, covariance, sensors, times = states
+    open_history, _ = group
+    earth = model[5]
+    n, size = 9 + sensors.shape[0], covariance.shape[0]
+    x, z, R, H = np.empty(size), np.empty(3), np.empty(3), np.empty((3, size))
+    turn, P, after = np.empty((3, 3)), np.empty((n, n)), np.empty((size, size))
+    cut = np.empty((2, rows.shape[1]))
+    between = np.empty((1, history.shape[1]))
+    made, done, total = 0, 0, time.shape[0]
+    while done < fix_time.shape[0]:
+        epoch = fix_time[done]
+        if epoch > times[AT_STEP] + same:
+            if made == total:
+                break
+            end = made
+            while end < total and time[end] < epoch - same:
+                end += 1
+            inside = end < total and time[end] > epoch + same
+            if not inside:
+                end = min(end + 1, total)
+            why, went, count = over_steps(
+                kinds,
+                model,
+                states,
+                group,
+                count,
+                room,
+                step,
+                note_at,
+                time[made:end],
+                rows[made:end],
+                history[made:end],
+            )
+            made += went
+            if why != ALL:
+                return why, made, count, done
+            if inside:
+                split_increment(rows[end], epoch - times[AT_STEP], cut[0], cut[1])
+                why, went, count = over_steps(
+                    kinds,
+                    model,
+                    states,
+                    group,
+                    count,
+                    room,
+                    step,
+                    note_at,
+                    fix_time[done : done + 1],
+                    cut[:1],
+                    between,
+                )
+                if went == 1:
+                    rows[end] = cut[1]
+                if why != ALL:
+                    return why, made, count, done
+            continue
+        bad = close_group(kinds, model, states, group, count, room[0])
+        count = 0
+        if bad >= 0:
+            return BAD, made, count, done
+        of_place = fixes[done, CODE] == place_code
+        meet_fix(which, state, earth, arm, of_place, fixes[done], turn, z, H, R)
+        x[:] = 0.0
+        told[done, 2] = 1.0
+        if form == UD:
+            wrong = ud_update(covariance, x, z, H, R, told[done])
+        elif form == WD:
+            wrong = wd_epoch(
+                covariance, covariance, covariance, False, x, z, H, R, told[done], after
+            )
+            covariance[:, :] = after
+        else:
+            wrong = dense_update(covariance, x, z, H, R, form != PLAIN, told[done])
+        if wrong != -1:
+            return BAD_FIX, made, count, done
+        take_off(which, state, sensors, earth, x)
+        level_place(which, state, turn)
+        noted_at[done] = times[AT_STEP]
+        note(
+            form,
+            covariance,
+            sensors,
+            turn,
+            P,
+            noted[done],
+            noted_sensors[done],
+            noted_sd[done],
+        )
+        for j in range(open_history.shape[1]):
+            open_history[0, j] = state[j]
+        if made > 0 and times[AT_STEP] <= time[made - 1] + same:
+            for j in range(history.shape[1]):
+                history[made - 1, j] = state[j]
+        note_at = times[AT_COVARIANCE] + interval
+        done += 1
+    return ALL, made, count, done

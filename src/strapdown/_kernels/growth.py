@@ -1,0 +1,207 @@
+"""From the dynamics of errors to their transition and their noise over a step.
+
+Matrices are padded with zeros, to rows by threes and columns by fours (`padded`), so that rows are
+added to rows three at a time and a processor takes several numbers of them at once. Of n states
+the first nine have dynamics F, (9, n); each of the others decays by itself.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+CORE = 9
+
+
+@njit(cache=True)
+def padded(n):
+    """Rows and columns of a padded matrix of n states."""
+    rows = (n + 2) // 3 * 3
+    return rows, (rows + 3) // 4 * 4
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def add_three(out, i, a, b, c, rows, k):
+    """Add to row i of `out` a, b and c times the rows of `rows` from k on."""
+    for j in range(rows.shape[1]):
+        out[i, j] += a * rows[k, j] + b * rows[k + 1, j] + c * rows[k + 2, j]
+
+
+@njit(cache=True, error_model="numpy")
+def powers(f, decay, dt, one, two, three):
+    """Fill the core's rows of F dt and of its square and cube; `f` and they are (9, w)."""
+    k = decay.shape[0]
+    for i in range(CORE):
+        for j in range(f.shape[1]):
+            one[i, j] = dt * f[i, j]
+            two[i, j] = 0.0
+            three[i, j] = 0.0
+    for i in range(CORE):
+        for m in range(0, CORE, 3):
+            add_three(two, i, one[i, m], one[i, m + 1], one[i, m + 2], one, m)
+    for j in range(k):
+        fading = -decay[j] * dt
+        if fading != 0.0:
+            for i in range(CORE):
+                two[i, CORE + j] += fading * one[i, CORE + j]
+                three[i, CORE + j] += fading * fading * one[i, CORE + j]
+    for i in range(CORE):
+        for m in range(0, CORE, 3):
+            add_three(three, i, one[i, m], one[i, m + 1], one[i, m + 2], two, m)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def series(one, two, three, part, out):
+    """Fill ``exp(F dt part)`` to third order from the powers of F dt."""
+    b, c = part * part / 2.0, part * part * part / 6.0
+    for i in range(CORE):
+        for j in range(one.shape[1]):
+            out[i, j] = part * one[i, j] + b * two[i, j] + c * three[i, j]
+        out[i, i] += 1.0
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def turned_noise(matrix, noise, dt, out, at):
+    """Fill ``C diag(noise²) C' dt``, (3, 3), into rows `at` and after of `out`."""
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for m in range(3):
+                total += matrix[i, m] * matrix[j, m] * noise[m] * noise[m]
+            out[at + i, j] = dt * total
+
+
+@njit(cache=True, error_model="numpy")
+def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, phi, tail, q, room):
+    """Fill transition and noise of a step of dynamics f, (9, w).
+
+    `phi` (9, w) takes the core's rows of ``exp(F dt)`` to third order, as drift reaches the place
+    through tilt and velocity; `tail` (k,) the exact decay of the others. `q` (rows, w) takes the
+    covariance that white noise adds. It enters at the middle of the step, ``exp(F dt/2) G q G'
+    exp(F dt/2)' dt``, which holds its correlations to second order and is positive semidefinite.
+    `matrix` is C_lb; rows that are `still`, a bit each, take no noise. `room` (51, w) is to work
+    in.
+    """
+    k, w = decay.shape[0], f.shape[1]
+    one, two, three = room[0:9], room[9:18], room[18:27]
+    lift, weighted, across, turned = room[27:36], room[36:39], room[39:45], room[45:51]
+    powers(f, decay, dt, one, two, three)
+    series(one, two, three, 1.0, phi)
+    series(one, two, three, 0.5, lift)
+    for i in range(CORE):
+        if still & (1 << i):
+            for j in range(w):
+                lift[i, j] = 0.0
+    turned_noise(matrix, accel_noise, dt, turned, 0)
+    turned_noise(matrix, gyro_noise, dt, turned, 3)
+    for m in range(6):
+        for j in range(w):
+            across[m, j] = 0.0
+        for i in range(CORE):
+            across[m, i] = lift[i, 3 + m]
+    for i in range(q.shape[0]):
+        for j in range(w):
+            q[i, j] = 0.0
+    for i in range(CORE):
+        for at in range(0, 6, 3):
+            for j in range(3):
+                weighted[0, j] = (
+                    lift[i, 3 + at] * turned[at, j]
+                    + lift[i, 4 + at] * turned[at + 1, j]
+                    + lift[i, 5 + at] * turned[at + 2, j]
+                )
+            add_three(q, i, weighted[0, 0], weighted[0, 1], weighted[0, 2], across, at)
+    for j in range(k):
+        tail[j] = math.exp(-decay[j] * dt)
+        if drive[j] != 0.0:
+            spread = dt * drive[j] * drive[j]
+            own = math.exp(-0.5 * decay[j] * dt)
+            for i in range(CORE):
+                share = spread * lift[i, CORE + j]
+                if share != 0.0:
+                    for m in range(CORE):
+                        q[i, m] += share * lift[m, CORE + j]
+                    q[i, CORE + j] += share * own
+            q[CORE + j, CORE + j] += spread * own * own
+    for i in range(CORE):
+        for j in range(i):
+            q[i, j] = q[j, i]
+        for j in range(CORE, CORE + k):
+            q[j, i] = q[i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def grown_covariance(P, phi, tail, q, out, room):
+    """Fill ``Phi P Phi' + Q``, exactly symmetric; all are padded, `room` (9 + rows of P, w).
+
+    Return -1, or the first state whose variance is no number or negative.
+    """
+    k, rows, w = tail.shape[0], P.shape[0], P.shape[1]
+    n = CORE + k
+    half, turned = room[0:9], room[9 : 9 + rows]
+    for i in range(rows):
+        for j in range(w):
+            turned[i, j] = 0.0
+    for i in range(CORE):
+        for j in range(n):
+            turned[j, i] = phi[i, j]
+        for j in range(w):
+            half[i, j] = 0.0
+        for m in range(0, rows, 3):
+            add_three(half, i, phi[i, m], phi[i, m + 1], phi[i, m + 2], P, m)
+    for j in range(k):
+        turned[CORE + j, CORE + j] = tail[j]
+    for i in range(CORE):
+        for j in range(w):
+            out[i, j] = q[i, j]
+        for m in range(0, rows, 3):
+            add_three(out, i, half[i, m], half[i, m + 1], half[i, m + 2], turned, m)
+    bad = -1
+    for i in range(n):
+        if i >= CORE:
+            for j in range(i, n):
+                out[i, j] = tail[i - CORE] * tail[j - CORE] * P[i, j] + q[i, j]
+        for j in range(i):
+            out[i, j] = out[j, i]
+        if bad < 0 and not 0.0 <= out[i, i] < math.inf:
+            bad = i
+    return bad
+
+
+@njit(cache=True, error_model="numpy")
+def compose_growth(step, tail, added, phi, q, work):
+    """Let a step follow: ``phi <- step phi`` and ``q <- step q step' + added``.
+
+    `phi`, `q` and `work` are (n, n); `step` (9, w), `tail` (k,) and `added` are of
+    `growth_of_step`.
+    """
+    n = phi.shape[0]
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            if i < CORE:
+                for m in range(n):
+                    total += step[i, m] * phi[m, j]
+            else:
+                total = tail[i - CORE] * phi[i, j]
+            work[i, j] = total
+    phi[:, :] = work
+    for i in range(n):
+        for j in range(n):
+            total = 0.0
+            if i < CORE:
+                for m in range(n):
+                    total += step[i, m] * q[m, j]
+            else:
+                total = tail[i - CORE] * q[i, j]
+            work[i, j] = total
+    for i in range(n):
+        for j in range(i, n):
+            total = added[i, j]
+            if j < CORE:
+                for m in range(n):
+                    total += work[i, m] * step[j, m]
+            else:
+                total += work[i, j] * tail[j - CORE]
+            q[i, j] = q[j, i] = total

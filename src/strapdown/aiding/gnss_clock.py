@@ -1,0 +1,355 @@
+"""Whether a receiver and inertial sensors have one clock, and how far it is off."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.frames import place_difference
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["TimeOffset", "check_overlap", "find_time_offset", "time_offset"]
+
+Array = NDArray[np.float64]
+
+WEEK = 604_800.0
+#: Unix time of the first second of GPS time, and the seconds that it is ahead of UTC since 2017.
+GPS_EPOCH, LEAP = 315_964_800.0, 18.0
+#: Unix time since 1995 and until 2040, s.
+UNIX = (7.9e8, 2.21e9)
+#: Offsets that are looked at, s, and the step of the search.
+LARGEST, STEP = 20.0, 0.05
+#: Below this speed a course says nothing, m/s.
+LEAST_SPEED = 3.0
+#: How far an antenna may be from where the vehicle goes as it points, m.
+ARM = 1.0
+#: Steps that are needed; part of the changes that the sensors must explain; and by how much the
+#: best offset must leave less than any other farther than a second from it.
+LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
+LONGEST_STEP = 1.5
+#: An offset is told where it is so many standard deviations, and not less than this, s.
+SURE, LEAST_OFFSET = 3.0, 0.02
+
+
+@dataclass(frozen=True)
+class TimeOffset:
+    """Stamps of a receiver less the time of the inertial sensors.
+
+    Attributes
+    ----------
+    offset, sd : float, s
+    share : float
+        Of the changes of that course or speed that the sensors explain.
+    by : {'course', 'speed'}
+        What it was found by, or most of it.
+    """
+
+    offset: float
+    sd: float
+    share: float
+    by: str
+
+
+def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) -> list[Finding]:
+    """Refuse fixes that are of another time than the inertial record.
+
+    Parameters
+    ----------
+    gnss, imu : DataFrame
+    offset : float, s
+        Stamps of the receiver less the time of the sensors, as it is configured.
+
+    Returns
+    -------
+    list of Finding
+        An outage at the start or at the end, and fixes beyond the record.
+
+    Raises
+    ------
+    DataError
+        No fix is within the record; what the difference of the clocks looks like is told.
+    """
+    time, stamps = index_of(gnss) - offset, index_of(imu)
+    source = source_of(gnss)
+    within = (time >= stamps[0]) & (time <= stamps[-1])
+    if not within.any():
+        why, remedy = _difference(time, stamps)
+        raise DataError(
+            f"fixes go from {time[0]:.9g} to {time[-1]:.9g} s and the inertial record from "
+            f"{stamps[0]:.9g} to {stamps[-1]:.9g} s: none is within it{why}",
+            file=source,
+            quantity="time",
+            remedy=remedy,
+        )
+    found = []
+    inside = np.flatnonzero(within)
+    usual = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    slack = 3.0 * usual + 1.0
+    for late, row, where in (
+        (float(time[inside[0]] - stamps[0]), int(inside[0]), "first"),
+        (float(stamps[-1] - time[inside[-1]]), int(inside[-1]), "last"),
+    ):
+        if late > slack:
+            begins = where == "first"
+            found.append(
+                Finding(
+                    f"the {where} fix within the record is {late:.3g} s "
+                    + ("after its start" if begins else "before its end"),
+                    file=source,
+                    row=row + 1,
+                    quantity="time",
+                    remedy="begin with the first fix, or give place and velocity of the start"
+                    if begins
+                    else "the rest is navigated without fixes: look at its standard deviations",
+                )
+            )
+    outside = len(time) - len(inside)
+    if outside > 0.2 * len(time):
+        found.append(
+            Finding(
+                f"{outside} of {len(time)} fixes are outside the inertial record",
+                file=source,
+                quantity="time",
+                remedy="give the whole inertial record, or check that the clocks are the same",
+            )
+        )
+    return found
+
+
+def time_offset(
+    gnss: pd.DataFrame, imu: pd.DataFrame, velocity_delay: float = 0.0
+) -> TimeOffset | None:
+    """Find the offset at which gyros explain how the course changes, or force how the speed does.
+
+    Good to some hundredths of a second: the nominal value of a state that finds the rest.
+
+    Parameters
+    ----------
+    gnss, imu : DataFrame
+    velocity_delay : float, s
+        Of the receiver (`gnss_delay.velocity_delay`). Where it tells no velocity, the mean between
+        places is taken in its place.
+
+    Returns
+    -------
+    TimeOffset or None
+        None where nothing turns or changes its speed, another offset does about as well, or the
+        two disagree.
+
+    Notes
+    -----
+    Over a step between fixes, the course changes by a linear function of the integral of the three
+    rates, whatever the mounting, as long as the vehicle does not tilt by much; its speed by one of
+    the integral of force. For every offset of a grid the four numbers are fitted by least squares;
+    the least misfit is refined by a parabola, whose curvature gives the standard deviation. The
+    course of an antenna that is a metre before the rear axle is ahead of the heading by a metre
+    over the speed; what course and speed tell is weighed with that.
+    """
+    told = _courses(gnss, velocity_delay)
+    if told is None:
+        return None
+    at, velocity = told
+    speed = np.hypot(velocity[:, 0], velocity[:, 1])
+    course = np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))
+    steps = np.diff(at)
+    ready = (steps <= LONGEST_STEP) & (np.minimum(speed[1:], speed[:-1]) > LEAST_SPEED)
+    turns = np.abs(np.diff(course)) < 0.5 * math.pi
+    if not ready.any():
+        return None
+    ahead = ARM / float(np.sqrt(np.mean(np.square(speed[1:][ready]))))
+    found = [
+        replace(one, sd=math.hypot(one.sd, systematic))
+        for name, change, columns, used, systematic in (
+            ("course", np.diff(course), GYRO, ready & turns, ahead),
+            ("speed", np.diff(speed), ACCEL, ready, 0.0),
+        )
+        if (one := _best(at, change, used, imu, columns, name)) is not None
+    ]
+    if not found:
+        return None
+    weights = np.array([one.sd**-2 for one in found])
+    offsets = np.array([one.offset for one in found])
+    offset, sd = float(weights @ offsets / weights.sum()), float(weights.sum() ** -0.5)
+    if np.ptp(offsets) > 4.0 * math.hypot(*(one.sd for one in found)):
+        return None
+    best = found[int(np.argmax(weights))]
+    return TimeOffset(offset, sd, best.share, best.by)
+
+
+def find_time_offset(
+    gnss: pd.DataFrame,
+    imu: pd.DataFrame,
+    assumed: float = 0.0,
+    velocity_delay: float = 0.0,
+    assumed_sd: float = 0.0,
+) -> list[Finding]:
+    """Tell an offset that is sure, and beyond what is assumed.
+
+    Parameters
+    ----------
+    gnss, imu : DataFrame
+    assumed, velocity_delay, assumed_sd : float, s
+        As configured; what is within three standard deviations is left to the filter.
+
+    Returns
+    -------
+    list of Finding
+        With the option that takes it away; empty where there is nothing to tell.
+    """
+    found = time_offset(gnss, imu, velocity_delay)
+    if found is None or abs(found.offset - assumed) < max(
+        SURE * found.sd, LEAST_OFFSET, 3.0 * assumed_sd
+    ):
+        return []
+    known = f"; {assumed:g} s are configured" if assumed else ""
+    leap = abs(abs(found.offset - assumed) - LEAP) < 0.5
+    return [
+        Finding(
+            f"stamps of the receiver are {found.offset:+.3f} s (standard deviation {found.sd:.3f}) "
+            f"off the time of the inertial sensors{known}: so the changes of its {found.by} are "
+            f"explained to {100.0 * found.share:.0f} %"
+            + (", and 18 s are the leap seconds between GPS time and UTC" if leap else ""),
+            file=source_of(gnss),
+            quantity="time",
+            remedy=f"set time_offset_s = {found.offset:.3g} and time_offset_sd_s = "
+            f"{max(0.05, 2.0 * found.sd):.2g}, so that the filter finds the rest",
+        )
+    ]
+
+
+def _courses(gnss: pd.DataFrame, delay: float) -> tuple[Array, Array] | None:
+    """Instants on the clock of the places, and horizontal velocity then."""
+    time = index_of(gnss)
+    good = values_of(gnss, ["quality"])[:, 0] > 0.0
+    by_velocity = good & np.isfinite(values_of(gnss, VELOCITY_SD[:2])).all(axis=1)
+    if by_velocity.sum() > LEAST_STEPS:
+        return time[by_velocity] - delay, values_of(gnss, VELOCITY)[by_velocity, :2]
+    good &= np.isfinite(values_of(gnss, POSITION_SD[:2])).all(axis=1)
+    if good.sum() <= LEAST_STEPS + 1:
+        return None
+    time, place = time[good], values_of(gnss, GEODETIC)[good]
+    moved = place_difference(place[1:], place[:-1])[:, :2]
+    return 0.5 * (time[1:] + time[:-1]), moved / np.diff(time)[:, None]
+
+
+def _best(
+    at: Array,
+    change: Array,
+    used: NDArray[np.bool_],
+    imu: pd.DataFrame,
+    columns: list[str],
+    by: str,
+) -> TimeOffset | None:
+    """The offset at which the integrals of three channels explain a change best."""
+    stamps = index_of(imu)
+    if not set(columns) <= set(imu.columns):
+        return None
+    values = values_of(imu, columns)
+    # Every offset is judged by the same steps: those within the record at all that leave enough.
+    most = min(LARGEST, 0.25 * float(stamps[-1] - stamps[0]))
+    begin, end = at[:-1], at[1:]
+    used = used & (begin - most >= stamps[0]) & (end + most <= stamps[-1])
+    if used.sum() < LEAST_STEPS:
+        return None
+    begin, end, change = begin[used], end[used], change[used]
+    steps = np.diff(stamps)[:, None]
+    mean = values[1:] if imu.attrs["sampling"] == "mean" else 0.5 * (values[1:] + values[:-1])
+    sums = np.vstack([np.zeros(3), np.cumsum(steps * mean, axis=0)])
+
+    def misfit(offset: float) -> float:
+        gone = [
+            np.interp(end - offset, stamps, c) - np.interp(begin - offset, stamps, c)
+            for c in sums.T
+        ]
+        X = np.column_stack([*gone, end - begin])
+        fit, *_ = np.linalg.lstsq(X, change, rcond=None)
+        return float(np.square(change - X @ fit).sum())
+
+    whole = float(np.square(change - change.mean()).sum())
+    grid = np.arange(-most, most + 0.5 * STEP, STEP)
+    costs = np.array([misfit(float(one)) for one in grid])
+    k = int(np.argmin(costs))
+    share = 1.0 - float(costs[k]) / whole if whole > 0.0 else 0.0
+    away = np.abs(grid - grid[k]) > 1.0
+    if (
+        share < LEAST_SHARE
+        or not 0 < k < len(grid) - 1
+        or not (away.any() and costs[away].min() > CLEAR * costs[k])
+    ):
+        return None
+    # Again about the least, with a step that is wide beside its noise and narrow beside motions.
+    fine = grid[k] + np.arange(-4, 5) * 0.5 * STEP
+    second, first, _ = np.polyfit(fine - grid[k], [misfit(float(one)) for one in fine], 2)
+    if not second > 0.0:
+        return None
+    offset = float(grid[k] - 0.5 * first / second)
+    # What is left is correlated from step to step: twice what independent steps would give.
+    sd = 2.0 * math.sqrt(costs[k] / max(len(change) - 5, 1) / second)
+    return TimeOffset(offset, sd, share, by)
+
+
+def _difference(time: Array, stamps: Array) -> tuple[str, str]:
+    """What the difference of two clocks looks like, and what to do."""
+    apart = float(time[0] - stamps[0])
+    span = max(float(time[-1] - time[0]), float(stamps[-1] - stamps[0]), 60.0)
+    known = (
+        (GPS_EPOCH - LEAP, "the one is Unix time and the other GPS time since 1980"),
+        (GPS_EPOCH, "the one is Unix time and the other counts from 1980"),
+    )
+    for size, what in known:
+        if abs(abs(apart) - size) < span:
+            return (
+                f"; {what}",
+                f"take {math.copysign(size, apart):.0f} s off the stamps of the fixes",
+            )
+    for ratio, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")):
+        for scaled, other, whose in ((time, stamps, "the fixes"), (stamps, time, "the record")):
+            if abs(scaled[0] / ratio - other[0]) < span / ratio + span and other[0] > span:
+                return f"; those of {whose} seem to be in {unit}", f"divide them by {ratio:g}"
+    kinds = [_kind(float(x[0]), span) for x in (time, stamps)]
+    if kinds[0] != kinds[1]:
+        words = f"; the fixes seem to have {kinds[0]}, and the record {kinds[1]}"
+        week = "the second of the GPS week"
+        if set(kinds) == {"Unix time", week}:
+            shift = _to_week(time if kinds[0] == "Unix time" else stamps)
+            whose = "the fixes" if kinds[0] == "Unix time" else "the inertial record"
+            return words, f"take {shift:.0f} s off the stamps of {whose}"
+        return (
+            words,
+            "bring both to one clock: the stamp of one event in both gives what to take off",
+        )
+    for length, name in ((WEEK, "week"), (86_400.0, "day"), (3600.0, "hour")):
+        count = round(apart / length)
+        if count and abs(apart - count * length) < min(span, 0.2 * length):
+            many = f"{abs(count)} {name}{'s' if abs(count) > 1 else ''}"
+            return (
+                f"; they are about {many} apart",
+                f"take {count * length:.0f} s off the stamps of the fixes, if it is a matter of "
+                "time zones or of the turn of the week",
+            )
+    return (
+        f"; they are {abs(apart):.6g} s apart",
+        f"give the fixes of this record, or set time_offset_s = {apart:.6g} if both began together",
+    )
+
+
+def _kind(first: float, span: float) -> str:
+    if UNIX[0] <= first <= UNIX[1]:
+        return "Unix time"
+    if abs(first) < max(span, 100.0):
+        return "seconds from a start of their own"
+    if 0.0 <= first <= WEEK:
+        return "the second of the GPS week"
+    return "a clock of their own"
+
+
+def _to_week(unix: Array) -> float:
+    """Seconds from Unix time to the second of the GPS week."""
+    gps = float(unix[0]) - GPS_EPOCH + LEAP
+    return math.floor(gps / WEEK) * WEEK + GPS_EPOCH - LEAP

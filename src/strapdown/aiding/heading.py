@@ -1,0 +1,97 @@
+"""Where an axis of the body points: a compass, or the baseline of two antennas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.aiding.aid import Epochs, TableAid
+from strapdown.aiding.checks import check_number
+from strapdown.aiding.view import ROTATION, View
+from strapdown.estimation.observation import Observation
+from strapdown.estimation.sensor_blocks import unseen
+from strapdown.estimation.sensor_states import SensorStates
+from strapdown.rotation import cross_matrix
+from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.heading import HEADING, check_heading
+
+__all__ = ["Heading"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Heading(TableAid):
+    """Azimuth of an axis of the body, clockwise from north: that, a misalignment, and noise.
+
+    Of a compass the misalignment is what declination and iron leave; of two antennas, what is
+    wrong with the axis. It is told from the heading where something else knows that.
+
+    Attributes
+    ----------
+    axis_deg : float, deg
+        Of the axis in the body, from forward to the right: 0 of a compass, 90 of a baseline from
+        the left antenna to the right one.
+    added_deg : float, deg
+        Added to what is read: the declination, east positive, of a magnetic heading.
+    misalignment_sd_deg : float, deg
+        More than zero adds the state ``NAME.misalignment``: what is read less the truth.
+    steepest_deg : float, deg
+        While the axis is steeper, nothing is observed: an axis that is nearly vertical points
+        nowhere.
+    """
+
+    axis_deg: float = 0.0
+    added_deg: float = 0.0
+    misalignment_sd_deg: float = 0.0
+    steepest_deg: float = 80.0
+
+    kind: ClassVar[str] = "heading"
+    summary: ClassVar[str] = "heading of a compass or of two antennas, with its misalignment"
+    source: ClassVar[str] = "Groves (2013), sec. 6.1"
+    columns: ClassVar[tuple[str, ...]] = tuple(HEADING)
+
+    def __post_init__(self) -> None:
+        for name in ("axis_deg", "added_deg"):
+            check_number(self, name, low=-360.0, high=360.0)
+        check_number(self, "misalignment_sd_deg", low=0.0)
+        check_number(self, "steepest_deg", low=0.0, high=89.0, above=True)
+
+    def states(self) -> tuple[SensorStates, ...]:
+        """Return the state of the misalignment, if it has a standard deviation."""
+        if self.misalignment_sd_deg == 0.0:
+            return ()
+        sd = math.radians(self.misalignment_sd_deg)
+        return (unseen(f"{self.name}.misalignment", ("misalignment",), "rad", sd),)
+
+    def epochs(self, table: pd.DataFrame) -> Epochs:
+        """Return an epoch for each heading that was measured; see `TableAid.epochs`."""
+        check_heading(table)
+        values = np.radians(values_of(table, HEADING))
+        told = np.isfinite(values[:, 1])
+        return Epochs(index_of(table)[told], values[told])
+
+    def observe(self, view: View, values: Array) -> list[Observation]:
+        """Return the azimuth less what was measured, unless the axis is too steep."""
+        angle = math.radians(self.axis_deg)
+        axis = view.C_lb @ [math.cos(angle), math.sin(angle), 0.0]
+        C_nl = view.C_ln.T
+        north, east, down = (C_nl @ axis).tolist()
+        if abs(down) > math.sin(math.radians(self.steepest_deg)):
+            return []
+        H = np.zeros((1, view.columns))
+        of_axis = np.array([-east, north, 0.0]) / (north * north + east * east)
+        H[0, ROTATION] = -of_axis @ C_nl @ cross_matrix(axis)
+        read = values[0] + math.radians(self.added_deg)
+        block = f"{self.name}.misalignment"
+        if view.has(block):
+            read -= float(view.estimate(block)[0])
+            H[0, view.place(block)] = -1.0
+        z = math.remainder(math.atan2(east, north) - read, 2.0 * math.pi)
+        R = values[1:] ** 2
+        return [Observation(f"{self.name}.heading", np.array([z]), H, R, ("heading, rad",))]

@@ -1,0 +1,154 @@
+"""Wheels that roll where they point: no velocity to the side, none up or down."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown._kernels.interval_sums import MEMORY, interval_sums
+from strapdown.aiding.aid import Epochs, WatchingAid
+from strapdown.aiding.checks import check_number, check_numbers
+from strapdown.aiding.point_velocity import point_velocity
+from strapdown.aiding.vehicle_axes import VehicleAxes
+from strapdown.aiding.view import View
+from strapdown.estimation.observation import Observation
+from strapdown.estimation.sensor_states import SensorStates
+
+__all__ = ["NoSlip"]
+
+Array = NDArray[np.float64]
+
+# Place of the rotation about the vertical among the physical errors.
+HEADING = 8
+
+
+@dataclass(frozen=True)
+class NoSlip(WatchingAid):
+    """A vehicle on wheels: a point of an axle that is not steered moves along the vehicle.
+
+    Lateral and vertical velocity of the point, in axes of the vehicle, are zero but for
+
+    * what road and suspension do, `lateral_sd` and `vertical_sd`;
+    * the slip angle of the tyres, which is the force to the side that they bear, times `slip`:
+      a lateral velocity of ``slip v f_y``;
+    * the pitch of the body on its springs, which goes with the force along it: a vertical one of
+      ``dive v f_x``.
+
+    These last over `correlation_time`, and to a filter every observation is new: its variance is
+    that of the errors times ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``,
+    so that a mean over many is as good as it is, whatever the `interval`.
+
+    At rest it holds as well as on the move, and backwards as well as forwards.
+
+    Attributes
+    ----------
+    lever_arm : tuple of float, m
+        From the inertial sensors to the middle of the rear axle, at the height of the sensors,
+        body axes. An error of x m is a lateral velocity of x times the rate of turn.
+    roll_deg, pitch_deg, yaw_deg : float, deg
+        Of the inertial sensors in the vehicle (`VehicleAxes`).
+    mounting_sd_deg : tuple of float, deg
+        Of pitch and of yaw: more than zero adds the states ``NAME.mounting``, which are seen while
+        the vehicle moves and GNSS tells where to.
+    lateral_sd, vertical_sd : float, m/s
+        Of the velocities at an instant, straight on.
+    slip : float, rad/(m/s²)
+        Slip angle of the rear tyres by lateral force; 4 deg/g by default.
+    dive : float, rad/(m/s²)
+        Pitch of the body by longitudinal force; 2 deg/g by default.
+    correlation_time : float, s
+    interval : float, s
+        Between observations: they are at its multiples, or the first sample after.
+    largest_rate_deg : float, deg/s
+        While the vehicle turns faster about its vertical, as it does when it skids, nothing is
+        observed.
+    largest_heading_sd_deg : float, deg
+        Nor while the heading is less known than so: a wrong one by so much has no linear errors.
+    """
+
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    roll_deg: float = 0.0
+    pitch_deg: float = 0.0
+    yaw_deg: float = 0.0
+    mounting_sd_deg: tuple[float, float] = (0.0, 0.0)
+    lateral_sd: float = 0.03
+    vertical_sd: float = 0.06
+    slip: float = 0.007
+    dive: float = 0.0035
+    correlation_time: float = 0.5
+    interval: float = 0.5
+    largest_rate_deg: float = 45.0
+    largest_heading_sd_deg: float = 20.0
+
+    kind: ClassVar[str] = "no_slip"
+    summary: ClassVar[str] = "wheels that do not slip: no lateral and vertical velocity"
+    source: ClassVar[str] = "Dissanayake et al. (2001); single-track model of the slip"
+
+    def __post_init__(self) -> None:
+        check_numbers(self, "lever_arm", 3)
+        check_numbers(self, "mounting_sd_deg", 2, low=0.0)
+        for name in ("roll_deg", "pitch_deg", "yaw_deg"):
+            check_number(self, name, low=-360.0, high=360.0)
+        for name in ("lateral_sd", "vertical_sd", "interval"):
+            check_number(self, name, low=0.0, above=True)
+        for name in ("largest_rate_deg", "largest_heading_sd_deg"):
+            check_number(self, name, low=0.0, above=True)
+        for name in ("slip", "dive", "correlation_time"):
+            check_number(self, name, low=0.0)
+
+    @property
+    def axes(self) -> VehicleAxes:
+        """Axes of the vehicle."""
+        angles = (self.roll_deg, self.pitch_deg, self.yaw_deg)
+        return VehicleAxes(angles, (0.0, *self.mounting_sd_deg))
+
+    def states(self) -> tuple[SensorStates, ...]:
+        """Return the states of the mounting, if it has a standard deviation."""
+        return self.axes.states(self.name)
+
+    def begin(self) -> Array:
+        """Return nothing seen."""
+        return np.concatenate([[np.nan], np.zeros(MEMORY - 1)])
+
+    def watch(self, memory: Array, time: Array, rows: Array) -> tuple[Array, Epochs]:
+        """Return an epoch an interval, with the mean rate and force over it."""
+        memory = memory.copy()
+        at, means = np.empty(len(time), dtype=np.int64), np.empty((len(time), 6))
+        count = interval_sums(time, rows, self.interval, memory, at, means)
+        return memory, Epochs(time[at[:count]], means[:count])
+
+    def observe(self, view: View, values: Array) -> list[Observation]:
+        """Return the lateral and the vertical velocity, or nothing, as the limits say."""
+        # About the third level axis, which is vertical.
+        heading_sd = math.sqrt(view.covariance[HEADING, HEADING])
+        if heading_sd > math.radians(self.largest_heading_sd_deg):
+            return []
+        axes = self.axes
+        velocity, H = point_velocity(view, self.lever_arm)
+        velocity, H = axes.of_vehicle(view, self.name, velocity, H)
+        C_vb = axes.now(view, self.name)
+        rate, force = C_vb @ values[:3], C_vb @ values[3:6]
+        if abs(rate[2]) > math.radians(self.largest_rate_deg):
+            return []
+        sd = np.array(
+            [
+                math.hypot(self.lateral_sd, self.slip * velocity[0] * force[1]),
+                math.hypot(self.vertical_sd, self.dive * velocity[0] * force[0]),
+            ]
+        )
+        R = sd**2 * self._longer()
+        return [Observation(f"{self.name}.velocity", velocity[1:], H[1:], R, LABELS)]
+
+    def _longer(self) -> float:
+        """By how much the variance of a mean of correlated errors exceeds that of others."""
+        if self.correlation_time == 0.0:
+            return 1.0
+        rho = math.exp(-self.interval / self.correlation_time)
+        return (1.0 + rho) / (1.0 - rho)
+
+
+LABELS = ("lateral, m/s", "vertical, m/s")

@@ -1,0 +1,63 @@
+"""What ``strapdown navigate`` prints."""
+
+from __future__ import annotations
+
+from strapdown.cli.console import console, print_table
+from strapdown.report.crash_values import spaced
+from strapdown.report.document import TableBlock
+from strapdown.report.navigation_found import examine
+from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_tables import (
+    end_table,
+    error_table,
+    observation_table,
+    outage_table,
+    state_table,
+    withheld_table,
+)
+from strapdown.report.navigation_trust import trust
+from strapdown.report.navigation_values import duration_words
+from strapdown.report.navigation_words import cautions, headline
+from strapdown.systems.sins.result import NavigationResult
+
+__all__ = ["print_navigation"]
+
+# Rows of a table on the terminal; the report has all.
+_MOST = 12
+
+
+def print_navigation(result: NavigationResult) -> None:
+    """Print where a run ended, how well that is known, and what is to be careful about."""
+    out = console()
+    found = examine(told_of(result))
+    time = result.record.trajectory.index
+    out.print(
+        f"{result.source.name}: {result.source.what}, "
+        f"{spaced(duration_words(float(time[-1] - time[0])))}, {len(time)} samples"
+    )
+    tables = (
+        end_table(found),
+        error_table(found),
+        observation_table(found),
+        outage_table(found),
+        withheld_table(found),
+        state_table(found),
+    )
+    for block in tables:
+        if block is not None:
+            _print(block)
+    out.print(spaced(headline(found)), style="bold")
+    verdict = trust(found)
+    style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[verdict.verdict]
+    out.print(spaced(verdict.sentence), style=style)
+    for head, text in cautions(found):
+        out.print(spaced(f"  - {head}: {text}"))
+
+
+def _print(block: TableBlock) -> None:
+    rows = [[spaced(cell) for cell in row] for row in block.rows]
+    columns = [spaced(name) for name in block.columns]
+    strong = tuple(k for k in block.strong if k < _MOST)
+    print_table(columns, rows[:_MOST], text=block.text, strong=strong)
+    if len(rows) > _MOST:
+        console().print(f"  {len(rows) - _MOST} more rows; all of them are in the report")

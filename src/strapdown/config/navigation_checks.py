@@ -1,0 +1,313 @@
+"""What a run of navigation says against itself, or a module refuses: told before anything runs.
+
+Everything is looked at, and everything that does not fit is told at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from strapdown.aiding.aid import Aid, TableAid
+from strapdown.config.alignment_checks import NEEDS_GNSS, NOT_BEFORE_FINE
+from strapdown.config.choice import make_choice
+from strapdown.config.crash_checks import Written
+from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
+from strapdown.config.slots import SLOTS
+from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
+from strapdown.config.together import together
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.stated_states import stated_states
+from strapdown.exceptions import ConfigError
+from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+from strapdown.nav_state import NavState
+from strapdown.navigation.navigator import with_states
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.stated_imu import stated_imu
+
+__all__ = ["TRAJECTORY_FILES", "check_navigation", "given_of", "make_aids", "make_filter"]
+
+WITHOUT = "without that no position has a bound, and no aid a weight"
+#: Forms of a trajectory that a run can write.
+TRAJECTORY_FILES = tuple(TRAJECTORY_WRITERS)
+#: Stages that are modules.
+STAGES = ("prefilter", "coarse", "fine", "mechanization", "filter", "damping", "recorder")
+#: Keys that end an alignment.
+ENDS = ("duration_s", "until_heading_sd_deg", "until_tilt_sd_deg", "window_s")
+#: Aids that observe a height.
+HEIGHTS = ("barometer",)
+
+
+def check_navigation(spec: NavigationSpec, written: Written | None = None) -> None:
+    """Refuse what cannot be meant.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+    written : Written, optional
+        The file that it was read from, for lines in messages.
+
+    Raises
+    ------
+    ConfigError
+        A module refuses an option, modules do not go together, the place is none, or a sensor is
+        not known or says too little: all of it in one message, each with its line.
+    """
+    check = _Checks(written)
+    found: list[ConfigError] = []
+    for one in check.all(spec):
+        try:
+            one()
+        except ConfigError as error:
+            found.append(error)
+    if found:
+        raise together(found)
+
+
+class _Checks(SourceChecks):
+    def all(self, spec: NavigationSpec) -> Iterator[Callable[[], None]]:
+        yield partial(self.earth, spec)
+        yield partial(self.axes, spec.axes)
+        yield partial(self.log, spec.log)
+        yield partial(self.sensors, spec.sensors, spec.simulation, WITHOUT)
+        yield partial(self.times, spec)
+        yield partial(self.begins, spec)
+        for name in STAGES:
+            yield partial(self.stage, spec, name)
+        yield partial(self.modes, spec)
+        yield partial(self.alignment, spec)
+        for name in aids_of(spec):
+            yield partial(self.aid, spec, name)
+        yield partial(self.output, spec)
+        yield partial(self.chain, spec)
+
+    def earth(self, spec: NavigationSpec) -> None:
+        self.told(("ellipsoid",), lambda: find_ellipsoid(spec.ellipsoid))
+
+    def times(self, spec: NavigationSpec) -> None:
+        longest = self.span(spec.log)
+        if longest is None:
+            return
+        for stage in ("coarse", "fine"):
+            duration = getattr(spec, stage).duration_s
+            if duration is not None and duration > longest:
+                raise self.refuse(
+                    (stage, "duration_s"),
+                    f"it is longer than the record's {longest:g} s",
+                    "give less, or leave it out",
+                )
+
+    def begins(self, spec: NavigationSpec) -> None:
+        """Where it begins."""
+        for name in ("start", "site"):
+            table = getattr(spec, name)
+            if table is not None:
+                self.place(name, table.lat_deg, table.lon_deg, table.alt_m)
+        if spec.start is not None:
+            for stage in ("coarse", "fine"):
+                if getattr(spec, stage).kind != "none":
+                    raise self.refuse(
+                        (stage, "kind"),
+                        "[start] says attitude and place already",
+                        f"leave [{stage}] out, or [start]",
+                    )
+            if spec.site is not None:
+                raise self.refuse(
+                    ("site", "lat_deg"),
+                    "[start] says the place already",
+                    "leave [site] out, or [start]",
+                )
+        elif spec.coarse.kind == "none":
+            raise self.refuse(
+                ("start", "lat_deg"),
+                "nothing says where navigation begins: there is no [start], and [coarse] is none",
+                "write [start] with place and attitude, or a kind of [coarse]",
+            )
+
+    def stage(self, spec: NavigationSpec, name: str) -> None:
+        self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
+
+    def modes(self, spec: NavigationSpec) -> None:
+        """What ends each alignment, and what is said of one that is not there."""
+        for stage in ("coarse", "fine"):
+            given = getattr(spec, stage)
+            ends = [n for n in ENDS if getattr(given, n, None) is not None]
+            if given.kind == "none" and ends:
+                raise self.refuse(
+                    (stage, ends[0]), "there is no such alignment to end", "leave it out"
+                )
+            commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
+            if given.kind != "none" and not [n for n in ends if n != "window_s"]:
+                if commanded:
+                    continue
+                raise self.refuse(
+                    (stage, "duration_s"),
+                    "nothing ends this alignment, and navigation never begins",
+                    "write duration_s = …, until_heading_sd_deg = … or until_tilt_sd_deg = …",
+                )
+
+    def alignment(self, spec: NavigationSpec) -> None:
+        """What coarse and fine alignment need of one another, and of the aids."""
+        kind = spec.coarse.kind
+        if kind in NEEDS_GNSS and not _fixes(spec):
+            raise self.refuse(
+                ("coarse", "kind"),
+                "it takes the course from satellite fixes, and no aid gives them",
+                "write [aiding.gnss] with path = …, or take another kind",
+            )
+        if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
+            raise self.refuse(
+                ("coarse", "kind"),
+                f"{NOT_BEFORE_FINE[kind]}, and a fine alignment follows",
+                'write kind = "none" in [fine], or take another coarse alignment',
+            )
+        if spec.start is None and spec.site is None and not _fixes(spec):
+            raise self.refuse(
+                ("site", "lat_deg"),
+                "nothing says where the body is: there is neither [start] nor [site], and no aid "
+                "gives fixes",
+                "write [site] with lat_deg and lon_deg",
+            )
+
+    def aid(self, spec: NavigationSpec, name: str) -> None:
+        """One aid: its options, and whether it has what it observes by."""
+        given = aids_of(spec)[name]
+        entry = SLOTS["aiding"].entries[given.kind]
+        self.told(("aiding", name), partial(_aid, spec, name))
+        takes = issubclass(entry, TableAid)
+        if not takes and given.path is not None:
+            raise self.refuse(
+                ("aiding", name, "path"),
+                f"'{given.kind}' watches the inertial sensors, and takes no file",
+                "leave path out",
+            )
+        if takes and given.path is None and name not in receivers_of(spec):
+            raise self.refuse(
+                ("aiding", name, "path"),
+                f"it is missing: '{given.kind}' takes what it measured from a file",
+                "write path = …, from the folder of this file",
+            )
+        for key in ("position_sd_m", "velocity_sd_m_per_s"):
+            if getattr(given, key) is not None and given.kind != "gnss":
+                raise self.refuse(
+                    ("aiding", name, key),
+                    f"'{given.kind}' takes no fixes",
+                    'leave it out: it belongs to an aid of kind = "gnss"',
+                )
+        height = getattr(spec.mechanization, "height", None)
+        if given.kind in HEIGHTS and height == "held":
+            raise self.refuse(
+                ("aiding", name, "kind"),
+                'it observes the height, and [mechanization] height = "held" keeps it where it is',
+                'write height = "free", or leave this aid out',
+            )
+
+    def output(self, spec: NavigationSpec) -> None:
+        for form in spec.output.files:
+            if form not in TRAJECTORY_FILES:
+                raise self.refuse(
+                    ("output", "files"),
+                    f"there is no form '{form}'",
+                    f"use any of {', '.join(TRAJECTORY_FILES)}",
+                )
+        simulation = spec.simulation
+        if simulation is not None and simulation.rate_hz > MOST_SAMPLES:
+            raise self.refuse(("simulation", "rate_hz"), "it is no rate", "give Hz, as 100.0")
+
+    def chain(self, spec: NavigationSpec) -> None:
+        """Begin the filter, which refuses parts that do not go together."""
+        try:
+            made = make_filter(spec, uncertainty_of(spec))
+            aids = make_aids(spec)
+        except ConfigError as error:
+            # Options of modules are told by themselves, and with their own keys.
+            if (error.finding.quantity or "") != "states":
+                return
+            self.told(("sensors",), partial(_raise, error))
+            return
+        self.told(("filter",), partial(_begun, spec, with_states(made, aids)))
+
+
+def _raise(error: ConfigError) -> None:
+    raise error
+
+
+def _fixes(spec: NavigationSpec) -> list[str]:
+    """Names of the aids that give fixes."""
+    return [name for name, aid in aids_of(spec).items() if aid.kind == "gnss"]
+
+
+def _aid(spec: NavigationSpec, name: str) -> Aid:
+    made: Aid = make_choice(aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name})
+    return made
+
+
+def _begun(spec: NavigationSpec, filter_: ErrorFilter) -> None:
+    start = NavState.from_degrees(min(80.0, filter_.mechanization.latitude_limit_deg), 0.0)
+    filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
+
+
+def given_of(spec: NavigationSpec) -> dict[str, Any]:
+    """Fields of modules that the chain fills."""
+    return {"ellipsoid": spec.ellipsoid}
+
+
+def uncertainty_of(spec: NavigationSpec) -> ImuUncertainty:
+    """What is not known of the sensors of a specification.
+
+    Raises
+    ------
+    ConfigError
+        The sensor is unknown, or says too little.
+    """
+    stated = spec.sensors
+    sensor = None if stated.sensor is None else load_sensor(stated.sensor)
+    return stated_imu(sensor, stated.gyro, stated.accel)
+
+
+def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
+    """Make the filter of a specification, without the states of its aids.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    ErrorFilter
+
+    Raises
+    ------
+    ConfigError
+        A module refuses an option, or a state has no size.
+    """
+    options = make_choice(spec.filter, SLOTS["filter"], given_of(spec))
+    mechanization = make_choice(spec.mechanization, SLOTS["mechanization"], given_of(spec))
+    return ErrorFilter(
+        mechanization,
+        options.model(
+            gyro_noise=sensors.gyro.axis("noise_density"),
+            accel_noise=sensors.accel.axis("noise_density"),
+            sensors=stated_states(sensors, spec.sensors.states),
+        ),
+        options.form,
+        options.rule,
+        step=options.step,
+    )
+
+
+def make_aids(spec: NavigationSpec) -> tuple[Aid, ...]:
+    """Make the aids of a specification.
+
+    Raises
+    ------
+    ConfigError
+        One refuses an option.
+    """
+    return tuple(_aid(spec, name) for name in aids_of(spec))

@@ -1,0 +1,251 @@
+"""A run of navigation read from its file, or from what is sealed: the forms that its kinds have."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ValidationError, create_model
+
+from strapdown.config.alignment import PrefilterSpec
+from strapdown.config.case_keys import canonical
+from strapdown.config.case_paths import with_absolute_paths
+from strapdown.config.choice import ChoiceSpec, choice_form, with_kinds
+from strapdown.config.crash_checks import Written
+from strapdown.config.explain import explained
+from strapdown.config.motions import KINDS, MANOEUVRES
+from strapdown.config.navigation import (
+    AidSpec,
+    CoarseModeSpec,
+    DampingSpec,
+    FilterSpec,
+    FineModeSpec,
+    MechanizationSpec,
+    NavigationSimulationTable,
+    NavigationSpec,
+    ReceiverTable,
+    RecorderSpec,
+)
+from strapdown.config.navigation_checks import check_navigation
+from strapdown.config.navigation_wanted import what_navigation_wants, write_of_navigation
+from strapdown.config.placeholders import refuse_placeholders
+from strapdown.config.slots import SLOTS
+from strapdown.config.spec import TableSpec
+from strapdown.config.together import together
+from strapdown.config.toml_file import TomlFile, place_of, read_toml
+from strapdown.config.toml_lines import KeyPath
+from strapdown.exceptions import ConfigError
+
+__all__ = ["NAVIGATION_STAGES", "navigation_spec", "read_navigation_spec", "stage_default"]
+
+#: Stages that are modules, by table: what the table has beside the options, the kind that stands
+#: there where none is named, and whether a chain can do without it, by the kind ``none``.
+NAVIGATION_STAGES: dict[str, tuple[type[ChoiceSpec], str, bool]] = {
+    "prefilter": (PrefilterSpec, "none", True),
+    "coarse": (CoarseModeSpec, "inertial_frame", True),
+    "fine": (FineModeSpec, "filter", True),
+    "mechanization": (MechanizationSpec, "ned", False),
+    "filter": (FilterSpec, "error_state", False),
+    "damping": (DampingSpec, "feedback", False),
+    "recorder": (RecorderSpec, "interval", False),
+}
+#: Of a start that is known nothing is aligned.
+ALIGNMENTS = ("coarse", "fine")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+
+def stage_default(name: str, table: Mapping[str, Any]) -> str:
+    """The kind of a stage where its table names none."""
+    if name in ALIGNMENTS and table.get("start") is not None:
+        return "none"
+    return NAVIGATION_STAGES[name][1]
+
+
+def navigation_form(table: Mapping[str, Any], file: TomlFile | None = None) -> type[NavigationSpec]:
+    """The specification with the options of the kinds that a table names.
+
+    Raises
+    ------
+    ConfigError
+        There is no such kind, or an aid has no name that can be used.
+    """
+    parts: dict[str, Any] = {}
+    for name, (base, _, empty) in NAVIGATION_STAGES.items():
+        given = table.get(name)
+        form = choice_form(
+            SLOTS[name],
+            given if isinstance(given, Mapping) else {},
+            base,
+            default=stage_default(name, table),
+            empty=empty,
+            file=file,
+            path=(name,),
+        )
+        parts[name] = _field(form, {"kind": stage_default(name, table)})
+    parts["aiding"] = _field(_aiding_form(table, file), {})
+    if isinstance(table.get("simulation"), Mapping):
+        parts["simulation"] = (_simulation_form(table, file), ...)
+    return create_model("Navigation", __base__=NavigationSpec, **parts)
+
+
+def _field(form: type[TableSpec], usual: dict[str, Any]) -> tuple[Any, Any]:
+    """A field of a form, which may be left out where nothing in it must be written."""
+    needed = any(one.is_required() for name, one in form.model_fields.items() if name not in usual)
+    return form, ... if needed else form.model_validate(usual)
+
+
+def _aiding_form(table: Mapping[str, Any], file: TomlFile | None) -> type[TableSpec]:
+    given = table.get("aiding")
+    forms: dict[str, Any] = {}
+    for name, aid in given.items() if isinstance(given, Mapping) else ():
+        path = ("aiding", name)
+        _refuse_name(name, path, file)
+        slot = SLOTS["aiding"]
+        form = choice_form(
+            slot,
+            aid if isinstance(aid, Mapping) else {},
+            AidSpec,
+            default=name if name in slot.entries else "",
+            file=file,
+            path=path,
+        )
+        forms[name] = (form, ...)
+    return create_model("Aiding", __base__=TableSpec, **forms)
+
+
+def _simulation_form(table: Mapping[str, Any], file: TomlFile | None) -> type[TableSpec]:
+    """The simulation with a receiver for each aid that takes fixes and names no file."""
+    aiding = table.get("aiding")
+    names = {
+        name
+        for name, aid in (aiding.items() if isinstance(aiding, Mapping) else ())
+        if isinstance(aid, Mapping) and aid.get("kind", name) == "gnss" and not aid.get("path")
+    }
+    written = table["simulation"].get("gnss")
+    for name in written if isinstance(written, Mapping) else ():
+        if name not in names:
+            path: KeyPath = ("simulation", "gnss", str(name))
+            what = "there is no aid of this name that takes its fixes"
+            remedy = f'write [aiding.{name}] with kind = "gnss" and without path, or leave it out'
+            if file is None:
+                raise ConfigError(what, quantity=place_of(path), remedy=remedy)
+            raise file.refuse(path, what, remedy)
+    forms: dict[str, Any] = {name: (ReceiverTable, ReceiverTable()) for name in sorted(names)}
+    receivers = create_model("Receivers", __base__=TableSpec, **forms)
+    return create_model(
+        "Simulation", __base__=NavigationSimulationTable, gnss=(receivers, receivers())
+    )
+
+
+def _refuse_name(name: Any, path: KeyPath, file: TomlFile | None) -> None:
+    if isinstance(name, str) and _NAME.fullmatch(name) and not hasattr(BaseModel, name):
+        return
+    what = "it is no name that an aid can have"
+    remedy = "begin with a letter, and go on with letters, digits and _: [aiding.rtk]"
+    if isinstance(name, str) and hasattr(BaseModel, name):
+        what, remedy = "this name is taken by the form of the file", "choose another"
+    if file is None:
+        raise ConfigError(what, quantity=place_of(path), remedy=remedy)
+    raise file.refuse(path, what, remedy)
+
+
+def navigation_spec(table: Mapping[str, Any]) -> NavigationSpec:
+    """Make a specification of plain data, as a command or a sealed folder has it.
+
+    Parameters
+    ----------
+    table : mapping
+
+    Returns
+    -------
+    NavigationSpec
+
+    Raises
+    ------
+    ConfigError
+        There is no such kind, or the parts do not go together.
+    ValidationError
+        The table has another form.
+    """
+    whole = _with_kinds(table)
+    spec = navigation_form(whole).model_validate(whole)
+    check_navigation(spec)
+    return spec
+
+
+def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationSpec:
+    """Read the file of a run of navigation.
+
+    Parameters
+    ----------
+    path : str or Path
+    files : bool
+        Whether the files that it names must be there, and become absolute paths; else only the
+        form is checked.
+
+    Returns
+    -------
+    NavigationSpec
+        Named after the file.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
+        does not fit, or the parts do not go together; the message names the line.
+    """
+    path = Path(path)
+    file = read_toml(path, "a configuration has three levels")
+    if "name" in file.table:
+        remedy = "a run is named after its file; write title = …"
+        raise file.refuse(("name",), "there is no such key", remedy)
+    refuse_placeholders(file, what_navigation_wants)
+    file = replace(file, table=_with_kinds(file.table))
+    form = navigation_form(file.table, file)
+    table, written = canonical(file, form)
+    try:
+        spec = form(**{**table, "name": path.stem})
+        if files:
+            whole = spec.model_dump(serialize_as_any=True)
+            spec = form(**with_absolute_paths(file, whole, "this file"))
+    except ValidationError as error:
+        raise together([_explained(one, file, written) for one in error.errors()]) from None
+    check_navigation(spec, Written(file, written))
+    return spec
+
+
+def _explained(error: Any, file: TomlFile, written: Mapping[KeyPath, KeyPath]) -> ConfigError:
+    return explained(
+        error,
+        file,
+        place=_place,
+        tags={"kind": KINDS, "do": MANOEUVRES},
+        written=written,
+        wanted=write_of_navigation,
+    )
+
+
+def _place(parts: KeyPath) -> str:
+    """Where it stands; which of the motions it is goes without saying."""
+    if parts[:2] == ("simulation", "motion") and len(parts) > 3 and parts[2] in KINDS:
+        parts = (*parts[:2], *parts[3:])
+    return place_of(parts)
+
+
+def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table in which a module that is named by its kind alone is a table, too."""
+    out = dict(table)
+    for name in NAVIGATION_STAGES:
+        if name in out:
+            whole = {"kind": out[name]} if isinstance(out[name], str) else out[name]
+            out[name] = with_kinds(SLOTS[name], whole, stage_default(name, table))
+    aiding = out.get("aiding")
+    if isinstance(aiding, Mapping):
+        out["aiding"] = {
+            name: with_kinds(SLOTS["aiding"], aid, name if isinstance(name, str) else "")
+            for name, aid in aiding.items()
+        }
+    return out

@@ -1,0 +1,103 @@
+"""Errors of sensors as states by their names, with the sizes that a data sheet states."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from strapdown.estimation.sensor_blocks import (
+    accel_bias,
+    accel_drift,
+    accel_misalignment,
+    accel_scale,
+    g_sensitivity,
+    gyro_bias,
+    gyro_drift,
+    gyro_misalignment,
+    gyro_scale,
+)
+from strapdown.estimation.sensor_states import SensorStates
+from strapdown.estimation.standard_states import standard_states
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+
+__all__ = ["STATED_STATES", "stated_states"]
+
+#: By name of the block: triad, attribute of its uncertainty, what makes the block of it, and the
+#: key of [sensors.gyro] or [sensors.accel] that states it.
+STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
+    "gyro_bias": ("gyro", "bias", gyro_bias, "bias_sd_deg_per_h"),
+    "accel_bias": ("accel", "bias", accel_bias, "bias_sd_ug"),
+    "gyro_drift": ("gyro", "drift", gyro_drift, "bias_instability_deg_per_h, correlation_time_s"),
+    "accel_drift": ("accel", "drift", accel_drift, "bias_instability_ug, correlation_time_s"),
+    "gyro_scale": ("gyro", "scale", gyro_scale, "scale_sd_ppm"),
+    "accel_scale": ("accel", "scale", accel_scale, "scale_sd_ppm"),
+    "gyro_misalignment": ("gyro", "misalignment", gyro_misalignment, "misalignment_sd_mrad"),
+    "accel_misalignment": ("accel", "misalignment", accel_misalignment, "misalignment_sd_mrad"),
+    "g_sensitivity": ("gyro", "g_sensitivity", g_sensitivity, "g_sensitivity_sd_deg_per_h_per_g"),
+}
+
+
+def stated_states(
+    sensors: ImuUncertainty, names: Sequence[str] | None = None
+) -> tuple[SensorStates, ...]:
+    """Return errors of sensors as states.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+        How large each may be.
+    names : sequence of str, optional
+        Of `STATED_STATES`; biases and drifts as `standard_states`, if not given. A bias that is
+        named without its drift is a random walk that bounds both.
+
+    Returns
+    -------
+    tuple of SensorStates
+
+    Raises
+    ------
+    ConfigError
+        There is no such block, one is named twice, or nothing states its size.
+    """
+    if names is None:
+        return standard_states(sensors)
+    bounds = {one.block.name: one for one in standard_states(sensors, separate=False)}
+    out = []
+    for name in names:
+        if name not in STATED_STATES:
+            raise ConfigError(
+                f"'{name}' is no error of a sensor that a filter can estimate",
+                quantity="states",
+                remedy=nearest(name, STATED_STATES),
+            )
+        if list(names).count(name) > 1:
+            raise ConfigError(f"'{name}' stands there twice", quantity="states", remedy="keep one")
+        out.append(_block(name, sensors, bounds, names))
+    return tuple(out)
+
+
+def _block(
+    name: str, sensors: ImuUncertainty, bounds: dict[str, SensorStates], names: Sequence[str]
+) -> SensorStates:
+    triad, attribute, make, keys = STATED_STATES[name]
+    if attribute == "bias" and f"{triad}_drift" not in names:
+        return bounds[name]
+    drift = getattr(sensors, f"{triad}_drift")
+    sd = drift.triad if attribute == "drift" else getattr(sensors, triad).axis(attribute)
+    if not any(sd):
+        raise ConfigError(
+            f"nothing states how large '{name}' may be",
+            quantity="states",
+            remedy=f"state {keys} in [sensors.{triad}], or leave it out",
+        )
+    if attribute != "drift":
+        return make(sd)
+    if math.isinf(drift.correlation_time):
+        raise ConfigError(
+            f"nothing states over which time '{name}' changes",
+            quantity="states",
+            remedy=f"state correlation_time_s in [sensors.{triad}], or leave it out: a drift "
+            "without end is a part of the bias",
+        )
+    return make(sd, drift.correlation_time)

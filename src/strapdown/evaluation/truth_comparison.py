@@ -1,0 +1,353 @@
+"""A run of navigation against the truth: errors beside what the run itself claims of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown._kernels import geodetic as kernel
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.evaluation.nees import SHARE, bounds, normalised_squares
+from strapdown.evaluation.trajectory_at import SAME_BEAT, same_stamps, trajectory_at
+from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.exceptions import DataError, Finding
+from strapdown.frames import q_ne
+from strapdown.simulation.earth_motion import EarthMotion
+from strapdown.tables import (
+    EULER,
+    GEODETIC,
+    POSITION_SD,
+    TRAJECTORY,
+    TRAJECTORY_ERROR,
+    places_of,
+    trajectory_error_table,
+)
+
+__all__ = [
+    "COMPONENTS",
+    "PARTS",
+    "TruthComparison",
+    "compare_with_places",
+    "compare_with_truth",
+    "state_errors",
+]
+
+Array = NDArray[np.float64]
+
+#: Physical errors, as `mechanization.state_error.state_error` has them, and their units.
+COMPONENTS = ("north", "east", "down", "VN", "VE", "VD", "psi_N", "psi_E", "psi_D")
+UNITS = ("m",) * 3 + ("m/s",) * 3 + ("deg",) * 3
+#: What normalised squares are of.
+PARTS = {
+    "all": tuple(range(9)),
+    "position": (0, 1, 2),
+    "velocity": (3, 4, 5),
+    "attitude": (6, 7, 8),
+    "horizontal": (0, 1),
+}
+# A mark tells of the first row after it, if that is not more steps of the recorder away.
+NEAR = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class TruthComparison:
+    """Errors of a run, and what the run says of them.
+
+    Attributes
+    ----------
+    time : ndarray, (k,), s
+        Of the marks that the truth covers; against places alone, of the places.
+    errors : ndarray, (k, 9)
+        Computed less true, as `mechanization.state_error.state_error`: m, m/s, rad, in
+        north-east-down. NaN where the truth has no velocity or attitude.
+    covariance : ndarray, (k, 9, 9)
+        Claimed of them.
+    differences : DataFrame
+        TrajectoryError table at `time`: m, m/s, deg of roll, pitch and heading; NaN as above.
+    sd : DataFrame
+        TrajectoryError table of the standard deviations claimed.
+    nees : DataFrame
+        By time: normalised squares of the `PARTS` that can be told.
+    freedom : dict of str to int
+        Number of components in each of them: what the run has no states of is not in it.
+    inside : dict of str to float
+        Share of the epochs at which each is below its 95 % bound (chi-square, one-sided);
+        ``horizontal``: inside of the 95 % ellipse.
+    table : DataFrame
+        By component, with rows ``horizontal`` and ``3-D``: ``unit``, ``rms``, ``max`` (of the
+        absolute value), ``sd`` (root mean square of what was claimed), ``inside`` (share within
+        1.96 claimed standard deviations; of the ellipse). Rotations in deg.
+    findings : tuple of Finding
+        What interpolation of the truth may cost, gaps.
+    """
+
+    time: Array
+    errors: Array
+    covariance: Array
+    differences: pd.DataFrame
+    sd: pd.DataFrame
+    nees: pd.DataFrame
+    freedom: dict[str, int]
+    inside: dict[str, float]
+    table: pd.DataFrame
+    findings: tuple[Finding, ...] = ()
+
+
+def compare_with_truth(
+    trajectory: pd.DataFrame,
+    marks: ArrayLike,
+    covariance: Array,
+    truth: pd.DataFrame | EarthMotion,
+    ellipsoid: Ellipsoid = WGS84,
+) -> TruthComparison:
+    """Compare a run with the truth at the marks of its covariance.
+
+    A mark holds from its instant on: it is compared with the first row of the trajectory that
+    is not before it, where nothing is mixed with what was not yet observed.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        Trajectory table (`NavigationRecord.trajectory`).
+    marks : array_like, (m,), s
+        Instants of the covariance (``NavigationRecord.sd.index``).
+    covariance : ndarray, (m, 9, 9)
+        `NavigationRecord.covariance`.
+    truth : DataFrame or EarthMotion
+        Trajectory table of any rate, on the same clock (`trajectory_at`), or the motion itself.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    TruthComparison
+
+    Raises
+    ------
+    DataError
+        No mark is within the truth, a table is not valid, or a covariance is not positive.
+    """
+    stamps = trajectory.index.to_numpy(dtype=np.float64)
+    row, mark = _rows_of_marks(stamps, np.asarray(marks, dtype=np.float64))
+    if isinstance(truth, EarthMotion):
+        inside = stamps[row] <= truth.duration
+        span = (0.0, truth.duration)
+    else:
+        known = truth.index.to_numpy(dtype=np.float64)
+        inside = same_stamps(known, stamps[row], SAME_BEAT)[1]
+        inside |= (stamps[row] > known[0]) & (stamps[row] < known[-1])
+        span = (float(known[0]), float(known[-1]))
+    row, mark = row[inside], mark[inside]
+    if not row.size:
+        raise _nothing_in_common(trajectory, span)
+    computed, time = trajectory.iloc[row], stamps[row]
+    if isinstance(truth, EarthMotion):
+        true = truth.trajectory(time)
+        differences = trajectory_differences(computed, true, ellipsoid)
+    else:
+        true = trajectory_at(truth, time, ellipsoid)
+        differences = trajectory_differences(computed, truth, ellipsoid)
+    P = np.asarray(covariance)[mark]
+    return _comparison(
+        time,
+        state_errors(computed, true, ellipsoid),
+        P,
+        differences[TRAJECTORY_ERROR],
+        computed[EULER].to_numpy(),
+        tuple(differences.attrs["findings"]),
+    )
+
+
+def compare_with_places(
+    trajectory: pd.DataFrame,
+    marks: ArrayLike,
+    covariance: Array,
+    places: pd.DataFrame,
+    *,
+    antenna: Sequence[float] = (0.0, 0.0, 0.0),
+    ellipsoid: Ellipsoid = WGS84,
+) -> TruthComparison:
+    """Compare a run with places alone, as those of a receiver, at their own instants.
+
+    Parameters
+    ----------
+    trajectory, marks, covariance
+        As `compare_with_truth`; at a place the newest covariance is used.
+    places : DataFrame
+        By time in s: ``lat lon`` deg, ``alt`` m, and, if they are not exact, ``north_sd east_sd
+        down_sd`` m, as a Gnss table. What they are wrong by is added to what is claimed, and must
+        not have been used by the run: places that the filter has seen are nearer to it than the
+        two together say.
+    antenna : sequence of float, (3,), m
+        What the places are of, from the point that the trajectory describes, in body axes.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    TruthComparison
+        Of the place alone.
+
+    Raises
+    ------
+    DataError
+        No place is within the run; a covariance is not positive.
+    """
+    stamps = trajectory.index.to_numpy(dtype=np.float64)
+    instants = np.asarray(marks, dtype=np.float64)
+    usable = places[np.isfinite(places[GEODETIC].to_numpy(dtype=np.float64)).all(axis=1)]
+    if "quality" in usable:
+        usable = usable[usable["quality"] > 0]
+    time = usable.index.to_numpy(dtype=np.float64)
+    inside = (time >= max(stamps[0], instants[0])) & (time <= stamps[-1])
+    if not inside.any():
+        span = (float(time[0]), float(time[-1])) if time.size else (np.nan, np.nan)
+        raise _nothing_in_common(trajectory, span)
+    usable, time = usable[inside], time[inside]
+    computed = trajectory_at(trajectory, time, ellipsoid)
+    mark = np.searchsorted(instants, time, side="right") - 1
+    q_nb = rotation.quaternion_from_euler(computed[EULER].to_numpy())
+    arm = np.asarray(rotation.rotate(q_nb, np.asarray(antenna, dtype=np.float64)))
+    errors = np.full((len(time), 9), np.nan)
+    errors[:, :3] = _displacements(places_of(computed), _places(usable), ellipsoid) + arm
+    P = np.asarray(covariance)[mark].copy()
+    # The place of the antenna is wrong by dr + psi x arm, too.
+    J = np.concatenate(
+        [np.broadcast_to(np.eye(3), (len(time), 3, 3)), -rotation.cross_matrix(arm)], axis=2
+    )
+    at = [0, 1, 2, 6, 7, 8]
+    P[:, :3, :3] = J @ P[:, at][:, :, at] @ np.swapaxes(J, 1, 2)
+    if set(POSITION_SD) <= set(usable.columns):
+        own = usable[POSITION_SD].to_numpy(dtype=np.float64) ** 2
+        P[:, [0, 1, 2], [0, 1, 2]] += np.where(np.isfinite(own), own, 0.0)
+    differences = pd.DataFrame(errors, index=pd.Index(time, name="time"), columns=TRAJECTORY_ERROR)
+    return _comparison(time, errors, P, differences, computed[EULER].to_numpy(), ())
+
+
+def state_errors(computed: pd.DataFrame, true: pd.DataFrame, ellipsoid: Ellipsoid = WGS84) -> Array:
+    """Return `mechanization.state_error.state_error` of each pair of rows, (n, 9).
+
+    Parameters
+    ----------
+    computed, true : DataFrame
+        Trajectory tables of the same instants.
+    ellipsoid : Ellipsoid
+    """
+    a, b = (table[TRAJECTORY].to_numpy(dtype=np.float64) for table in (computed, true))
+    q_a, q_b = (rotation.quaternion_from_euler(x[:, 6:]) for x in (a, b))
+    # Of the truth's local level to that of the computed state.
+    between = rotation.compose(q_ne(a[:, 0], a[:, 1]), rotation.conjugate(q_ne(b[:, 0], b[:, 1])))
+    psi = rotation.rotation_vector_from_quaternion(
+        rotation.compose(q_a, rotation.conjugate(rotation.compose(between, q_b)))
+    )
+    apart = _displacements(places_of(computed), places_of(true), ellipsoid)
+    velocity = a[:, 3:6] - rotation.rotate(between, b[:, 3:6])
+    return np.hstack([apart, velocity, psi])
+
+
+def _displacements(computed: Array, true: Array, ellipsoid: Ellipsoid) -> Array:
+    """As `displacement_between`, of degrees and metres."""
+    a, e2 = ellipsoid.semi_major_axis, ellipsoid.eccentricity_squared
+    pairs = np.hstack([computed, true])
+    pairs[:, [0, 1, 3, 4]] = np.radians(pairs[:, [0, 1, 3, 4]])
+    return np.array(
+        [
+            kernel.displacement(lat, lon, alt, true_lat, true_lon, true_alt, a, e2)
+            for lat, lon, alt, true_lat, true_lon, true_alt in pairs.tolist()
+        ]
+    )
+
+
+def _places(table: pd.DataFrame) -> Array:
+    return table[GEODETIC].to_numpy(dtype=np.float64)
+
+
+def _rows_of_marks(stamps: Array, marks: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of a trajectory that marks tell of, and these marks: of several, the last."""
+    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    nearest, same = same_stamps(stamps, marks, SAME_BEAT)
+    row = np.where(same, nearest, np.searchsorted(stamps, marks))
+    mark = np.flatnonzero(row < len(stamps))
+    mark = mark[same[mark] | (stamps[row[mark]] - marks[mark] <= NEAR * step)]
+    row = row[mark]
+    last = np.append(row[1:] != row[:-1], True) if row.size else np.zeros(0, dtype=bool)
+    return row[last], mark[last]
+
+
+def _comparison(
+    time: Array,
+    errors: Array,
+    P: Array,
+    differences: pd.DataFrame,
+    euler: Array,
+    findings: tuple[Finding, ...],
+) -> TruthComparison:
+    variance = np.diagonal(P, axis1=1, axis2=2)
+    told = np.asarray(np.isfinite(errors).all(axis=0) & (variance > 0.0).all(axis=0))
+    squares, freedom, inside = {}, {}, {}
+    for part, members in PARTS.items():
+        kept = [k for k in members if told[k]]
+        if not kept or (part == "horizontal" and len(kept) < 2):
+            continue
+        squares[part] = normalised_squares(errors[:, kept], P[:, kept][:, :, kept])
+        freedom[part] = len(kept)
+        # One-sided: what is nearer than claimed is outside of no ellipse.
+        limit = bounds(len(kept), 2.0 * SHARE - 1.0)[1]
+        inside[part] = float(np.mean(squares[part] <= limit))
+    index = pd.Index(time, name="time")
+    sd = np.sqrt(np.maximum(variance, 0.0))
+    sds = trajectory_error_table(
+        time, sd[:, :3], sd[:, 3:6], rotation.euler_sd(euler, P[:, 6:, 6:])
+    )
+    return TruthComparison(
+        time,
+        errors,
+        P,
+        differences,
+        sds,
+        pd.DataFrame(squares, index=index),
+        freedom,
+        inside,
+        _table(errors, sd, told, inside),
+        findings,
+    )
+
+
+def _table(
+    errors: Array, sd: Array, told: NDArray[np.bool_], inside: dict[str, float]
+) -> pd.DataFrame:
+    from scipy.stats import norm
+
+    wide = float(norm.ppf(0.5 + 0.5 * SHARE))
+    rows = {}
+    for k, name in enumerate(COMPONENTS):
+        factor = np.degrees(1.0) if UNITS[k] == "deg" else 1.0
+        e, s = factor * errors[:, k], factor * sd[:, k]
+        share = float(np.mean(np.abs(e) <= wide * s)) if told[k] else np.nan
+        rows[name] = (UNITS[k], _rms(e), float(np.abs(e).max()), _rms(s), share)
+    for name, members, part in (("horizontal", (0, 1), "horizontal"), ("3-D", (0, 1, 2), None)):
+        at = list(members)
+        e, s = (np.linalg.norm(x[:, at], axis=1) for x in (errors, sd))
+        share = np.nan if part is None else inside.get(part, np.nan)
+        rows[name] = ("m", _rms(e), float(e.max()), _rms(s), share)
+    return pd.DataFrame.from_dict(
+        rows, orient="index", columns=["unit", "rms", "max", "sd", "inside"]
+    )
+
+
+def _rms(x: Array) -> float:
+    return float(np.sqrt(np.mean(x * x)))
+
+
+def _nothing_in_common(trajectory: pd.DataFrame, span: tuple[float, float]) -> DataError:
+    time = trajectory.index
+    return DataError(
+        f"the run ({time[0]:.9g} to {time[-1]:.9g} s) and the truth ({span[0]:.9g} to "
+        f"{span[1]:.9g} s) have no instant in common",
+        file=trajectory.attrs.get("source"),
+        quantity="time",
+        remedy="check that both count time from the same moment and in seconds",
+    )

@@ -1,0 +1,310 @@
+"""Fixes withheld from a navigator, and how far it then is from them.
+
+A reference is not needed where a receiver is good: some seconds of its fixes are kept back, and the
+navigator, which goes on without them, is scored against them. What it says of its own error is
+scored at the same fixes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.aiding.aid import TableAid
+from strapdown.estimation.update_rule import Step
+from strapdown.exceptions import ConfigError, nearest
+from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.record import Span
+from strapdown.tables.checks import index_of, source_of
+
+__all__ = [
+    "WithheldScore",
+    "Withholding",
+    "score_withheld",
+    "scores_table",
+    "spans_to_withhold",
+    "without_spans",
+]
+
+Array = NDArray[np.float64]
+
+#: Square of the Mahalanobis distance that 95 of 100 normal points of a plane are within, and its
+#: root: -2 ln 0.05.
+WITHIN_95 = -2.0 * math.log(0.05)
+
+
+@dataclass(frozen=True)
+class Withholding:
+    """The rule of an aid whose observations are looked at and not used."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return a step that changes nothing."""
+        return Step(0.0, 1.0, r, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class WithheldScore:
+    """A navigator over one span without fixes.
+
+    Attributes
+    ----------
+    span : Span
+    time : ndarray, (n,), s
+        Of the fixes that were withheld, on the clock of the inertial sensors.
+    error : ndarray, (n, 3), m
+        Computed place of the antenna less the fix, north, east, down.
+    variance : ndarray, (n, 3), m²
+        Expected of it, the noise of the fix with it.
+    covariance : ndarray, (n, 2, 2), m²
+        Of its horizontal part, the noise of the fix with it.
+    """
+
+    span: Span
+    time: Array
+    error: Array
+    variance: Array
+    covariance: Array
+
+    @property
+    def horizontal(self) -> Array:
+        """Length of the horizontal error, (n,), m."""
+        return np.asarray(np.hypot(self.error[:, 0], self.error[:, 1]))
+
+    @property
+    def largest(self) -> float:
+        """Largest horizontal error, m."""
+        return float(self.horizontal.max())
+
+    @property
+    def bound(self) -> Array:
+        """Distance that 95 of 100 errors are within, in the direction of the error, (n,), m.
+
+        Where the ray through the error leaves the ellipse of 95 %: `horizontal` is below it if and
+        only if the error is within the ellipse.
+        """
+        far = self.distance
+        size = self.horizontal
+        along = np.sqrt(np.linalg.eigvalsh(self.covariance)[:, 1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out = np.where(size > 0.0, size * math.sqrt(WITHIN_95) / far, 2.45 * along)
+        return np.asarray(out)
+
+    @property
+    def distance(self) -> Array:
+        """Mahalanobis distance of the horizontal error, (n,): 2.45 is the bound of 95 %."""
+        e = self.error[:, :2]
+        weighed = np.linalg.solve(self.covariance, e[:, :, None])[..., 0]
+        return np.asarray(np.sqrt((e * weighed).sum(axis=1)))
+
+    @property
+    def inside(self) -> bool:
+        """Whether the largest horizontal error is within the ellipse of 95 % of its instant."""
+        return bool(self.distance[int(np.argmax(self.horizontal))] ** 2 <= WITHIN_95)
+
+
+def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) -> tuple[Span, ...]:
+    """Return spans of one length, spread evenly: the first at the begin, the last at the end.
+
+    Parameters
+    ----------
+    begin, end : float, s
+        Between which there are fixes and the filter has settled.
+    length : float, s
+    places : int
+
+    Returns
+    -------
+    tuple of Span
+        They overlap where there is not room for them side by side; each is tried by itself.
+
+    Raises
+    ------
+    ConfigError
+        There is no room for one.
+    """
+    room = end - begin - length
+    if room < 0.0 or places < 1 or not length > 0.0:
+        raise ConfigError(
+            f"{places} spans of {length:g} s do not fit within {end - begin:g} s",
+            quantity="withhold",
+            remedy="withhold fewer seconds",
+        )
+    starts = begin + room * (np.linspace(0.0, 1.0, places) if places > 1 else np.array([0.5]))
+    return tuple(Span(f"{length:g} s", float(at), float(at + length)) for at in starts)
+
+
+def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
+    """Return the rows of a table whose stamps are in no span.
+
+    Parameters
+    ----------
+    table : DataFrame
+        By time.
+    spans : sequence of Span
+        After the begin, up to the end.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    ConfigError
+        Nothing is left, or a span has no row in it.
+    """
+    time = index_of(table)
+    kept = np.ones(len(time), dtype=np.bool_)
+    for span in spans:
+        within = (time > span.begin) & (time <= span.end)
+        if not within.any():
+            raise ConfigError(
+                f"there is nothing to withhold from {span.begin:g} to {span.end:g} s: the table "
+                f"goes from {time[0]:.9g} to {time[-1]:.9g} s",
+                file=source_of(table),
+                quantity="withhold",
+                remedy="give times on the clock of the table, in s",
+            )
+        kept &= ~within
+    if not kept.any():
+        raise ConfigError(
+            "every row would be withheld",
+            file=source_of(table),
+            quantity="withhold",
+            remedy="withhold less",
+        )
+    out = table[kept]
+    out.attrs = dict(table.attrs)
+    return out
+
+
+def score_withheld(
+    navigator: Navigator,
+    state: NavigatorState,
+    time: Array,
+    rows: Array,
+    name: str,
+    table: pd.DataFrame,
+    spans: Sequence[Span],
+) -> tuple[WithheldScore, ...]:
+    """Navigate with every fix up to each span, and through it with none.
+
+    The aid stays in the navigator and its observations are computed, but not used. Each span is by
+    itself: the run that goes on from its end has had the fixes.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    state : NavigatorState
+        At the start; the tables of the other aids have been told.
+    time : ndarray, (n,), s
+    rows : ndarray, (n, 10)
+        As `Navigator.advance`, from the state on.
+    name : str
+        Of the aid; its observation ``NAME.position`` is scored.
+    table : DataFrame
+        Of the aid, not told yet.
+    spans : sequence of Span
+        On the clock of the inertial sensors.
+
+    Returns
+    -------
+    tuple of WithheldScore
+        In the order of the spans.
+
+    Raises
+    ------
+    ConfigError
+        There is no such aid, or a span has no fixes or is not within the record.
+    """
+    aid = navigator.by_name.get(name)
+    if not isinstance(aid, TableAid):
+        raise ConfigError(
+            f"there is no aid '{name}' with a table",
+            quantity="withhold",
+            remedy=nearest(name, navigator.by_name),
+        )
+    blind = replace(
+        navigator,
+        aids=tuple(
+            replace(one, rule=Withholding()) if one.name == name else one for one in navigator.aids
+        ),
+    )
+    state = navigator.tell(state, name, table)
+    found: dict[int, WithheldScore] = {}
+    at = 0
+    for k in sorted(range(len(spans)), key=lambda k: spans[k].begin):
+        span = spans[k]
+        first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
+        if first < at or first == last or span.end > time[-1]:
+            raise ConfigError(
+                f"from {span.begin:.9g} to {span.end:.9g} s is not within the record",
+                quantity="withhold",
+                remedy=f"withhold between {state.time:.9g} and {time[-1]:.9g} s",
+            )
+        state, _ = navigator.advance(state, time[at:first], rows[at:first])
+        at = first
+        found[k] = _score(blind, state, time[first:last], rows[first:last], name, span)
+    return tuple(found[k] for k in range(len(spans)))
+
+
+def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
+    """Return scores as a table.
+
+    Parameters
+    ----------
+    scores : sequence of WithheldScore
+
+    Returns
+    -------
+    DataFrame
+        By begin of the span in s: its ``length`` s and ``fixes``; of the largest horizontal error
+        ``error`` m, ``bound`` m (95 %), ``distance`` (Mahalanobis, 2.45 at the bound); ``down``
+        m, the largest error of height; ``inside``, the share of the fixes within their bounds.
+    """
+    rows = []
+    for one in scores:
+        worst = int(np.argmax(one.horizontal))
+        rows.append(
+            {
+                "length": one.span.end - one.span.begin,
+                "fixes": len(one.time),
+                "error": one.largest,
+                "bound": float(one.bound[worst]),
+                "distance": float(one.distance[worst]),
+                "down": float(np.abs(one.error[:, 2]).max()),
+                "inside": float(np.mean(one.distance**2 <= WITHIN_95)),
+            }
+        )
+    begins = pd.Index([one.span.begin for one in scores], name="begin")
+    return pd.DataFrame(rows, index=begins)
+
+
+def _score(
+    blind: Navigator, state: NavigatorState, time: Array, rows: Array, name: str, span: Span
+) -> WithheldScore:
+    _, piece = blind.advance(state, time, rows)
+    seen = [one for one in piece.seen if one.name == f"{name}.position"]
+    if not seen:
+        raise ConfigError(
+            f"there are no fixes from {span.begin:.9g} to {span.end:.9g} s to score by",
+            quantity="withhold",
+            remedy="withhold where the receiver has fixes",
+        )
+    marks = {mark.time: mark.covariance for mark in piece.marks}
+    P = np.array([marks[one.time][:2, :2] for one in seen])
+    s = np.array([one.innovations.s for one in seen])
+    # What is expected along north and east is P, what the arm adds, and the fix's own noise: the
+    # part beyond P is independent from axis to axis but for the arm's share.
+    beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
+    return WithheldScore(
+        span=span,
+        time=np.array([one.time for one in seen]),
+        error=np.array([one.innovations.nu for one in seen]),
+        variance=s,
+        covariance=P + np.eye(2) * beyond[:, None, :],
+    )

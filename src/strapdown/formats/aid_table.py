@@ -1,0 +1,207 @@
+"""Readings of an odometer, a barometer and their like, from a table with named columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats import csv, parquet
+from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of_name, unrolled, with_clock
+from strapdown.formats.columns import CLOCKS, TIMES
+from strapdown.formats.find_columns import Column
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.quantity_columns import (
+    ANGLES,
+    LENGTHS,
+    PRESSURES,
+    RATES,
+    SPEEDS,
+    Found,
+    Quantity,
+    find_quantities,
+)
+from strapdown.formats.recording import RawLog
+
+__all__ = ["SYNONYMS", "UNITS", "read_aid_table"]
+
+Array = NDArray[np.float64]
+#: Unit of a table's column to the units that a file may have, with their factors to it.
+UNITS: dict[str, Mapping[str, float]] = {
+    "": {},
+    "m": LENGTHS,
+    "m/s": SPEEDS,
+    "deg": ANGLES,
+    "rad/s": RATES,
+    "Pa": PRESSURES,
+}
+#: Other words for a column, without blanks and underscores; those of opposite sign are not here.
+SYNONYMS: dict[str, tuple[str, ...]] = {
+    "speed": ("velocity", "vel", "v", "wheelspeed", "vehiclespeed", "odometerspeed", "odospeed"),
+    "distance": ("odometer", "odo", "mileage", "way"),
+    "pulses": ("pulse", "ticks", "counts", "count"),
+    "alt": ("altitude", "height", "h", "baroaltitude", "baroheight", "hbaro"),
+    "height": ("altitude", "alt", "h", "baroaltitude", "baroheight", "hbaro"),
+    "pressure": ("p", "baro", "barometer", "airpressure", "staticpressure"),
+    "heading": ("yaw", "psi", "azimuth", "course", "hdg"),
+}
+_SD = "_sd"
+_SD_WORDS = ("sd", "std", "stddev", "stdev", "sigma")
+
+
+def read_aid_table(
+    path: str | Path,
+    columns: Mapping[str, str],
+    *,
+    optional: Sequence[str] = (),
+    names: Mapping[str, str] | None = None,
+    repair: bool = False,
+) -> pd.DataFrame:
+    """Read the readings of an aid.
+
+    Parameters
+    ----------
+    path : str or Path
+        Text table or Parquet, with names of columns, which may carry a unit: ``speed_km_h``,
+        ``Pressure [hPa]``, ``heading_sd_deg``.
+    columns : dict of str to str
+        Column of the table that is wanted to its unit, a key of `UNITS`. One that ends in ``_sd``
+        is the standard deviation of the one before, and has to be positive where it stands.
+    optional : sequence of str
+        Those of `columns` that need not be there.
+    names : dict of str to str, optional
+        Column of the table to its name in the file, or its number counted from 1.
+    repair : bool
+        Leave out rows that cannot be used, and say how many, instead of refusing the file.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by ``time`` s, with those of `columns` that were found, in their units; ``attrs``
+        say its clock (`clocks`), its ``source`` and its ``findings``.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, or `names` names what is not in it.
+    DataError
+        A column is missing, a unit is none of it, a value is no number, a standard deviation is
+        not positive, or time does not advance; the message names the row.
+    """
+    path = Path(path)
+    raw = _raw(path)
+    known = {"time": Quantity((*TIMES, *CLOCKS, "utc", "datetime", "date"), TIME_UNITS)}
+    known |= {name: Quantity(_words(name), UNITS[unit]) for name, unit in columns.items()}
+    found = find_quantities(raw.columns, known, names or {}, raw.name, raw.units)
+    missing = [q for q in ("time", *columns) if q not in found and q not in optional]
+    if missing:
+        needed = [q for q in ("time", *columns) if q not in optional]
+        raise DataError(
+            f"missing columns: {', '.join(missing)}; it has {', '.join(raw.columns)}",
+            file=raw.name,
+            remedy=f"it needs {', '.join(needed)}; name columns that are called otherwise with "
+            f'columns = {{{missing[0]} = "…"}}',
+        )
+    findings = list(raw.findings)
+    time, clock = _time(raw, found["time"])
+    there = [name for name in columns if name in found]
+    values = {name: _values(raw, name, found[name]) for name in there}
+    for name, unit in columns.items():
+        if name in values and UNITS[unit] and not found[name].stated:
+            findings.append(
+                Finding(f"no unit is stated; {unit} is taken", file=raw.name, quantity=name)
+            )
+    keep = _usable(raw, time, values, repair, findings)
+    table = pd.DataFrame(
+        {name: block[keep] for name, block in values.items()},
+        index=pd.Index(time[keep], name="time"),
+    )
+    table.attrs |= {"source": raw.name, "findings": tuple(findings)}
+    return with_clock(table, clock)
+
+
+def _raw(path: Path) -> RawLog:
+    if not path.exists():
+        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+    if path.is_dir() or not (csv.detect(path) or parquet.detect(path)):
+        raise DataError(
+            "this is a folder" if path.is_dir() else f"the ending '{path.suffix}' is of no table",
+            file=path.resolve().name,
+            remedy=f"give one file: {', '.join((*csv.SUFFIXES, *parquet.SUFFIXES))}",
+        )
+    return parquet.read(path) if parquet.detect(path) else csv.read(path)
+
+
+def _words(name: str) -> tuple[str, ...]:
+    if name.endswith(_SD):
+        of = _words(name.removesuffix(_SD))
+        return tuple(w + s for w in of for s in _SD_WORDS) + tuple(
+            s + w for w in of for s in _SD_WORDS
+        )
+    return (name.lower().replace("_", ""), *SYNONYMS.get(name, ()))
+
+
+def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
+    ticks, dated = ticks_of(raw, Column(found.source, None, ""))
+    time = np.asarray(ticks * (1e-9 if dated else found.factor), dtype=np.float64)
+    finite = np.isfinite(time)
+    first = float(time[finite][0]) if finite.any() else 0.0
+    clock = clock_of_name(found.source, first, dated=dated)
+    if clock in (GPS, RELATIVE) and finite.all():
+        time, _ = unrolled(time)
+    return time, Clock(clock)
+
+
+def _values(raw: RawLog, name: str, found: Found) -> Array:
+    read = numbers(raw, Column(found.source, None, ""), name)
+    return np.asarray(read, dtype=np.float64) * found.factor
+
+
+def _usable(
+    raw: RawLog, time: Array, values: dict[str, Array], repair: bool, findings: list[Finding]
+) -> NDArray[np.bool_]:
+    """Rows of numbers alone, later than every row before them."""
+    keep = np.ones(time.size, dtype=bool)
+    for name, block in {"time": time, **values}.items():
+        bad = ~np.isfinite(block)
+        what = "it is no number"
+        if name.endswith(_SD) and not bad.any():
+            bad, what = ~(block > 0.0), "it is no standard deviation: it is not positive"
+        _refuse_or_say(raw, name, bad, what, repair, findings)
+        keep &= ~bad
+    latest = np.maximum.accumulate(np.where(keep, time, -np.inf))
+    late = keep & np.concatenate([[False], time[1:] <= latest[:-1]])
+    _refuse_or_say(raw, "time", late, "it is not later than every row before", repair, findings)
+    keep &= ~late
+    if not keep.any():
+        raise DataError("no row can be used", file=raw.name, remedy="look at the file")
+    return keep
+
+
+def _refuse_or_say(
+    raw: RawLog,
+    name: str,
+    bad: NDArray[np.bool_],
+    what: str,
+    repair: bool,
+    findings: list[Finding],
+) -> None:
+    rows = np.flatnonzero(bad)
+    if not rows.size:
+        return
+    more = f"{what} ({rows.size} such row{'s' if rows.size > 1 else ''} in all)"
+    row = raw.row(int(rows[0]))
+    if not repair:
+        raise DataError(
+            more,
+            file=raw.name,
+            row=row,
+            quantity=name,
+            remedy="correct or delete such rows, or leave them out with repair",
+        )
+    findings.append(Finding(f"left out: {more}", file=raw.name, row=row, quantity=name))

@@ -1,0 +1,149 @@
+"""Columns of numbers out of lines of text, all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
+
+Columns = list[NDArray[Any]]
+#: What programs write for a value that is not there.
+NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
+
+
+def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns | None:
+    """Columns of lines of one width.
+
+    Parameters
+    ----------
+    body : bytes
+        ASCII without quotes; the last line has its end.
+    count : int
+        Columns.
+    separator : str or None
+        Between fields; None for any run of blanks.
+
+    Returns
+    -------
+    list of ndarray, or None
+        As `parsed`. None where a line has another width, is empty, or holds what may be no number.
+    """
+    # A comma may be a decimal sign, and an x that of a hexadecimal number.
+    if count < 2 or b"x" in body or b"X" in body or (separator != "," and b"," in body):
+        return None
+    if b"\r" in body:
+        body = body.replace(b"\r\n", b"\n")
+        if b"\r" in body:
+            return None
+    columns = _parsed_or_none(body, count, separator or " ")
+    if columns is not None and all(_full(c) for c in columns):
+        return columns
+    # A value that is missing may be two blanks beside each other, or a line without any.
+    if separator is None:
+        body = single_blanks(body)
+        columns = _parsed_or_none(body, count, " ")
+    return None if b"\n\n" in body or body.startswith(b"\n") else columns
+
+
+def _parsed_or_none(body: bytes, count: int, delimiter: str) -> Columns | None:
+    import pyarrow as pa
+
+    try:
+        return parsed(body, count, delimiter)
+    except pa.ArrowInvalid:
+        return None
+
+
+def _full(column: NDArray[Any]) -> bool:
+    return column.dtype.kind in "iu" or (
+        column.dtype.kind == "f" and bool(np.isfinite(column.sum()))
+    )
+
+
+def single_blanks(text: bytes) -> bytes:
+    """Lines with one blank between fields, and none before the first or after the last.
+
+    Parameters
+    ----------
+    text : bytes
+        Fields apart by blanks and tabs.
+
+    Returns
+    -------
+    bytes
+        The same object where it was so.
+    """
+    text = text.replace(b"\t", b" ")
+    # Runs of up to 300 blanks in four passes; longer ones in as many as they need.
+    for run in (16, 4, 3, 2):
+        text = text.replace(b" " * run, b" ")
+    while b"  " in text:
+        text = text.replace(b"  ", b" ")
+    return text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ")
+
+
+def parsed(
+    body: bytes,
+    count: int,
+    delimiter: str,
+    *,
+    decimal: str = ".",
+    text: Sequence[int] = (),
+) -> Columns:
+    """Parse lines, each number to the double nearest to it.
+
+    Parameters
+    ----------
+    body : bytes
+        UTF-8, without a header.
+    count : int
+        Columns.
+    delimiter, decimal : str
+    text : sequence of int
+        Columns that are left as they stand.
+
+    Returns
+    -------
+    list of ndarray, (n,)
+        Numbers as numbers with NaN for what is missing, dates as dates, the rest as text.
+
+    Raises
+    ------
+    pyarrow.ArrowInvalid
+        A line has another number of fields.
+    """
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    table = pa_csv.read_csv(
+        pa.BufferReader(body),
+        read_options=pa_csv.ReadOptions(
+            column_names=[str(k) for k in range(count)], use_threads=False
+        ),
+        parse_options=pa_csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
+        convert_options=pa_csv.ConvertOptions(
+            decimal_point=decimal,
+            null_values=list(NULLS),
+            strings_can_be_null=True,
+            column_types={str(k): pa.string() for k in text},
+        ),
+    )
+    return [_array(table.column(k)) for k in range(count)]
+
+
+def _array(column: Any) -> NDArray[Any]:
+    """Numbers as numbers with NaN for what is missing, dates as dates, the rest as text."""
+    kind = str(column.type)
+    if kind in ("int64", "double"):
+        values: NDArray[Any] = column.to_numpy()
+        return values
+    if kind == "null":
+        return np.full(len(column), np.nan)
+    if kind.startswith("timestamp") and not column.null_count:
+        dates: NDArray[Any] = column.cast("timestamp[ns]").to_numpy()
+        return dates
+    return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)

@@ -1,0 +1,270 @@
+"""Fixes of a table whose columns have names: text, Parquet."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import TIME_UNITS
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv, parquet
+from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
+from strapdown.formats.columns import CLOCKS, TIMES
+from strapdown.formats.find_columns import Column
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.gnss_pos import QUALITY
+from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.quantity_columns import (
+    ANGLES,
+    LENGTHS,
+    SPEEDS,
+    Found,
+    Quantity,
+    find_quantities,
+)
+from strapdown.formats.recording import RawLog
+from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+
+__all__ = ["QUANTITIES", "detect", "read"]
+
+Array = NDArray[np.float64]
+_SD_HEADS = ("sd", "std", "stddev", "stdev", "sigma", "s")
+_HEADS = ("v", "vel", "velocity", "speed")
+
+
+def _sds(*words: str) -> tuple[str, ...]:
+    """Names of a standard deviation: the word for it before or after what it is of."""
+    return tuple(h + w for h in _SD_HEADS for w in words) + tuple(
+        w + h for h in _SD_HEADS[:-1] for w in words
+    )
+
+
+def _velocities(letter: str, word: str) -> tuple[str, ...]:
+    return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
+
+
+#: What a table of fixes may hold, as it may be called.
+QUANTITIES: dict[str, Quantity] = {
+    "time": Quantity(
+        (*TIMES, *CLOCKS, "gpssecondsofweek", "secondsofweek", "utc", "datetime", "date"),
+        TIME_UNITS,
+    ),
+    "week": Quantity(("week", "gpsweek", "weeknumber", "wn"), {}),
+    "lat": Quantity(("lat", "latitude"), ANGLES),
+    "lon": Quantity(("lon", "lng", "long", "longitude"), ANGLES),
+    "alt": Quantity(
+        (
+            "alt",
+            "altitude",
+            "h",
+            "hgt",
+            "height",
+            "hell",
+            "altell",
+            "heightell",
+            "ellipsoidalheight",
+            "heightellipsoid",
+            "altitudeellipsoid",
+        ),
+        LENGTHS,
+    ),
+    "alt_msl": Quantity(
+        (
+            "hmsl",
+            "altmsl",
+            "altitudemsl",
+            "heightmsl",
+            "mslaltitude",
+            "mslheight",
+            "orthometricheight",
+        ),
+        LENGTHS,
+    ),
+    "geoid": Quantity(
+        ("geoid", "undulation", "geoidsep", "geoidseparation", "geoidheight", "geoidundulation"),
+        LENGTHS,
+    ),
+    "VN": Quantity(_velocities("n", "north"), SPEEDS),
+    "VE": Quantity(_velocities("e", "east"), SPEEDS),
+    "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
+    "north_sd": Quantity(_sds("n", "north", "lat", "latitude"), LENGTHS),
+    "east_sd": Quantity(_sds("e", "east", "lon", "longitude"), LENGTHS),
+    "down_sd": Quantity(
+        _sds("d", "down", "u", "up", "h", "alt", "altitude", "height", "hgt"), LENGTHS
+    ),
+    "VN_sd": Quantity(_sds("vn", "veln", "velocityn", "northvelocity", "velnorth"), SPEEDS),
+    "VE_sd": Quantity(_sds("ve", "vele", "velocitye", "eastvelocity", "veleast"), SPEEDS),
+    "VD_sd": Quantity(
+        _sds("vd", "veld", "velocityd", "vu", "velu", "velocityu", "veldown", "velup"), SPEEDS
+    ),
+    "quality": Quantity(("quality", "fixquality", "gpsquality", "gnssquality"), {}),
+    "Q": Quantity(("q",), {}),
+}
+_NEEDED = ("time", *GEODETIC)
+
+
+def detect(path: Path) -> bool:
+    """Tell by the ending."""
+    return csv.detect(path) or parquet.detect(path)
+
+
+def read(path: Path, options: GnssOptions) -> Fixes:
+    """Read the fixes of a table by the names of its columns.
+
+    Parameters
+    ----------
+    path : Path
+    options : GnssOptions
+
+    Returns
+    -------
+    Fixes
+        Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; without one those of a
+        Gnss table are taken. A column ``Q`` has the codes of RTKLIB, ``quality`` those of NMEA.
+
+    Raises
+    ------
+    DataError
+        Time or the place is missing, two columns could be one quantity, a unit is none, or the
+        only height is over the sea.
+    """
+    raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
+    return fixes_of_columns(raw, options)
+
+
+def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
+    """Fixes of columns by their names; see `read`."""
+    found = find_quantities(raw.columns, QUANTITIES, options.columns, raw.name, raw.units)
+    over_sea = "alt" not in found and "alt_msl" in found
+    missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
+    if missing:
+        raise DataError(
+            f"missing columns: {', '.join(missing)}; it has {', '.join(raw.columns)}",
+            file=raw.name,
+            remedy="fixes need time, lat, lon and alt; name columns that are called otherwise with "
+            f'columns = {{{missing[0]} = "…"}}',
+        )
+    if over_sea and "geoid" not in found:
+        raise DataError(
+            f"the height is over the sea (column '{found['alt_msl'].source}')",
+            file=raw.name,
+            quantity="alt",
+            remedy="give the height over the ellipsoid, or add a column geoid_m with that of "
+            "the geoid over the ellipsoid",
+        )
+
+    def values(quantity: str) -> Array:
+        column = found[quantity]
+        read = numbers(raw, Column(column.source, None, ""), quantity)
+        return np.asarray(read, dtype=np.float64) * column.factor
+
+    def block(names: Sequence[str]) -> Array | None:
+        there = [name for name in names if name in found]
+        if there and len(there) < len(names):
+            missing = next(name for name in names if name not in found)
+            raise DataError(
+                f"it is missing, while {there[0]} is there (column '{found[there[0]].source}')",
+                file=raw.name,
+                quantity=missing,
+                remedy="give all three components, or none",
+            )
+        return np.column_stack([values(name) for name in names]) if there else None
+
+    place = np.column_stack([values("lat"), values("lon"), _height(found, values, raw)])
+    time, clock = _time(raw, found["time"])
+    if "week" in found and clock.name == RELATIVE:
+        clock = Clock(GPS)
+    if "week" in found and clock.name == GPS:
+        week = values("week")
+        time = time + WEEK * (week - week[0])
+        clock = Clock(GPS, 0.0, int(week[0]))
+    return Fixes(
+        name=raw.name,
+        time=time,
+        place=place,
+        rows=np.arange(1, time.size + 1) if raw.rows is None else raw.rows,
+        clock=clock,
+        velocity=_velocity(raw, block(VELOCITY)),
+        position_sd=block(POSITION_SD),
+        velocity_sd=block(VELOCITY_SD),
+        quality=_quality(raw, found, values),
+        findings=raw.findings,
+    )
+
+
+def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
+    if "alt_msl" not in found or "geoid" not in found:
+        return values("alt")
+    raw.findings.append(
+        Finding(
+            "height over the ellipsoid is that over the sea (column "
+            f"'{found['alt_msl'].source}') with that of the geoid added (column "
+            f"'{found['geoid'].source}')",
+            file=raw.name,
+            quantity="alt",
+        )
+    )
+    return np.asarray(values("alt_msl") + values("geoid"))
+
+
+def _velocity(raw: RawLog, velocity: Array | None) -> Array | None:
+    """The same; a speed with a course is no velocity, for nothing says how fast it climbs."""
+    words = [w for name in raw.columns for w in re.split(r"[^a-z]+", name.lower())]
+    if velocity is None and {"speed", "sog"} & set(words) and {"course", "cog"} & set(words):
+        raw.findings.append(
+            Finding(
+                "speed and course are not used: nothing says the velocity down",
+                file=raw.name,
+                quantity=", ".join(VELOCITY),
+                remedy="give velocity north, east and down, as in vN_m_s, vE_m_s, vD_m_s",
+            )
+        )
+    return velocity
+
+
+def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
+    ticks, dated = ticks_of(raw, Column(found.source, None, ""))
+    time = np.asarray(ticks * (1e-9 if dated else found.factor), dtype=np.float64)
+    first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
+    name = clock_of_name(found.source, first, dated=dated)
+    if name == UNIX and not dated and not found.stated and first > 1e11:
+        raise DataError(
+            f"a stamp of {first:.12g} s is no date that a clock of 1970 tells",
+            file=raw.name,
+            row=raw.row(0),
+            quantity="time",
+            remedy=f"name its column with the unit, as in {found.source}_ms",
+        )
+    return time, Clock(name)
+
+
+def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array | None:
+    if "quality" in found:
+        return values("quality")
+    if "Q" not in found:
+        return None
+    codes = values("Q")
+    known = np.isin(codes, list(QUALITY))
+    if not known.all():
+        k = int(np.argmin(known))
+        raise DataError(
+            f"a solution of kind {codes[k]:g} is unknown",
+            file=raw.name,
+            row=raw.row(k),
+            quantity="Q",
+            remedy="Q has the codes of RTKLIB, 1 to 7; call a column with those of NMEA quality",
+        )
+    raw.findings.append(
+        Finding(
+            f"column '{found['Q'].source}' is taken for the codes of RTKLIB: 1 fix, 2 float, 5 "
+            "single",
+            file=raw.name,
+            quantity="quality",
+            remedy="if it is that of NMEA (4 fix, 5 float, 1 single), call it quality",
+        )
+    )
+    return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)

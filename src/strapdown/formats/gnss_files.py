@@ -1,0 +1,97 @@
+"""Fixes of satellite receivers from files: one reader a format, and the one table of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.formats import gnss_columns, gnss_kf_gins, gnss_pos, pyins
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions, table_of_fixes
+
+__all__ = ["GNSS_READERS", "GnssOptions", "GnssReader", "read_gnss"]
+
+
+@dataclass(frozen=True)
+class GnssReader:
+    """How one format of fixes is recognised and read."""
+
+    title: str
+    detect: Callable[[Path], bool]
+    read: Callable[[Path, GnssOptions], Fixes]
+
+
+#: In the order in which they are tried.
+GNSS_READERS: dict[str, GnssReader] = {
+    "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
+    "kf-gins": GnssReader(
+        "KF-GINS fixes, 7 or 13 columns without a header", gnss_kf_gins.detect, gnss_kf_gins.read
+    ),
+    "python-ins": GnssReader(
+        "python-ins arrays: fix_time, fix (.npz)", pyins.detect_fixes, pyins.read_fixes
+    ),
+    "columns": GnssReader(
+        "table with named columns (.csv .txt .tsv .dat .parquet)",
+        gnss_columns.detect,
+        gnss_columns.read,
+    ),
+}
+
+
+def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:
+    """Read the fixes of a satellite receiver.
+
+    Parameters
+    ----------
+    path : str or Path
+    options : GnssOptions, optional
+        What the user says about it.
+
+    Returns
+    -------
+    DataFrame
+        A Gnss table, time as it stands in the file: ``attrs`` say its clock (`clocks`), its
+        ``source`` and its ``findings``. A velocity that is not there has an infinite standard
+        deviation.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file, no such format, or `options` name what is not in it.
+    DataError
+        The file cannot be used; the message names file, row, quantity and remedy.
+    """
+    path, asked = Path(path), options or GnssOptions()
+    if not path.exists():
+        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+    if path.is_dir():
+        raise DataError(
+            "this is a folder, and fixes are read from one file",
+            file=path.resolve().name,
+            remedy="give one file of it",
+        )
+    if path.stat().st_size == 0:
+        raise DataError(
+            "the file is empty",
+            file=path.name,
+            remedy="check that the recording was saved and copied whole",
+        )
+    if asked.format is not None and asked.format not in GNSS_READERS:
+        raise ConfigError(
+            f"'{asked.format}' is no format of fixes",
+            quantity="format",
+            remedy=nearest(asked.format, GNSS_READERS),
+        )
+    readers = [GNSS_READERS[asked.format]] if asked.format else GNSS_READERS.values()
+    for reader in readers:
+        if asked.format or reader.detect(path):
+            return table_of_fixes(reader.read(path, asked), asked)
+    kinds = "; ".join(r.title for r in GNSS_READERS.values())
+    raise DataError(
+        f"the ending '{path.suffix}' is of no known format of fixes",
+        file=path.name,
+        remedy=f"give one of: {kinds}",
+    )

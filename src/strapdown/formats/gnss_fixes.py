@@ -1,0 +1,296 @@
+"""What the readers of fixes have in common: their options, and what every fix is checked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
+from strapdown.tables import gnss_table
+from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+
+__all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
+
+Array = NDArray[np.float64]
+Sd = float | tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class GnssOptions:
+    """What the user says about a file of fixes; whatever is None is taken from the file.
+
+    Attributes
+    ----------
+    format : str, optional
+        A key of `gnss_files.GNSS_READERS`.
+    columns : dict of str to str
+        Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its
+        number counted from 1.
+    position_sd, velocity_sd : float or tuple of float, optional, m and m/s
+        Standard deviations north, east, down, or one for all three: of each fix, in place of
+        those of the file.
+    repair : bool
+        Leave out rows that cannot be used, and say how many, instead of refusing the file.
+    """
+
+    format: str | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    position_sd: Sd | None = None
+    velocity_sd: Sd | None = None
+    repair: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("position_sd", "velocity_sd"):
+            value = getattr(self, name)
+            if value is not None and not (
+                np.shape(value) in ((), (3,)) and np.all(np.asarray(value) > 0.0)
+            ):
+                raise ConfigError(
+                    f"{value!r} is no standard deviation",
+                    quantity=name,
+                    remedy="give one positive number, or three: north, east, down",
+                )
+
+
+@dataclass
+class Fixes:
+    """Fixes as a file has them, in the units of a Gnss table; NaN where nothing stands.
+
+    Attributes
+    ----------
+    name : str
+    time : ndarray, (n,), s
+    place : ndarray, (n, 3)
+        Latitude and longitude in deg, height over the ellipsoid in m.
+    rows : ndarray of int, (n,)
+        Row of the file, counted from 1.
+    clock : Clock
+    velocity, position_sd, velocity_sd : ndarray, (n, 3), or None
+        North, east, down.
+    quality : ndarray, (n,), or None
+        As field 6 of NMEA 0183 GGA.
+    zero_is_unknown : bool
+        A standard deviation of zero stands for one that is not known.
+    findings : list of Finding
+    """
+
+    name: str
+    time: Array
+    place: Array
+    rows: NDArray[np.int64]
+    clock: Clock = field(default_factory=lambda: Clock(RELATIVE))
+    velocity: Array | None = None
+    position_sd: Array | None = None
+    velocity_sd: Array | None = None
+    quality: Array | None = None
+    zero_is_unknown: bool = False
+    findings: list[Finding] = field(default_factory=list)
+
+
+def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
+    """Make a Gnss table of fixes, or say what is wrong with them.
+
+    Parameters
+    ----------
+    fixes : Fixes
+    options : GnssOptions
+
+    Returns
+    -------
+    DataFrame
+        A Gnss table; ``attrs`` say its clock (`clocks`) and its `findings`.
+
+    Raises
+    ------
+    DataError
+        A stamp or a place is no number, time does not advance, a standard deviation is zero,
+        negative, or nowhere stated, or as `gnss_table`.
+    """
+    count = fixes.time.size
+    position_sd = _sd(fixes, "position", options.position_sd, count)
+    velocity, velocity_sd = _velocity(fixes, options.velocity_sd, count)
+    quality = np.ones(count) if fixes.quality is None else fixes.quality
+    quality = np.where(np.isnan(quality), 0.0, quality)
+    time, keep = _time(fixes, options)
+    keep &= _placed(fixes, quality, options)
+    if not keep.any():
+        raise DataError(
+            "no fix in it can be used",
+            file=fixes.name,
+            quantity="lat, lon",
+            remedy="look at the file: every row is without a place or a later stamp",
+        )
+    at = np.flatnonzero(keep)
+    try:
+        table = gnss_table(
+            time[at],
+            fixes.place[at],
+            velocity[at],
+            position_sd[at],
+            velocity_sd[at],
+            quality[at],
+            source=fixes.name,
+        )
+    except DataError as error:
+        # The row of the table is not that of the file.
+        said = error.finding
+        raise DataError(
+            said.what,
+            file=fixes.name,
+            row=None if said.row is None else int(fixes.rows[at[said.row - 1]]),
+            quantity=said.quantity,
+            remedy=said.remedy,
+        ) from None
+    with_clock(table, fixes.clock)
+    table.attrs["findings"] = tuple(fixes.findings)
+    return table
+
+
+# --- time and place ---------------------------------------------------------------------
+
+
+def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]:
+    """Stamps that go on over the end of a week, and the rows that are later than all before."""
+    time = fixes.time
+    bad = np.flatnonzero(~np.isfinite(time))
+    if bad.size and not options.repair:
+        raise DataError(
+            f"its stamp is no number ({bad.size} such row{'s' if bad.size > 1 else ''} in all)",
+            file=fixes.name,
+            row=int(fixes.rows[bad[0]]),
+            quantity="time",
+            remedy="correct or delete that row, or leave such rows out with repair",
+        )
+    keep: NDArray[np.bool_] = np.isfinite(time)
+    if fixes.clock.name in (GPS, RELATIVE):
+        whole = time.copy()
+        whole[keep], weeks = unrolled(time[keep])
+        time = np.asarray(whole)
+        if weeks:
+            row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
+            fixes.findings.append(
+                Finding(
+                    "the seconds of week begin again; they are counted on",
+                    file=fixes.name,
+                    row=row,
+                    quantity="time",
+                )
+            )
+    there = np.where(keep, time, -np.inf)
+    before = np.maximum.accumulate(np.concatenate([[-np.inf], there[:-1]]))
+    late = np.flatnonzero(keep & (there <= before))
+    if late.size and not options.repair:
+        k = int(late[0])
+        same = there[k] == before[k]
+        raise DataError(
+            f"the stamp {time[k]:.12g} s "
+            + ("is that of a row before" if same else f"comes after {before[k]:.12g} s")
+            + f" ({late.size} such row{'s' if late.size > 1 else ''} in all)",
+            file=fixes.name,
+            row=int(fixes.rows[k]),
+            quantity="time",
+            remedy="sort the rows by time, each instant once; repair leaves such rows out",
+        )
+    keep = np.asarray(keep & (there > before))
+    _say_left_out(fixes, keep, "whose stamp is no number, or not later than every one before")
+    return time, keep
+
+
+def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bool_]:
+    """Rows with a place; those of quality 0 may be without."""
+    there = np.asarray(np.isfinite(fixes.place).all(axis=1))
+    bad = np.flatnonzero(~there & (quality != 0.0))
+    if bad.size and not options.repair:
+        k = int(bad[0])
+        which = GEODETIC[int(np.argmin(np.isfinite(fixes.place[k])))]
+        raise DataError(
+            f"it is no number ({bad.size} such row{'s' if bad.size > 1 else ''} in all)",
+            file=fixes.name,
+            row=int(fixes.rows[k]),
+            quantity=which,
+            remedy="correct or delete that row, or leave such rows out with repair",
+        )
+    _say_left_out(fixes, there, "without a place")
+    return there
+
+
+def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], why: str) -> None:
+    out = np.flatnonzero(~keep)
+    if out.size:
+        fixes.findings.append(
+            Finding(
+                f"{out.size} row{'s' if out.size > 1 else ''} left out {why}",
+                file=fixes.name,
+                row=int(fixes.rows[out[0]]),
+            )
+        )
+
+
+# --- standard deviations ----------------------------------------------------------------
+
+
+def _velocity(fixes: Fixes, asked: Sd | None, count: int) -> tuple[Array, Array]:
+    """Velocity, and its standard deviation: infinite where none was measured."""
+    if fixes.velocity is None:
+        return np.zeros((count, 3)), np.full((count, 3), np.inf)
+    sd = _sd(fixes, "velocity", asked, count)
+    there = np.isfinite(fixes.velocity)
+    return np.where(there, fixes.velocity, 0.0), np.where(there, sd, np.inf)
+
+
+def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
+    names = POSITION_SD if what == "position" else VELOCITY_SD
+    stated = fixes.position_sd if what == "position" else fixes.velocity_sd
+    if asked is not None:
+        return np.broadcast_to(np.asarray(asked, dtype=np.float64), (count, 3)).copy()
+    if stated is None:
+        if what == "velocity":
+            fixes.findings.append(
+                Finding(
+                    "velocities without standard deviations; they are not used",
+                    file=fixes.name,
+                    quantity=", ".join(VELOCITY),
+                    remedy="state velocity_sd, in m/s",
+                )
+            )
+            return np.full((count, 3), np.inf)
+        raise DataError(
+            "no standard deviations of the places are in it",
+            file=fixes.name,
+            quantity=", ".join(names),
+            remedy="state position_sd, in m: 0.02 suits RTK, 1 a code receiver with corrections, "
+            "5 one without",
+        )
+    sd = np.where(np.isnan(stated), np.inf, stated)
+    zero = sd == 0.0
+    if fixes.zero_is_unknown and zero.any():
+        rows = np.flatnonzero(zero.any(axis=1))
+        fixes.findings.append(
+            Finding(
+                f"{rows.size} row{'s' if rows.size > 1 else ''} with a standard deviation of zero, "
+                f"which stands for one that is not known: that {what} is not used",
+                file=fixes.name,
+                row=int(fixes.rows[rows[0]]),
+                quantity=names[int(np.argmax(zero[rows[0]]))],
+                remedy=f"state {what}_sd for all of them",
+            )
+        )
+        sd = np.where(zero, np.inf, sd)
+    bad = np.argwhere(~(sd > 0.0))
+    if bad.size:
+        k, j = (int(v) for v in bad[0])
+        raise DataError(
+            f"{stated[k, j]:.9g} is no standard deviation ({len(np.unique(bad[:, 0]))} such "
+            "rows in all)",
+            file=fixes.name,
+            row=int(fixes.rows[k]),
+            quantity=names[j],
+            remedy=f"give what the receiver states, leave it empty where it does not measure, or "
+            f"state {what}_sd for all rows",
+        )
+    return np.asarray(sd)

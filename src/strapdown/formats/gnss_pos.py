@@ -1,0 +1,338 @@
+"""Fixes that RTKLIB has solved (``.pos``).
+
+Lines of ``%`` at the top say how the file was made; the last of them names the columns, and its
+first word the time system. Time is a date or a GPS week with its seconds; the place is in degrees,
+in degrees, minutes and seconds, or Cartesian. A standard deviation of two axes, as ``sdne``, is the
+root of the size of their covariance, with its sign. Layout: RTKLIB 2.4.3 manual, appendix B.1.
+"""
+
+from __future__ import annotations
+
+import codecs
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
+from strapdown.formats.csv_columns import columns_at_once
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.frames import geodetic_from_ecef, q_ne
+
+__all__ = ["QUALITY", "detect", "read"]
+
+Array = NDArray[np.float64]
+SUFFIX = ".pos"
+#: RTKLIB's Q (1 fix, 2 float, 3 SBAS, 4 DGPS, 5 single, 6 PPP, 7 dead reckoning) to field 6 of
+#: NMEA 0183 GGA, as RTKLIB itself writes it; SBAS is differential.
+QUALITY = {0: 0, 1: 4, 2: 5, 3: 2, 4: 2, 5: 1, 6: 3, 7: 6}
+# What is added to make a time system that of UTC, in s; GPST needs nothing.
+_TO_UTC = {"UTC": 0.0, "JST": -9.0 * 3600.0}
+_HEAD = re.compile(r"%\s*(GPST|UTC|JST)\b[\s,;\t]*(.*)", re.I)
+_DAYS_OF_1980 = 3657  # from 1970-01-01 to 1980-01-06
+_AGAIN = "write it again with RTKLIB, as lat/lon/height over the ellipsoid"
+
+
+def detect(path: Path) -> bool:
+    """Tell by the name, or by the line that names the columns."""
+    if not path.is_file():
+        return False
+    if path.suffix.lower() == SUFFIX:
+        return True
+    with path.open("rb") as stream:
+        head = stream.read(csv.HEAD).decode("latin-1")
+    return any(_header(line) for line in head.splitlines() if line.startswith("%"))
+
+
+def _header(line: str) -> re.Match[str] | None:
+    match = _HEAD.match(line.strip())
+    known = ("latitude(", "x-ecef(", "e-baseline(", "longitude(")
+    return match if match and any(k in match[2] for k in known) else None
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """What the header says."""
+
+    system: str
+    names: list[str]
+    separator: str
+    row: int
+
+
+def read(path: Path, options: GnssOptions) -> Fixes:
+    """Read the fixes of a solution of RTKLIB.
+
+    Parameters
+    ----------
+    path : Path
+    options : GnssOptions
+
+    Returns
+    -------
+    Fixes
+        Time in seconds of the GPS week of the first row: UTC is brought to it
+        with its leap seconds, JST with nine hours more.
+
+    Raises
+    ------
+    DataError
+        No line names the columns, it is a baseline and no place, heights are over the geoid or
+        the datum is another, or a row is damaged.
+    """
+    text, findings = _decoded(path)
+    lines = text.splitlines()
+    layout = _layout(lines, path.name, findings)
+    columns, rows = _columns(lines, layout, text.endswith(("\n", "\r")), path.name, findings)
+    time, week = _time(columns, layout, path.name, rows)
+    named = {n: columns[n] for n in layout.names if n in columns}
+    fixes = _ecef(named) if "x-ecef(m)" in named else _level(named, columns)
+    place, velocity, position_sd, velocity_sd = fixes
+    quality = columns["Q"]
+    known = np.isin(quality, list(QUALITY))
+    if not known.all():
+        k = int(np.argmin(known))
+        raise DataError(
+            f"a solution of kind {quality[k]:g} is unknown",
+            file=path.name,
+            row=int(rows[k]),
+            quantity="Q",
+            remedy="1 to 7 stand for fix, float, SBAS, DGPS, single, PPP, dead reckoning",
+        )
+    return Fixes(
+        name=path.name,
+        time=time,
+        place=place,
+        rows=rows,
+        clock=Clock(GPS, 0.0, week),
+        velocity=velocity,
+        position_sd=position_sd,
+        velocity_sd=velocity_sd,
+        quality=np.array([QUALITY[int(q)] for q in quality], dtype=np.float64),
+        zero_is_unknown=True,
+        findings=findings,
+    )
+
+
+def _decoded(path: Path) -> tuple[str, list[Finding]]:
+    data = path.read_bytes()
+    if not data:
+        raise DataError(
+            "the file is empty",
+            file=path.name,
+            remedy="check that the solution was saved and copied whole",
+        )
+    if data.startswith(codecs.BOM_UTF8):
+        data = data[3:]
+    return csv.decoded(data, path.name)
+
+
+def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
+    headers = (
+        (row, match)
+        for row, line in enumerate(lines, 1)
+        if line.startswith("%") and (match := _header(line))
+    )
+    row, match = next(headers, (0, None))
+    if match is None:
+        raise DataError(
+            "no line names its columns, as '%  GPST  latitude(deg) …' does",
+            file=file,
+            remedy="write it again with RTKLIB with 'output header' on, or give a table with names",
+        )
+    top = " ".join(line for line in lines[:row] if line.startswith("%"))
+    told = re.search(r"lat/lon/height=(\w+)/(\w+)", top)
+    if told and told[1] != "WGS84":
+        raise DataError(
+            f"the places refer to the datum {told[1]}",
+            file=file,
+            quantity="lat, lon",
+            remedy="write it again with RTKLIB, with the datum WGS84",
+        )
+    if told and told[2] == "geodetic":
+        raise DataError(
+            "its heights are over the geoid, as the header says (geodetic)",
+            file=file,
+            quantity="alt",
+            remedy="write it again with RTKLIB, with heights ellipsoidal",
+        )
+    if "e-baseline(" in match[2]:
+        raise DataError(
+            "it holds the way from the base station, and no place (e/n/u-baseline)",
+            file=file,
+            row=row,
+            quantity="lat, lon",
+            remedy=_AGAIN,
+        )
+    separator = next((s for s in ",;\t" if s in match[2]), " ")
+    names = [n for n in re.split(r"[\s,;]+", match[2].strip()) if n]
+    return _Layout(match[1].upper(), names, separator, row)
+
+
+def _columns(
+    lines: list[str], layout: _Layout, ended: bool, file: str, findings: list[Finding]
+) -> tuple[dict[str, Array], NDArray[np.int64]]:
+    """Numbers by name; a date is six of them, degrees with minutes and seconds three."""
+    held = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "%"]
+    if not held:
+        raise DataError(
+            "a header, and no solution under it",
+            file=file,
+            row=layout.row,
+            remedy="look at what RTKLIB told: it found no solution, or the copy is cut",
+        )
+    dated = "/" in held[0][1].split()[0]
+    names = ["year", "month", "day", "hour", "minute", "second"] if dated else ["week", "tow"]
+    for name in layout.names:
+        if "d'\"" in name:
+            names += [f"{name[:3]}{part}" for part in ("_deg", "_min", "_sec")]
+        else:
+            names.append(name)
+    table = str.maketrans({layout.separator: " "} | ({"/": " ", ":": " "} if dated else {}))
+    plain = [(row, line.translate(table)) for row, line in held]
+    widths = [len(line.split()) for _, line in plain]
+    if widths[-1] < len(names) and (not ended or len(plain) > 1):
+        findings.append(
+            Finding(
+                "the last line is cut; it was left out",
+                file=file,
+                row=plain[-1][0],
+                remedy="if more is missing, copy the file again",
+            )
+        )
+        plain, widths = plain[:-1], widths[:-1]
+    for (row, _), width in zip(plain, widths, strict=True):
+        if width != len(names):
+            raise DataError(
+                f"{width} numbers, where the header names {len(names)}",
+                file=file,
+                row=row,
+                remedy="correct or delete that row; if the file changes its columns, split it",
+            )
+    rows = np.array([row for row, _ in plain], dtype=np.int64)
+    text = "".join(f"{' '.join(line.split())}\n" for _, line in plain)
+    # Of whole numbers a zero has no sign, and of degrees it says the hemisphere.
+    body = text.replace(" -0 ", " -0.0 ").encode()
+    columns = columns_at_once(body, len(names), None) if body.isascii() else None
+    if columns is None or any(c.dtype.kind not in "iuf" for c in columns):
+        _refuse_words(plain, names, file)
+    assert columns is not None
+    return {n: np.asarray(c, dtype=np.float64) for n, c in zip(names, columns, strict=True)}, rows
+
+
+def _refuse_words(plain: list[tuple[int, str]], names: list[str], file: str) -> None:
+    for row, line in plain:
+        for name, text in zip(names, line.split(), strict=True):
+            try:
+                float(text)
+            except ValueError:
+                raise DataError(
+                    f"'{text}' is not a number",
+                    file=file,
+                    row=row,
+                    quantity=name,
+                    remedy="correct or delete that row"
+                    + ("; decimals need a point" if "," in text else ""),
+                ) from None
+
+
+def _time(
+    columns: dict[str, Array], layout: _Layout, file: str, rows: NDArray[np.int64]
+) -> tuple[Array, int]:
+    """Seconds of the GPS week of the first row, and that week."""
+    if "week" in columns:
+        weeks, seconds = columns["week"], columns["tow"]
+    else:
+        months = (12.0 * (columns["year"] - 1970.0) + columns["month"] - 1.0).astype(np.int64)
+        month = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+        days = month + columns["day"] - 1.0 - _DAYS_OF_1980
+        weeks = np.floor(days / 7.0)
+        seconds = 86400.0 * (days - 7.0 * weeks) + 3600.0 * columns["hour"]
+        seconds = seconds + 60.0 * columns["minute"] + columns["second"]
+    if layout.system in _TO_UTC:
+        utc = WEEK * weeks + seconds + 86400.0 * _DAYS_OF_1980 + _TO_UTC[layout.system]
+        # Whole seconds: nothing is rounded where they are added.
+        seconds = seconds + _TO_UTC[layout.system] + leap_seconds(utc)
+    bad = np.flatnonzero(~np.isfinite(weeks + seconds) | (weeks < 0.0))
+    if bad.size:
+        raise DataError(
+            "its time is no date since 1980 and no GPS week",
+            file=file,
+            row=int(rows[bad[0]]),
+            quantity="time",
+            remedy="correct or delete that row",
+        )
+    first = weeks[0] + np.floor(seconds[0] / WEEK)
+    return np.asarray(WEEK * (weeks - first) + seconds), int(first)
+
+
+# --- places and velocities --------------------------------------------------------------
+
+
+def _stack(named: dict[str, Array], names: list[str]) -> Array | None:
+    return np.column_stack([named[n] for n in names]) if all(n in named for n in names) else None
+
+
+def _degrees(columns: dict[str, Array], name: str) -> Array:
+    if f"{name}_deg" not in columns:
+        return columns[next(n for n in columns if n.startswith(f"{name}") and "(deg)" in n)]
+    whole, minute, second = (columns[f"{name}_{p}"] for p in ("deg", "min", "sec"))
+    # Between the equator and one degree south the sign is that of a zero.
+    return np.asarray(np.copysign(np.abs(whole) + minute / 60.0 + second / 3600.0, whole))
+
+
+_Four = tuple[Array, Array | None, Array | None, Array | None]
+
+
+def _level(named: dict[str, Array], columns: dict[str, Array]) -> _Four:
+    place = np.column_stack(
+        [_degrees(columns, "lat"), _degrees(columns, "lon"), named["height(m)"]]
+    )
+    velocity = _stack(named, ["vn(m/s)", "ve(m/s)", "vu(m/s)"])
+    return (
+        place,
+        None if velocity is None else velocity * [1.0, 1.0, -1.0],
+        _stack(named, ["sdn(m)", "sde(m)", "sdu(m)"]),
+        _stack(named, ["sdvn", "sdve", "sdvu"]),
+    )
+
+
+def _ecef(named: dict[str, Array]) -> _Four:
+    xyz = _stack(named, ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)"])
+    assert xyz is not None
+    place = geodetic_from_ecef(xyz)
+    to_level = q_ne(place[:, 0], place[:, 1])
+    velocity = _stack(named, ["vx(m/s)", "vy(m/s)", "vz(m/s)"])
+    pairs = ["sdxy(m)", "sdyz(m)", "sdzx(m)"]
+    return (
+        place,
+        None if velocity is None else rotation.rotate(to_level, velocity),
+        _turned_sd(named, ["sdx(m)", "sdy(m)", "sdz(m)"], pairs, to_level),
+        _turned_sd(named, ["sdvx", "sdvy", "sdvz"], ["sdvxy", "sdvyz", "sdvzx"], to_level),
+    )
+
+
+def _turned_sd(
+    named: dict[str, Array], own: list[str], pairs: list[str], to_level: Array
+) -> Array | None:
+    """Standard deviations north, east, down of a covariance along the axes of the Earth."""
+    sd, between = _stack(named, own), _stack(named, pairs)
+    if sd is None:
+        return None
+    P = np.zeros((len(sd), 3, 3))
+    for k in range(3):
+        P[:, k, k] = sd[:, k] ** 2
+    if between is not None:
+        signed = between * np.abs(between)
+        for column, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
+            P[:, i, j] = P[:, j, i] = signed[:, column]
+    C = rotation.dcm_from_quaternion(to_level)
+    turned = np.einsum("nij,njk,nik->ni", C, P, C)
+    # Zeros in any of the three are unknown along the Earth's axes, and so along all others.
+    turned[(sd == 0.0).any(axis=1)] = 0.0
+    return np.asarray(np.sqrt(np.maximum(turned, 0.0)))

@@ -1,0 +1,136 @@
+"""Arrays that python-ins is simulated with (``.npz``): rates, fixes and truth in one archive.
+
+``time`` s and ``imu`` (n, 6): rates in rad/s and specific force in m/s², forward, right, down, at
+their stamps. ``truth`` (n, 9): latitude, longitude in deg, height in m, velocity north, east, down
+in m/s, roll, pitch, heading in deg. ``fix_time`` s and ``fix`` (m, 3): places as in the truth.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.formats import npz
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.recording import RawLog
+from strapdown.tables import trajectory_table
+
+__all__ = ["detect", "detect_fixes", "detect_truth", "read", "read_fixes", "read_truth"]
+
+Array = NDArray[np.float64]
+COLUMNS = [*(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}" for a in "xyz")]
+
+
+def _holds(path: Path, *names: str) -> bool:
+    if not path.is_file() or path.suffix.lower() != ".npz":
+        return False
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return {f"{name}.npy" for name in names} <= set(archive.namelist())
+    except zipfile.BadZipFile:
+        return False
+
+
+def detect(path: Path) -> bool:
+    """Tell by the names of the arrays."""
+    return _holds(path, "time", "imu")
+
+
+def detect_fixes(path: Path) -> bool:
+    """Tell by the names of the arrays."""
+    return _holds(path, "fix_time", "fix")
+
+
+def detect_truth(path: Path) -> bool:
+    """Tell by the names of the arrays."""
+    return _holds(path, "time", "truth")
+
+
+def _arrays(path: Path, time: str, values: str, width: int) -> tuple[Array, Array]:
+    arrays = npz.arrays_of(path)
+    stamps, block = arrays[time], arrays[values]
+    numeric = stamps.dtype.kind in "iuf" and block.dtype.kind in "iuf"
+    if not numeric or stamps.ndim != 1 or block.shape != (stamps.size, width):
+        raise DataError(
+            f"shapes {stamps.shape} and {block.shape}, where (n,) and (n, {width}) belong",
+            file=path.name,
+            quantity=f"{time}, {values}",
+            remedy=f"save {width} numbers a stamp",
+        )
+    return stamps.astype(np.float64), block.astype(np.float64)
+
+
+def read(path: Path) -> RawLog:
+    """Read the rates.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        The archive is damaged, or its arrays have other shapes.
+    """
+    time, imu = _arrays(path, "time", "imu", len(COLUMNS))
+    stated = {"time": ("time", "s")}
+    stated |= {n: (n, "rad/s" if n.startswith("gyro") else "m/s2") for n in COLUMNS}
+    return RawLog(
+        name=path.name,
+        files=(path,),
+        columns={"time": time} | {n: imu[:, k] for k, n in enumerate(COLUMNS)},
+        stated=stated,
+        sampling="instantaneous",
+        axes="x,y,z",
+    )
+
+
+def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+    """Read the fixes, of which the archive states no standard deviation.
+
+    Parameters
+    ----------
+    path : Path
+    options : GnssOptions
+
+    Returns
+    -------
+    Fixes
+
+    Raises
+    ------
+    DataError
+        As `read`.
+    """
+    time, place = _arrays(path, "fix_time", "fix", 3)
+    return Fixes(path.name, time, place, np.arange(1, time.size + 1))
+
+
+def read_truth(path: Path) -> pd.DataFrame:
+    """Read the trajectory.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    DataFrame
+        A Trajectory table.
+
+    Raises
+    ------
+    DataError
+        As `read`, or as `trajectory_table`.
+    """
+    time, truth = _arrays(path, "time", "truth", 9)
+    return trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)

@@ -1,0 +1,205 @@
+"""Which column of a table is which quantity, by words and units in its name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from strapdown.constants import TIME_UNITS
+from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.formats.columns import CLOCKS
+from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
+
+__all__ = [
+    "ANGLES",
+    "LENGTHS",
+    "PRESSURES",
+    "RATES",
+    "SPEEDS",
+    "Found",
+    "Quantity",
+    "find_quantities",
+]
+
+ANGLES = {"deg": 1.0, "rad": float(np.degrees(1.0))}
+LENGTHS = {"m": 1.0, "km": 1000.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
+SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0, "cm/s": 0.01, "mm/s": 0.001}
+SPEEDS |= {"mph": 0.44704}
+PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
+RATES = {"rad/s": 1.0, "deg/s": float(np.radians(1.0))}
+#: Units as people write them, the parts of a name joined by underscores.
+SPELLINGS = {
+    **{s: u for s, u in UNITS_OF_LOGS.items() if u in TIME_UNITS or u in ANGLES or u in RATES},
+    **{u: u for u in LENGTHS},
+    "meters": "m",
+    "metres": "m",
+    **{u: u for u in SPEEDS},
+    **{u.replace("/", "_"): u for u in SPEEDS},
+    **{u.replace("/", "_per_"): u for u in SPEEDS},
+    "mps": "m/s",
+    "kmh": "km/h",
+    "kph": "km/h",
+    "knots": "kn",
+    "kt": "kn",
+    "kts": "kn",
+    **{u.lower(): u for u in PRESSURES},
+}
+_BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that a table may hold.
+
+    Attributes
+    ----------
+    words : tuple of str
+        Names without blanks, underscores and units, in small letters.
+    units : dict of str to float
+        Its units, each with its factor to that of the table; empty where it has none.
+    negative : tuple of str
+        Further words, of its opposite: ``velup`` of a velocity down.
+    """
+
+    words: tuple[str, ...]
+    units: Mapping[str, float]
+    negative: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    """The column of a quantity.
+
+    Attributes
+    ----------
+    source : str
+        Its name in the file.
+    factor : float
+        What turns its numbers into the table's unit and sign.
+    stated : bool
+        Its name says the unit; otherwise the table's own was taken.
+    """
+
+    source: str
+    factor: float
+    stated: bool
+
+
+def find_quantities(
+    names: Iterable[str],
+    known: Mapping[str, Quantity],
+    asked: Mapping[str, str],
+    file: str,
+    units: Mapping[str, str] | None = None,
+) -> dict[str, Found]:
+    """Find the column of each quantity.
+
+    Parameters
+    ----------
+    names : iterable of str
+        As they stand in the file.
+    known : dict of str to Quantity
+    asked : dict of str to str
+        Quantity to the name of its column, or its number counted from 1; goes before what the
+        names suggest.
+    file : str
+        For messages.
+    units : dict of str to str, optional
+        Column to unit, where the file states it apart from the name.
+
+    Returns
+    -------
+    dict of str to Found
+        Quantities that were not found are absent.
+
+    Raises
+    ------
+    ConfigError
+        A column that was asked for is not there, or its quantity is none.
+    DataError
+        Two columns could be one quantity, or a unit is none of its quantity.
+    """
+    columns = list(names)
+    wanted: dict[str, str] = {}
+    for quantity, name in asked.items():
+        if quantity not in known:
+            raise ConfigError(
+                f"'{quantity}' is no quantity of this table",
+                quantity="columns",
+                remedy=nearest(quantity, known),
+            )
+        if name not in columns and name.isdecimal() and 1 <= int(name) <= len(columns):
+            name = columns[int(name) - 1]
+        if name not in columns:
+            raise ConfigError(
+                f"there is no column '{name}'",
+                file=file,
+                quantity=f"columns {quantity}",
+                remedy=nearest(name, columns),
+            )
+        wanted[name] = quantity
+    found: dict[str, Found] = {}
+    for name in columns:
+        word, unit = read_words(name, known)
+        unit = unit or ((units or {}).get(name, "").strip("[]() ").lower() or None)
+        said = next((q for q, k in known.items() if word in k.words or word in k.negative), None)
+        meant = wanted.get(name, said)
+        if meant is None or (name not in wanted and meant in asked):
+            continue
+        sign = -1.0 if word in known[meant].negative else 1.0
+        factor = sign * _factor(meant, known[meant], unit, word, name, file)
+        if meant in found:
+            raise DataError(
+                f"columns '{found[meant].source}' and '{name}' could both be it",
+                file=file,
+                quantity=meant,
+                remedy=f'say which: columns = {{{meant} = "{name}"}}',
+            )
+        found[meant] = Found(name, factor, bool(unit))
+    return found
+
+
+def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | None]:
+    """The word of a name without blanks, and its unit as it is spelled, or None.
+
+    Parameters
+    ----------
+    name : str
+    known : dict of str to Quantity
+        A whole name that is a word of one has no unit: ``h``, ``s``.
+    """
+    text = name.strip()
+    bracket = _BRACKETS.search(text)
+    if bracket:
+        text = text[: bracket.start()]
+    words = [w for w in re.split(r"[\s_\-/:.#]+", text.lower()) if w]
+    if bracket:
+        return "".join(words), re.sub(r"\s+", "", bracket.group(1).lower()) or None
+    whole = "".join(words)
+    if any(whole in k.words or whole in k.negative for k in known.values()):
+        return whole, None
+    for take in (3, 2, 1):
+        spelled = "_".join(words[-take:])
+        if len(words) > take and spelled in SPELLINGS:
+            return "".join(words[:-take]), spelled
+    return whole, None
+
+
+def _factor(
+    quantity: str, known: Quantity, unit: str | None, word: str, name: str, file: str
+) -> float:
+    if unit is None:
+        # A clock that is called millis says its unit.
+        return known.units[CLOCKS[word]] if word in CLOCKS and CLOCKS[word] in known.units else 1.0
+    spelled = SPELLINGS.get(unit, unit)
+    if spelled not in known.units:
+        raise DataError(
+            f"'{unit}' is no unit of it (column '{name}')",
+            file=file,
+            quantity=quantity,
+            remedy=f"known are {', '.join(known.units) or 'none'}",
+        )
+    return known.units[spelled]

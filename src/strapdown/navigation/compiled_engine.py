@@ -1,0 +1,291 @@
+"""The way of a navigator whose mechanization, error model and form have one compiled loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown._kernels import error_loop as kernel
+from strapdown._kernels import fix_loop as fix_kernel
+from strapdown._kernels.growth import padded
+from strapdown._kernels.level import LEVEL
+from strapdown.aiding.aid import Epochs
+from strapdown.aiding.gnss import POSITION_CODE
+from strapdown.estimation.covariance import CovarianceForm, Innovations
+from strapdown.estimation.covariance_input import bad_observation
+from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
+from strapdown.estimation.error_model import refuse_damped_height
+from strapdown.estimation.joseph import Joseph, Plain
+from strapdown.estimation.observation import Observation
+from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.ud import BiermanThornton
+from strapdown.estimation.wd import Chernodarov
+from strapdown.exceptions import DivergenceError
+from strapdown.mechanization.mechanization import Mechanization
+from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.wander_azimuth import WanderAzimuth
+from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState
+
+__all__ = ["CompiledEngine", "compiled"]
+
+Array = NDArray[np.float64]
+
+# Exactly these: whatever is made from them may do otherwise.
+MECHANIZATIONS: dict[type[Mechanization], int] = {
+    NorthEastDown: kernel.NED,
+    WanderAzimuth: kernel.WANDER,
+}
+FORMS: dict[type[CovarianceForm], int] = {
+    Joseph: kernel.JOSEPH,
+    Plain: kernel.PLAIN,
+    BiermanThornton: kernel.UD,
+    Chernodarov: kernel.WD,
+}
+
+
+def compiled(filter_: ErrorFilter) -> bool:
+    """Whether the modules of a filter have a compiled loop."""
+    return (
+        type(filter_.mechanization) in MECHANIZATIONS
+        and type(filter_.model) is RotationVectorModel
+        and type(filter_.form) in FORMS
+        and not filter_.rests
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Fixed:
+    """What came of m fixes.
+
+    Attributes
+    ----------
+    time : ndarray, (m,), s
+        When they were taken.
+    told : ndarray, (m, 3, 3)
+        Innovation, its expected variance, and weight of each component.
+    covariance : ndarray, (m, 9, 9)
+    sensors, sensors_sd : ndarray, (m, k)
+        As of a `Mark`, after each.
+    """
+
+    time: Array
+    told: Array
+    covariance: Array
+    sensors: Array
+    sensors_sd: Array
+
+
+class CompiledEngine(Engine):
+    """North-east-down or a wander azimuth, with the errors as vectors, fed back.
+
+    The numbers are those of `GeneralEngine` but for rounding.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+        For which `compiled` is true.
+    state : EngineState
+    """
+
+    def __init__(self, filter_: ErrorFilter, state: EngineState) -> None:
+        refuse_damped_height(filter_.mechanization)
+        used, stacked = filter_.mechanization, filter_.model.stacked
+        form = FORMS[type(filter_.form)]
+        self.navigation = filter_
+        self._kinds = (MECHANIZATIONS[type(used)], form, used.height == "held")
+        self._n = n = filter_.model.layout.size
+        rows_of_q, width = padded(n)
+        shape = (n, n) if form >= kernel.UD else (rows_of_q, width)
+        self._model = (
+            stacked.gyro_terms,
+            stacked.accel_terms,
+            stacked.decay,
+            stacked.drive,
+            np.array([filter_.model.gyro_noise, filter_.model.accel_noise]),
+            filter_.earth,
+            used.kernel_options(),
+        )
+        self._covariance = np.zeros(shape)
+        self._sensors = state.filter.sensors.copy()
+        self._times = np.array([state.filter.time, state.time])
+        self.mechanization = state.mechanization.copy()
+        self._states = (self.mechanization, self._covariance, self._sensors, self._times)
+        self._group = (np.empty((LARGEST_GROUP + 1, used.row)), np.empty((LARGEST_GROUP, 10)))
+        closing = (
+            np.empty((9, width)),
+            np.empty((9, width)),
+            np.empty(n - 9),
+            np.empty((rows_of_q, width)),
+            np.empty((51 + rows_of_q, width)),
+            np.empty((6, 3)),
+            np.empty((1, LEVEL)),
+            np.zeros(shape),
+            np.empty((n, n)),
+            np.empty((n, n)),
+        )
+        self._room = (closing, np.empty((2, 7, 3)), np.empty(0))
+        self._covariance[:n, :n] = state.filter.covariance
+        self._count = len(state.open_rows)
+        self._group[0][: self._count + 1] = state.open_history
+        self._group[1][: self._count] = state.open_rows
+        self.filter, self.errors = state.filter, state.errors
+        self.time, self.row, self.last = state.time, state.row, state.last
+
+    def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+        """Go over steps, as `Engine.over`."""
+        why, made, self._count = kernel.over_steps(
+            self._kinds,
+            self._model,
+            self._states,
+            self._group,
+            self._count,
+            self._room,
+            self.navigation.step,
+            note_at,
+            time,
+            rows,
+            history,
+        )
+        self._after(why, time, made)
+        return int(made)
+
+    def over_fixes(
+        self,
+        time: Array,
+        rows: Array,
+        history: Array,
+        note_at: float,
+        interval: float,
+        arm: Array,
+        fixes: Epochs,
+    ) -> tuple[int, Fixed, bool]:
+        """Go over steps and fixes whose errors are their noise alone, to the end of either.
+
+        Parameters
+        ----------
+        time, rows, history, note_at
+            As `over`; `rows` are changed where a fix cuts a step.
+        interval : float, s
+            From a mark to the next time to stop at.
+        arm : ndarray, (3,), m
+            Of the antenna.
+        fixes : Epochs
+            Of `aiding.gnss.Gnss`.
+
+        Returns
+        -------
+        made : int
+        fixed : Fixed
+        noted : bool
+            Whether it stopped for a covariance to be noted.
+        """
+        size, k = len(fixes.time), self._n - 9
+        told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
+        noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
+        why, made, self._count, done = fix_kernel.over_fixes(
+            self._kinds,
+            self._model,
+            self._states,
+            self._group,
+            self._count,
+            self._room,
+            self.navigation.step,
+            note_at,
+            interval,
+            time,
+            rows,
+            history,
+            SAME_INSTANT,
+            arm,
+            POSITION_CODE,
+            fixes.time,
+            fixes.values,
+            told,
+            at,
+            noted,
+            sensors,
+            sd,
+        )
+        if why == fix_kernel.BAD_FIX:
+            raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
+        self._after(why, time, made)
+        fixed = Fixed(at[:done], told[:done], noted[:done], sensors[:done], sd[:done])
+        return int(made), fixed, why == kernel.NOTE
+
+    def close(self) -> None:
+        """Take the covariance to the newest step."""
+        if self._count:
+            bad = kernel.close_group(
+                self._kinds, self._model, self._states, self._group, self._count, self._room[0]
+            )
+            if bad >= 0:
+                raise self._no_covariance()
+            self._count = 0
+        self._note()
+
+    def observe(
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
+    ) -> list[Innovations]:
+        """Take what is observed now."""
+        self.filter, seen = self.navigation.observe(self.filter, observations, rules)
+        self.mechanization[:], self.row = self.filter.mechanization, self.filter.row
+        self._sensors[:] = self.filter.sensors
+        self._covariance[: self._n, : self._n] = self.filter.covariance
+        self._group[0][0] = self.row
+        return seen
+
+    def shown(self) -> Array:
+        """Return the row of the newest step."""
+        return self.row
+
+    def state(self) -> EngineState:
+        """Return where it is now."""
+        return EngineState(
+            filter=self.filter,
+            errors=self.errors,
+            time=self.time,
+            mechanization=self.mechanization.copy(),
+            row=self.row,
+            open_history=self._group[0][: self._count + 1].copy(),
+            open_rows=self._group[1][: self._count].copy(),
+            last=self.last,
+        )
+
+    def _after(self, why: int, time: Array, made: int) -> None:
+        """Take over what a loop left."""
+        if why == kernel.DIVERGED:
+            raise diverged(float(time[made]))
+        if why == kernel.BAD:
+            raise self._no_covariance()
+        self._note()
+        self.time = float(self._times[kernel.AT_STEP])
+        if self._count:
+            self.row = self._group[0][self._count].copy()
+            self.last = self._group[1][self._count - 1].copy()
+        else:
+            self.row = self.filter.row
+
+    def _note(self) -> None:
+        """Read the state of the filter from the loop's arrays."""
+        if self.filter.time != self._times[kernel.AT_COVARIANCE] or not self._count:
+            n = self._n
+            self.filter = replace(
+                self.filter,
+                time=float(self._times[kernel.AT_COVARIANCE]),
+                mechanization=self.mechanization.copy(),
+                row=self._group[0][0].copy(),
+                sensors=self._sensors.copy(),
+                covariance=self._covariance[:n, :n].copy(),
+            )
+
+    def _no_covariance(self) -> DivergenceError:
+        time = float(self._times[kernel.AT_STEP])
+        return DivergenceError(
+            f"the covariance is none any more at {time:.9g} s: a variance is negative or no number",
+            quantity="covariance",
+            remedy="use covariance 'ud' or 'wd', which cannot lose a variance to rounding, and "
+            "look at the standard deviations that are given: units, and nothing known exactly",
+        )

@@ -1,0 +1,346 @@
+"""Whether innovations are what a filter expected of them: how large, without mean, white."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError
+from strapdown.navigation.innovation_monitor import Alarm, InnovationMonitor
+from strapdown.navigation.innovation_verdicts import Verdict, judge
+
+__all__ = [
+    "GROSS",
+    "ComponentConsistency",
+    "ObservationConsistency",
+    "consistency_of",
+    "consistency_of_all",
+    "whiteness",
+]
+
+Array = NDArray[np.float64]
+
+#: Beyond so many standard deviations, of those that are usual in the run, an innovation is a gross
+#: error: one in two million normal ones is.
+GROSS = 5.0
+#: Fewer epochs than these tell of nothing.
+FEWEST = 10
+#: Lags of the test of whiteness, where there are so many epochs for each: with fewer the tail of
+#: its distribution is longer than that of chi-square.
+LAGS, EPOCHS_A_LAG = 10, 25
+#: Median of the absolute value of a standard normal number.
+MEDIAN = 0.6744897501960817
+#: Share within which a bound of 95 % is.
+SHARE = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class ComponentConsistency:
+    """Normalised innovations of one component, gross errors left out but where it is said.
+
+    Attributes
+    ----------
+    label : str
+        With its unit.
+    count, gross : int
+        Epochs; those among them with gross errors, which are in nothing that follows.
+    inside : float
+        Share within 1.96 standard deviations.
+    scale : float
+        Root of their mean square: 1 where what was expected is right.
+    scale_bounds : tuple of float
+        Within which it is in 95 % of all runs with as many epochs (chi-square).
+    bias : float
+        Their mean, in standard deviations.
+    bias_bound : float
+        Which it is below in 95 % of them: ``1.96 / √n``.
+    bias_in_unit : float
+        Mean of the innovations themselves.
+    autocorrelation : ndarray, (lags,)
+        Of lags 1, 2, ... epochs, about their mean.
+    autocorrelation_bound : float
+        Of each alone, in 95 % of them: ``1.96 / √n``.
+    whiteness_p : float
+        Probability of as large a sum of their squares, were they white (`whiteness`).
+    lag_p : float
+        Probability of as large an autocorrelation of lag 1, ``ρ √n`` as a normal number.
+    scale_p, bias_p : float
+        Probability of as extreme a scale or bias, were all as expected.
+    """
+
+    label: str
+    count: int
+    gross: int
+    inside: float
+    scale: float
+    scale_bounds: tuple[float, float]
+    bias: float
+    bias_bound: float
+    bias_in_unit: float
+    autocorrelation: Array
+    autocorrelation_bound: float
+    whiteness_p: float
+    lag_p: float
+    scale_p: float
+    bias_p: float
+
+
+@dataclass(frozen=True, eq=False)
+class ObservationConsistency:
+    """What the innovations of one observation say of the filter.
+
+    Attributes
+    ----------
+    name : str
+        Of the observation.
+    nis : DataFrame
+        By time of the epochs: ``nis``, the sum of the squares of the normalised innovations of an
+        epoch, ``components``, how many they are, and ``lower``, ``upper``, its 95 % bounds
+        (chi-square). Gross errors are in it.
+    windows : DataFrame
+        By time of the last epoch of each window, one after the other: ``since``, ``epochs``,
+        ``nis`` over the components (1 is expected), ``lower``, ``upper``, its 95 % bounds; without
+        gross errors.
+    inside : float
+        Share of the epochs whose NIS is inside of its two bounds.
+    components : tuple of ComponentConsistency
+    alarms : tuple of Alarm
+        Where it was no longer as expected (`InnovationMonitor`).
+    verdicts : tuple of Verdict
+        What is wrong, the most telling first; empty where nothing is.
+    false_alarm : float
+        Probability that there is any verdict but of gross errors where all is as expected.
+    """
+
+    name: str
+    nis: pd.DataFrame
+    windows: pd.DataFrame
+    inside: float
+    components: tuple[ComponentConsistency, ...]
+    alarms: tuple[Alarm, ...]
+    verdicts: tuple[Verdict, ...]
+    false_alarm: float
+
+    @property
+    def consistent(self) -> bool:
+        """Whether no verdict says otherwise; gross errors alone are none of the filter's."""
+        return all(one.kind == "gross" for one in self.verdicts)
+
+
+def consistency_of(
+    name: str, innovations: pd.DataFrame, *, window: int = 30, false_alarm: float = 0.01
+) -> ObservationConsistency:
+    """Hold the innovations of an observation against what was expected of them.
+
+    Components of one epoch are taken one after the other, each less what those before it told, so
+    that normalised they are independent numbers of mean 0 and variance 1 if the model is right.
+    They are so for Kalman's update; for a robust one as far as gross errors are rare.
+
+    Parameters
+    ----------
+    name : str
+    innovations : DataFrame
+        By time in s: ``nu LABEL``, ``s LABEL``, ``weight LABEL`` (`NavigationRecord.innovations`).
+    window : int
+        Epochs of a window.
+    false_alarm : float
+        Probability of any verdict where all is as expected, but for gross errors. It is
+        divided evenly among the tests: scale, bias, lag 1, whiteness and a change within the run,
+        of each component.
+
+    Returns
+    -------
+    ObservationConsistency
+
+    Raises
+    ------
+    ConfigError
+        The window has not at least two epochs, or the probability is none.
+    """
+    if window < 2:
+        raise ConfigError(
+            f"a window of {window} epochs says nothing",
+            quantity="window",
+            remedy="give at least 2 epochs",
+        )
+    if not 0.0 < false_alarm < 1.0:
+        raise ConfigError(
+            f"{false_alarm} is no probability of a false alarm",
+            quantity="false_alarm",
+            remedy="give a number between 0 and 1",
+        )
+    labels = [column[3:] for column in innovations.columns if column.startswith("nu ")]
+    time = innovations.index.to_numpy(dtype=np.float64)
+    nu = innovations[[f"nu {label}" for label in labels]].to_numpy(dtype=np.float64)
+    s = innovations[[f"s {label}" for label in labels]].to_numpy(dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        u = np.where((s > 0.0) & np.isfinite(s), nu / np.sqrt(s), np.nan)
+    gross = _gross(u)
+    good = np.where(gross, np.nan, u)
+    components = tuple(
+        _component(label, good[:, k], nu[:, k], int(gross[:, k].sum()))
+        for k, label in enumerate(labels)
+    )
+    # Of five tests each component has; that of a change has three sums over all epochs.
+    each = false_alarm / (5.0 * max(len(labels), 1))
+    monitor = InnovationMonitor(threshold=math.log(3.0 * max(len(time), 1) / each))
+    _, alarms = monitor.advance(monitor.begin(len(labels)), time, good)
+    nis = _nis(time, u)
+    inside = nis["nis"].between(nis["lower"], nis["upper"])[nis["components"] > 0]
+    return ObservationConsistency(
+        name,
+        nis,
+        _windows(time, good, window),
+        float(inside.mean()) if len(inside) else math.nan,
+        components,
+        alarms,
+        judge(time, good, gross, components, alarms, each, FEWEST),
+        false_alarm,
+    )
+
+
+def consistency_of_all(
+    innovations: Mapping[str, pd.DataFrame], *, window: int = 30, false_alarm: float = 0.01
+) -> dict[str, ObservationConsistency]:
+    """Return `consistency_of` each observation of a record, by name."""
+    return {
+        name: consistency_of(name, table, window=window, false_alarm=false_alarm)
+        for name, table in innovations.items()
+    }
+
+
+def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
+    """Test whether a sequence is white.
+
+    Parameters
+    ----------
+    values : ndarray, (n,)
+        Equally spaced, as far as it matters; NaN where there is none.
+    lags : int
+
+    Returns
+    -------
+    autocorrelation : ndarray, (lags,)
+        About the mean.
+    p : float
+        Probability of as large a value of ``n (n + 2) sum ρ_k²/(n - k)``, which is about
+        chi-square with `lags` degrees of freedom if it is white (Ljung and Box, Biometrika 65
+        (1978) 297).
+    """
+    from scipy.stats import chi2
+
+    told = ~np.isnan(values)
+    n = int(told.sum())
+    x = np.where(told, values - np.nanmean(values), 0.0) if n else np.zeros(len(values))
+    power = float(x @ x)
+    rho = np.zeros(lags)
+    if power > 0.0:
+        rho = np.array([x[k:] @ x[: len(x) - k] for k in range(1, lags + 1)]) / power
+    k = np.arange(1, lags + 1)
+    q = n * (n + 2.0) * float(np.sum(rho**2 / np.maximum(n - k, 1)))
+    return rho, float(chi2.sf(q, lags))
+
+
+def _gross(u: Array) -> NDArray[np.bool_]:
+    """Innovations far beyond those that are usual, by the median, which they do not move."""
+    out = np.zeros(u.shape, dtype=bool)
+    for k, column in enumerate(u.T):
+        told = np.abs(column[~np.isnan(column)])
+        if told.size:
+            usual = max(float(np.median(told)) / MEDIAN, 1.0)
+            with np.errstate(invalid="ignore"):
+                out[:, k] = np.abs(column) > GROSS * usual
+    return out
+
+
+def _component(label: str, u: Array, nu: Array, gross: int) -> ComponentConsistency:
+    from scipy.stats import chi2, norm
+
+    told = ~np.isnan(u)
+    x, n = u[told], int(told.sum())
+    normal = float(norm.ppf(0.5 + 0.5 * SHARE))
+    if n < FEWEST:
+        nothing = math.nan
+        return ComponentConsistency(
+            label,
+            n + gross,
+            gross,
+            nothing,
+            nothing,
+            (nothing, nothing),
+            nothing,
+            nothing,
+            nothing,
+            np.empty(0),
+            nothing,
+            1.0,
+            1.0,
+            1.0,
+            1.0,
+        )
+    square = float(x @ x)
+    lags = max(1, min(LAGS, n // EPOCHS_A_LAG))
+    rho, p = whiteness(u, lags)
+    low, high = float(chi2.ppf(0.5 - 0.5 * SHARE, n)) / n, float(chi2.ppf(0.5 + 0.5 * SHARE, n)) / n
+    root = math.sqrt(n)
+    return ComponentConsistency(
+        label=label,
+        count=n + gross,
+        gross=gross,
+        inside=float(np.mean(np.abs(x) <= normal)),
+        scale=math.sqrt(square / n),
+        scale_bounds=(math.sqrt(low), math.sqrt(high)),
+        bias=float(x.mean()),
+        bias_bound=normal / root,
+        bias_in_unit=float(nu[told].mean()),
+        autocorrelation=rho,
+        autocorrelation_bound=normal / root,
+        whiteness_p=p,
+        lag_p=2.0 * float(norm.sf(abs(rho[0]) * root)),
+        scale_p=2.0 * min(float(chi2.sf(square, n)), float(chi2.cdf(square, n))),
+        bias_p=2.0 * float(norm.sf(abs(x.mean()) * root)),
+    )
+
+
+def _nis(time: Array, u: Array) -> pd.DataFrame:
+    from scipy.stats import chi2
+
+    told = ~np.isnan(u)
+    count = told.sum(axis=1)
+    of = np.maximum(count, 1)
+    return pd.DataFrame(
+        {
+            "nis": (np.where(told, u, 0.0) ** 2).sum(axis=1),
+            "components": count,
+            "lower": chi2.ppf(0.5 - 0.5 * SHARE, of),
+            "upper": chi2.ppf(0.5 + 0.5 * SHARE, of),
+        },
+        index=pd.Index(time, name="time"),
+    )
+
+
+def _windows(time: Array, u: Array, window: int) -> pd.DataFrame:
+    from scipy.stats import chi2
+
+    cuts = np.arange(0, len(time), window)
+    told = ~np.isnan(u)
+    count = np.add.reduceat(told.sum(axis=1), cuts) if len(cuts) else np.empty(0)
+    squares = np.where(told, u, 0.0) ** 2
+    total = np.add.reduceat(squares.sum(axis=1), cuts) if len(cuts) else np.empty(0)
+    ends = np.minimum(cuts + window, len(time)) - 1
+    of = np.maximum(count, 1)
+    return pd.DataFrame(
+        {
+            "since": time[cuts],
+            "epochs": ends - cuts + 1,
+            "nis": np.where(count > 0, total / of, np.nan),
+            "lower": chi2.ppf(0.5 - 0.5 * SHARE, of) / of,
+            "upper": chi2.ppf(0.5 + 0.5 * SHARE, of) / of,
+        },
+        index=pd.Index(time[ends], name="time"),
+    )

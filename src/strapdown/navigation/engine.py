@@ -1,0 +1,250 @@
+"""How a navigator goes on: what every way of it does, and the one for any modules."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown._kernels.error_loop import BEYOND
+from strapdown.estimation.covariance import Innovations
+from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
+from strapdown.estimation.error_model import PHYSICAL
+from strapdown.estimation.observation import Observation
+
+__all__ = ["LARGEST_GROUP", "Engine", "EngineState", "GeneralEngine"]
+
+Array = NDArray[np.float64]
+
+#: An epoch so near to the end of a step is at it, s: stamps are decimal fractions that were
+#: rounded.
+SAME_INSTANT = 1e-7
+#: Most steps between two instants of the covariance.
+LARGEST_GROUP = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class EngineState:
+    """What an engine remembers.
+
+    Attributes
+    ----------
+    filter : FilterState
+        At the last instant to which the covariance was taken.
+    errors : ndarray, (n,)
+        States that are estimated and not fed back; zeros where all are.
+    time : float, s
+        Of the newest step.
+    mechanization, row : ndarray
+        State and row of a history then, what was fed back taken off.
+    open_history, open_rows : ndarray
+        What followed the last instant of the covariance: rows of the history, the one at that
+        instant first, and increments without the errors that were fed back.
+    last : ndarray, (10,)
+        The newest of these increments.
+    """
+
+    filter: FilterState
+    errors: Array
+    time: float
+    mechanization: Array
+    row: Array
+    open_history: Array
+    open_rows: Array
+    last: Array
+
+
+def begun(filter_: ErrorFilter, state: FilterState, feeds_back: bool = True) -> EngineState:
+    """Return the state of an engine at a state of a filter."""
+    errors = np.zeros(filter_.model.layout.size)
+    if not feeds_back:
+        # What an alignment found of the sensors is an error like those that are estimated.
+        E = filter_.model.from_physical(filter_.mechanization, state.time, state.row)
+        errors = E @ np.concatenate([np.zeros(PHYSICAL), state.sensors])
+        state = replace(state, sensors=np.zeros_like(state.sensors))
+    return EngineState(
+        filter=state,
+        errors=errors,
+        time=state.time,
+        mechanization=state.mechanization,
+        row=state.row,
+        open_history=state.row[None, :],
+        open_rows=np.empty((0, 10)),
+        last=np.concatenate([[1.0], np.zeros(9)]),
+    )
+
+
+class Engine(ABC):
+    """A mechanization, estimates and a covariance on their way over a piece of a log."""
+
+    filter: FilterState
+    errors: Array
+    time: float
+    mechanization: Array
+    row: Array
+    last: Array
+
+    @abstractmethod
+    def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+        """Go over steps in which nothing is observed.
+
+        Parameters
+        ----------
+        time : ndarray, (k,), s
+            Ends of the steps.
+        rows : ndarray, (k, 10)
+        history : ndarray, (k, row)
+            Filled with the rows that are shown.
+        note_at : float, s
+            It stops before its end where the covariance was taken to this time or beyond.
+
+        Returns
+        -------
+        int
+            Steps made.
+        """
+
+    @abstractmethod
+    def close(self) -> None:
+        """Take the covariance to the newest step."""
+
+    @abstractmethod
+    def observe(
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
+    ) -> list[Innovations]:
+        """Take what is observed now, after `close`."""
+
+    @abstractmethod
+    def shown(self) -> Array:
+        """Return the row of the newest step, estimated errors taken off."""
+
+    @abstractmethod
+    def state(self) -> EngineState:
+        """Return where it is now."""
+
+    def estimates(self, filter_: ErrorFilter) -> Array:
+        """Return the errors of the sensors as they are estimated, (k,)."""
+        T = filter_.model.to_physical(filter_.mechanization, self.filter.time, self.filter.row)
+        found: Array = self.filter.sensors + (T @ self.errors)[PHYSICAL:]
+        return found
+
+
+class GeneralEngine(Engine):
+    """For any mechanization, error model and form: group by group.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    state : EngineState
+    feeds_back : bool
+    """
+
+    def __init__(self, filter_: ErrorFilter, state: EngineState, feeds_back: bool) -> None:
+        self.navigation = filter_
+        self.feeds_back = feeds_back
+        self.filter, self.errors = state.filter, state.errors
+        self.time, self.row, self.last = state.time, state.row, state.last
+        self.mechanization = state.mechanization.copy()
+        self.open_history = list(state.open_history)
+        self.open_rows = list(state.open_rows)
+
+    def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+        """Go over steps, as `Engine.over`."""
+        made = 0
+        longest = self.navigation.step * BEYOND
+        while made < len(time):
+            room = LARGEST_GROUP - len(self.open_rows)
+            near = time[made : made + room] - self.filter.time <= longest
+            count = len(near) if near.all() else int(np.argmin(near))
+            if not count and not self.open_rows:
+                count = 1
+            if not count:
+                self.close()
+                if self.time >= note_at:
+                    return made
+                continue
+            end = made + count
+            self._steps(time[made:end], rows[made:end], history[made:end])
+            made = end
+        return made
+
+    def close(self) -> None:
+        """Take the covariance to the newest step."""
+        if not self.open_rows:
+            return
+        ends = self.filter.time + np.cumsum([row[0] for row in self.open_rows])
+        ends[-1] = self.time
+        self.filter, Phi = self.navigation.follow(
+            self.filter,
+            ends,
+            np.array(self.open_history),
+            np.array(self.open_rows),
+            self.mechanization,
+        )
+        if not self.feeds_back:
+            self.errors = Phi @ self.errors
+        self._open_anew()
+
+    def observe(
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
+    ) -> list[Innovations]:
+        """Take what is observed now."""
+        if self.feeds_back:
+            self.filter, seen = self.navigation.observe(self.filter, observations, rules)
+            self.mechanization, self.row = self.filter.mechanization.copy(), self.filter.row
+            self._open_anew()
+            return seen
+        self.filter, self.errors, seen = self.navigation.estimate(
+            self.filter, self.errors, observations, rules
+        )
+        return seen
+
+    def shown(self) -> Array:
+        """Return the row of the newest step, estimated errors taken off."""
+        if self.feeds_back:
+            return self.row
+        used = self.navigation.mechanization
+        T = self.navigation.model.to_physical(used, self.filter.time, self.filter.row)
+        error = (T @ self.errors)[:PHYSICAL]
+        # Since the last instant of the covariance the place has gone on with the velocity.
+        error[:3] += error[3:6] * (self.time - self.filter.time)
+        return used.history_row(used.correct(self.mechanization, error))
+
+    def state(self) -> EngineState:
+        """Return where it is now."""
+        return EngineState(
+            filter=self.filter,
+            errors=self.errors,
+            time=self.time,
+            mechanization=self.mechanization.copy(),
+            row=self.row,
+            open_history=np.array(self.open_history),
+            open_rows=np.array(self.open_rows).reshape(-1, 10),
+            last=self.last,
+        )
+
+    def _steps(self, time: Array, rows: Array, history: Array) -> None:
+        used = self.navigation
+        known = self.filter if self.feeds_back else replace(self.filter, sensors=self._nothing())
+        compensated = used.compensated(known, rows)
+        raw = history if self.feeds_back else np.empty_like(history)
+        if self.feeds_back:
+            used.advance_compensated(self.mechanization, time, compensated, raw)
+        for i in range(len(time)):
+            if not self.feeds_back:
+                one = slice(i, i + 1)
+                used.advance_compensated(self.mechanization, time[one], compensated[one], raw[one])
+                self.time, self.row = float(time[i]), raw[i].copy()
+                history[i] = self.shown()
+            self.open_history.append(raw[i].copy())
+            self.open_rows.append(compensated[i])
+        self.time, self.row, self.last = float(time[-1]), raw[-1].copy(), compensated[-1]
+
+    def _nothing(self) -> Array:
+        return np.zeros_like(self.filter.sensors)
+
+    def _open_anew(self) -> None:
+        self.open_rows, self.open_history = [], [self.row]

@@ -1,0 +1,126 @@
+"""A run of navigation as files: page, JSON, tables, paths for maps, sealed in a bundle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
+from strapdown.report.document_data import draw_stills
+from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document_html import document_page
+from strapdown.report.navigation_document import navigation_document
+from strapdown.report.navigation_files import write_navigation_files
+from strapdown.report.navigation_found import examine
+from strapdown.report.navigation_json import navigation_json
+from strapdown.report.navigation_result import told_of
+from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
+from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.run import run_navigation
+
+__all__ = ["navigate", "rerun_navigation", "write_navigation"]
+
+
+def navigate(
+    file: str | Path, out: str | Path, *, force: bool = False, progress: Progress = silent
+) -> Seal:
+    """Navigate as a configuration says, and write everything as a sealed bundle.
+
+    Parameters
+    ----------
+    file : str or Path
+        The configuration, in TOML.
+    out : str or Path
+        Folder to make.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        The file does not hold together, or `out` may not be written.
+    DataError
+        The record cannot be navigated by.
+    """
+    check_destination(Path(out), force)
+    result = run_navigation(read_navigation_spec(file), Path(file), progress)
+    return write_navigation(result, out, force=force, progress=progress)
+
+
+def rerun_navigation(configuration: dict[str, Any], out: Path) -> Seal:
+    """Run a sealed run of navigation again from its configuration."""
+    spec = navigation_spec(configuration["navigation"])
+    path = configuration.get("file_path")
+    name = str(configuration["name"])
+    return write_navigation(
+        run_navigation(spec, None if path is None else Path(path)), out, name=name
+    )
+
+
+@one_thread()
+def write_navigation(
+    result: NavigationResult,
+    out: str | Path,
+    *,
+    name: str | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Seal:
+    """Write a run of navigation as a sealed bundle.
+
+    Parameters
+    ----------
+    result : NavigationResult
+    out : str or Path
+        Folder to make.
+    name : str, optional
+        Of the folder, as the report names it; that of `out`, if not given.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        `out` exists and may not be replaced.
+    """
+    name = Path(out).absolute().name if name is None else name
+    file = next((str(i.path) for i in result.inputs if i.role == "configuration"), None)
+    configuration = {
+        "name": name,
+        "navigation": result.spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True),
+        **({} if file is None else {"file_path": file}),
+    }
+    seals: list[Seal] = []
+    with write_bundle(
+        Path(out),
+        command="navigate",
+        configuration=configuration,
+        inputs=result.inputs,
+        force=force,
+        seals=seals,
+    ) as folder:
+        progress("writing the tables", 0.82)
+        found = examine(told_of(result))
+        write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
+        write_navigation_files(result, folder)
+        progress("drawing the figures", 0.86)
+        document = navigation_document(found.told, name, found)
+        stills = draw_stills(document)
+        write_drawings(document, stills, folder / "figures")
+        progress("writing the page", 0.95)
+        write_text(folder / "report.html", document_page(document, stills=stills))
+        progress("sealing", 0.97)
+    return seals[0]

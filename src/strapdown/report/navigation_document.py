@@ -1,0 +1,193 @@
+"""The report of a run of navigation: the answer first, then what it rests on."""
+
+from __future__ import annotations
+
+from strapdown import __version__
+from strapdown.report import navigation_charts as charts
+from strapdown.report import navigation_tables as tables
+from strapdown.report.document import (
+    Block,
+    ChartBlock,
+    Document,
+    Facts,
+    Items,
+    KeyFigures,
+    Paragraph,
+    Section,
+    TableBlock,
+)
+from strapdown.report.navigation_conventions import CONVENTIONS
+from strapdown.report.navigation_error_charts import error_charts, nees_chart
+from strapdown.report.navigation_found import NavigationFound, examine
+from strapdown.report.navigation_innovation_charts import innovation_chart, nis_chart
+from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.navigation_told import NavigationTold
+from strapdown.report.navigation_trust import trust
+from strapdown.report.navigation_words import cautions, headline, key_figures, place_words
+
+__all__ = ["navigation_document"]
+
+
+def navigation_document(
+    told: NavigationTold, name: str, found: NavigationFound | None = None
+) -> Document:
+    """Return the report of a run of navigation.
+
+    Parameters
+    ----------
+    told : NavigationTold
+    name : str
+        Of the folder, for the command that verifies it; no command, if empty.
+    found : NavigationFound, optional
+        Of `examine`, where it was worked out already.
+
+    Returns
+    -------
+    Document
+    """
+    found = examine(told) if found is None else found
+    verdict = trust(found)
+    plan = plan_chart(told)
+    front: tuple[Block | None, ...] = (
+        KeyFigures(key_figures(found)),
+        Paragraph(verdict.sentence, "lead" if verdict.verdict == "trusted" else "warning"),
+        Items(cautions(found)) if cautions(found) else None,
+        Paragraph(f"It did not move from {place_words(found, 0)}.") if plan is None else None,
+        None if plan is None else ChartBlock(plan),
+        ChartBlock(charts.bound_chart(told)),
+    )
+    sections = (
+        _section("answer", "The answer", *_answer(found, verdict.reasons)),
+        _section(
+            "state",
+            "Height, velocity, attitude",
+            ChartBlock(charts.height_chart(told)),
+            ChartBlock(charts.velocity_chart(told)),
+            ChartBlock(charts.attitude_chart(told)),
+        ),
+        _section("truth", f"Against {told.truth_name}", *_errors(found)),
+        _section("sensors", "Errors of the sensors and the aids", *_states(found)),
+        _section("observations", "What was observed", *_observations(found)),
+        _section("outages", "Outages", *_outages(found)),
+        _section("events", "Events", tables.event_table(found)),
+        _section("findings", "Findings", *_findings(found)),
+        _section("method", "Method and assumptions", *_method(found, name)),
+        _section("conventions", "Conventions", Facts(CONVENTIONS)),
+    )
+    title = told.title or f"Navigation of {told.name}"
+    return Document(
+        title,
+        headline(found),
+        _facts(found),
+        tuple(block for block in front if block is not None),
+        tuple(s for s in sections if s.blocks),
+        title,
+    )
+
+
+def _section(slug: str, title: str, *blocks: Block | None) -> Section:
+    return Section(slug, title, tuple(b for b in blocks if b is not None))
+
+
+def _facts(found: NavigationFound) -> tuple[tuple[str, str], ...]:
+    told = found.told
+    aids = dict.fromkeys(
+        [*told.record.outages, *(a.name.partition(".")[0] for a in found.agreements)]
+    )
+    return (
+        ("Record", ", ".join(t for t in (told.name, told.what) if t)),
+        ("Start", place_words(found, 0)),
+        ("Aids", ", ".join(aids) or "none"),
+        ("Made with", f"strapdown {__version__}"),
+    )
+
+
+def _answer(found: NavigationFound, reasons: tuple[tuple[bool, str], ...]) -> tuple[Block, ...]:
+    said = tuple(("For it" if good else "Against it", f"{text}.") for good, text in reasons)
+    blocks: list[Block] = [tables.end_table(found)]
+    if said:
+        blocks += [Paragraph("What speaks for the answer, and what against it:"), Items(said)]
+    return tuple(blocks)
+
+
+def _errors(found: NavigationFound) -> tuple[Block | None, ...]:
+    if found.errors is None:
+        return ()
+    drawn = [ChartBlock(c) for c in error_charts(found.told, found.errors)]
+    nees = nees_chart(found.told, found.errors)
+    return (tables.error_table(found), *drawn, None if nees is None else ChartBlock(nees))
+
+
+def _states(found: NavigationFound) -> tuple[Block | None, ...]:
+    table: TableBlock | None = tables.state_table(found)
+    return (table, *(ChartBlock(c) for c in charts.state_charts(found.told)))
+
+
+def _observations(found: NavigationFound) -> tuple[Block | None, ...]:
+    if not found.agreements:
+        return (Paragraph("Nothing was observed: the inertial sensors were alone."),)
+    nis = nis_chart(found.record, found.agreements)
+    return (
+        tables.observation_table(found),
+        *_verdicts(found),
+        None if nis is None else ChartBlock(nis),
+        *(ChartBlock(innovation_chart(found.record, one)) for one in found.agreements),
+    )
+
+
+def _verdicts(found: NavigationFound) -> tuple[Block, ...]:
+    """What the innovations say against what was stated, beyond what chance makes."""
+    rows: list[tuple[str, str]] = []
+    for one in found.agreements:
+        kinds = dict.fromkeys(v.kind for v in one.consistency.verdicts)
+        for kind in kinds:
+            alike = [v for v in one.consistency.verdicts if v.kind == kind]
+            said = "; ".join(v.what for v in alike)
+            rows.append((one.name, f"{said}. {_capital(alike[0].meaning)}."))
+    if not rows:
+        return (Paragraph("Nothing in them speaks against what was stated of sensors and aids."),)
+    return (
+        Paragraph("What in them is not by chance, and what it may mean:"),
+        Items(tuple(rows)),
+    )
+
+
+def _capital(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+def _outages(found: NavigationFound) -> tuple[Block | None, ...]:
+    return (tables.withheld_table(found), tables.outage_table(found))
+
+
+def _findings(found: NavigationFound) -> tuple[Block, ...]:
+    if not found.findings:
+        return (Paragraph("None."),)
+    rows = []
+    for finding in found.findings:
+        head = ", ".join(
+            str(p)
+            for p in (finding.file, finding.quantity, finding.row and f"row {finding.row}")
+            if p
+        )
+        text = finding.what if not finding.remedy else f"{finding.what}. {finding.remedy}."
+        rows.append((head, text))
+    return (Items(tuple(rows)),)
+
+
+def _method(found: NavigationFound, name: str) -> tuple[Block | None, ...]:
+    taken = (
+        (
+            "",
+            "The errors of the sensors and of the aids are as stated, without bias that is not "
+            "among the states, and those of the aids without memory: every bound rests on them.",
+        ),
+        ("", "Normal gravity of the ellipsoid: a deflection of the vertical is not in the bounds."),
+    )
+    return (
+        Facts(found.told.chain) if found.told.chain else None,
+        Paragraph("Taken for given:"),
+        Items(taken),
+        Paragraph("To run it again and compare every byte:") if name else None,
+        Paragraph(f"strapdown verify {name}", "mono") if name else None,
+    )

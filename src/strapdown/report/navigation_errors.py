@@ -1,0 +1,152 @@
+"""A run of navigation beside its truth: errors, their bounds, and the two together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.truth_comparison import TruthComparison, compare_with_truth
+from strapdown.exceptions import Finding
+from strapdown.report.error_envelope import PLANE_95
+from strapdown.report.navigation_told import NavigationTold
+from strapdown.tables import EULER, NED, VELOCITY
+
+__all__ = ["NavigationErrors", "Score", "navigation_errors"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Errors of one quantity over a run.
+
+    Attributes
+    ----------
+    quantity, unit : str
+    rms, largest : float
+    largest_at : float, s
+    bound : float
+        Root mean square of the bounds of 95 %.
+    share : float
+        Of the instants at which the error is within its bound.
+    """
+
+    quantity: str
+    unit: str
+    rms: float
+    largest: float
+    largest_at: float
+    bound: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationErrors:
+    """Errors beside what the run itself claims of them.
+
+    Attributes
+    ----------
+    comparison : TruthComparison
+    """
+
+    comparison: TruthComparison
+
+    @property
+    def time(self) -> Array:
+        """Of the samples that are compared, (n,), s."""
+        return self.comparison.time
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the comparison."""
+        return self.comparison.findings
+
+    @property
+    def nees(self) -> Array:
+        """Normalised error squared of place, velocity and attitude, (n,)."""
+        if not self.freedom:
+            return np.full(len(self.time), np.nan)
+        return self.comparison.nees["all"].to_numpy(dtype=np.float64)
+
+    @property
+    def freedom(self) -> int:
+        """Errors that it is of: those of which the run has states."""
+        return self.comparison.freedom.get("all", 0)
+
+    def error(self, column: str) -> Array:
+        """Errors of a quantity, (n,): m, m/s, deg."""
+        return self.comparison.differences[column].to_numpy(dtype=np.float64)
+
+    def bound(self, column: str) -> Array:
+        """Bounds of 95 % of them, (n,)."""
+        return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def scores(self) -> tuple[Score, ...]:
+        """Errors of each quantity, and of the horizontal place."""
+        units = (
+            dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
+        )
+        found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        size = np.hypot(*(self.error(n) for n in NED[:2]))
+        return self._score("horizontal", "m", size, self._plane(size)), *found
+
+    def score(self, quantity: str) -> Score:
+        """That of one quantity."""
+        return next(s for s in self.scores if s.quantity == quantity)
+
+    def _plane(self, size: Array) -> Array:
+        """Reach of the ellipse of 95 % in the direction of the horizontal error, (n,), m.
+
+        The error is within it if and only if it is within the ellipse.
+        """
+        largest = np.linalg.eigvalsh(self.comparison.covariance[:, :2, :2])[:, 1]
+        reach = PLANE_95 * np.sqrt(np.maximum(largest, 0.0))
+        if "horizontal" not in self.comparison.nees:
+            return np.asarray(reach)
+        length = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(np.where(length > 0.0, PLANE_95 * size / length, reach))
+
+    def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
+        worst = int(np.argmax(np.abs(error)))
+        return Score(
+            name,
+            unit,
+            float(np.sqrt(np.mean(np.square(error)))),
+            float(abs(error[worst])),
+            float(self.time[worst]),
+            float(np.sqrt(np.mean(np.square(bound)))),
+            float(np.mean(np.abs(error) <= bound)),
+        )
+
+
+def navigation_errors(told: NavigationTold) -> NavigationErrors | None:
+    """Compare a run with its truth.
+
+    Parameters
+    ----------
+    told : NavigationTold
+
+    Returns
+    -------
+    NavigationErrors or None
+        None without a truth.
+
+    Raises
+    ------
+    DataError
+        As `truth_comparison.compare_with_truth`: they have no instant in common.
+    """
+    if told.truth is None:
+        return None
+    record = told.record
+    return NavigationErrors(
+        compare_with_truth(
+            record.trajectory, record.sd.index, record.covariance, told.truth, told.ellipsoid
+        )
+    )

@@ -1,0 +1,60 @@
+"""A run of navigation with everything that its report works out of it once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from strapdown.exceptions import Finding
+from strapdown.navigation.record import NavigationRecord
+from strapdown.report.navigation_agreement import Agreement, agreements
+from strapdown.report.navigation_errors import NavigationErrors, navigation_errors
+from strapdown.report.navigation_told import NavigationTold
+
+__all__ = ["NavigationFound", "examine"]
+
+
+@dataclass(frozen=True, eq=False)
+class NavigationFound:
+    """What was told of a run, and what it shows.
+
+    Attributes
+    ----------
+    told : NavigationTold
+    agreements : tuple of Agreement
+        One a name of an observation.
+    errors : NavigationErrors or None
+        Against the truth.
+    """
+
+    told: NavigationTold
+    agreements: tuple[Agreement, ...]
+    errors: NavigationErrors | None
+
+    @property
+    def record(self) -> NavigationRecord:
+        """Of the run."""
+        return self.told.record
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of the run and of its comparison."""
+        return (*self.told.findings, *(() if self.errors is None else self.errors.findings))
+
+
+def examine(told: NavigationTold) -> NavigationFound:
+    """Work out what a report says of a run.
+
+    Parameters
+    ----------
+    told : NavigationTold
+
+    Returns
+    -------
+    NavigationFound
+
+    Raises
+    ------
+    DataError
+        The truth has no instant in common with the run.
+    """
+    return NavigationFound(told, agreements(told.record), navigation_errors(told))

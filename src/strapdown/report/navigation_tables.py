@@ -1,0 +1,227 @@
+"""Tables of a run of navigation: start and end, states, observations, outages, errors."""
+
+from __future__ import annotations
+
+import math
+
+from strapdown.report.alignment_values import instant
+from strapdown.report.crash_values import GAP, about, plain
+from strapdown.report.document import TableBlock
+from strapdown.report.navigation_found import NavigationFound
+from strapdown.report.navigation_values import (
+    blocks_of,
+    duration_words,
+    half,
+    length_words,
+    plane_bound,
+    share_words,
+)
+from strapdown.report.navigation_words import longest_outages, place_words
+from strapdown.tables import EULER, VELOCITY
+
+__all__ = [
+    "end_table",
+    "error_table",
+    "event_table",
+    "observation_table",
+    "outage_table",
+    "state_table",
+    "withheld_table",
+]
+
+_MOST_EVENTS = 40
+
+
+def end_table(found: NavigationFound) -> TableBlock:
+    """Place, velocity and attitude at the start and at the end, with bounds."""
+    record = found.record
+    rows = [
+        ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
+        ("place", place_words(found, 0), place_words(found, -1)),
+    ]
+    plane = plane_bound(record)
+    rows.append(("horizontal ±", *(length_words(float(plane[k])) for k in (0, -1))))
+    for name, column, sd, unit in (
+        ("height", "alt", "down", "m"),
+        *(
+            (f"velocity {w}", v, v, "m/s")
+            for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)
+        ),
+        *((a, a, a, "°") for a in reversed(EULER)),
+    ):
+        cells = []
+        for k in (0, -1):
+            value = float(record.trajectory[column].iloc[k])
+            value = value % 360.0 if column == "heading" else value
+            cells.append(about(value, half(record.sd[sd].iloc[k]), unit))
+        rows.append((name, *cells))
+    return TableBlock(
+        ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with bounds of 95 %."
+    )
+
+
+def state_table(found: NavigationFound) -> TableBlock | None:
+    """Errors of sensors and aids: what was known before, and what is known now."""
+    record = found.record
+    if record.sensors.empty or not len(record.sensors.columns):
+        return None
+    rows = []
+    for block in blocks_of(record):
+        for column, label in zip(block.columns, block.labels, strict=True):
+            value = block.factor * float(record.sensors[column].iloc[-1])
+            first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
+            name = f"{block.name} {label}" if len(block.columns) > 1 else block.name
+            before = about(0.0, first, block.unit)
+            rows.append(
+                (
+                    name,
+                    about(value, last, block.unit),
+                    before[before.index("±") :],
+                    share_words(1.0 - last / first) if first > 0.0 and last <= first else "–",
+                )
+            )
+    return TableBlock(
+        ("error of", "estimate at the end", "bound at the start", "bound fell by"),
+        tuple(rows),
+        text=(0,),
+        caption="Bounds of 95 %.",
+    )
+
+
+def observation_table(found: NavigationFound) -> TableBlock | None:
+    """What was observed, how far from what was expected, and what was not used."""
+    rows = []
+    for one in found.agreements:
+        band = "–"
+        if one.used.any():
+            band = f"{plain(one.band[0], 2)} to {plain(one.band[1], 2)}"
+        memory = "–"
+        if math.isfinite(one.correlation):
+            memory = f"{plain(one.correlation, 2)} (±{GAP}{plain(one.correlation_bound, 2)})"
+        rows.append(
+            (
+                one.name,
+                str(one.epochs),
+                str(one.rejected),
+                str(one.weakened),
+                plain(one.ratio, 2),
+                plain(one.mean_nis, 2),
+                band,
+                memory,
+            )
+        )
+    if not rows:
+        return None
+    return TableBlock(
+        (
+            "observation",
+            "epochs",
+            "rejected",
+            "weakened",
+            "rms, sd",
+            "mean NIS",
+            "expected, 95 %",
+            "memory",
+        ),
+        tuple(rows),
+        text=(0,),
+        caption="Innovations that were used: root mean square in the standard deviations that were "
+        "expected, mean of the normalised innovation squared (NIS) and where it belongs, and the "
+        "largest correlation of a component with itself an epoch later, beside what chance makes.",
+    )
+
+
+def outage_table(found: NavigationFound) -> TableBlock | None:
+    """Outages with the largest bound in each."""
+    rows = [
+        (
+            aid,
+            instant(span.begin),
+            duration_words(span.end - span.begin),
+            length_words(bound),
+        )
+        for aid, span, bound in longest_outages(found)
+    ]
+    if not rows:
+        return None
+    return TableBlock(
+        ("aid", "from", "for", "largest bound"),
+        tuple(rows),
+        text=(0,),
+        caption="Outages, and the largest horizontal bound of 95 % in each: at its last mark.",
+    )
+
+
+def withheld_table(found: NavigationFound) -> TableBlock | None:
+    """What was withheld on purpose, and how far off the run was by it."""
+    rows = [
+        (
+            w.aid,
+            instant(w.begin),
+            duration_words(w.end - w.begin),
+            length_words(w.error_m),
+            length_words(w.bound_m),
+            "yes" if w.inside else "no",
+        )
+        for w in found.told.withheld
+    ]
+    if not rows:
+        return None
+    return TableBlock(
+        ("withheld", "from", "for", "largest error", "bound then", "inside"),
+        tuple(rows),
+        text=(0, 5),
+        caption="Aids withheld on purpose: the largest horizontal error, and the run's own bound "
+        "of 95 % at that instant.",
+        strong=tuple(k for k, w in enumerate(found.told.withheld) if not w.inside),
+    )
+
+
+def error_table(found: NavigationFound) -> TableBlock | None:
+    """Errors against the truth beside their bounds."""
+    if found.errors is None:
+        return None
+    names = {"horizontal": "horizontal", "down": "down (height)"}
+    names |= {v: f"velocity {w}" for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)}
+    rows = []
+    for score in found.errors.scores:
+        places = _places(score.rms)
+        rows.append(
+            (
+                f"{names.get(score.quantity, score.quantity)}, {score.unit}",
+                plain(score.rms, places),
+                plain(score.largest, places),
+                instant(score.largest_at),
+                plain(score.bound, places),
+                share_words(score.share),
+            )
+        )
+    return TableBlock(
+        ("error", "rms", "largest", "at", "95 % bound, rms", "inside"),
+        tuple(rows),
+        text=(0,),
+        caption=f"Errors against {found.told.truth_name}, at {len(found.errors.time)} instants.",
+        strong=(0,),
+    )
+
+
+def _places(value: float) -> int:
+    if not (math.isfinite(value) and value > 0.0):
+        return 3
+    return min(6, max(0, 2 - math.floor(math.log10(value))))
+
+
+def event_table(found: NavigationFound) -> TableBlock | None:
+    """Events, the first of them where there are many."""
+    events = found.record.events
+    if not events:
+        return None
+    shown = events[:_MOST_EVENTS]
+    rest = len(events) - len(shown)
+    more = f"; {rest} more stand in navigation.json" if rest else ""
+    return TableBlock(
+        ("at", "event", "what"),
+        tuple((instant(e.time), e.kind, e.what) for e in shown),
+        text=(0, 1, 2),
+        caption=f"What happened, in the order of time{more}.",
+    )

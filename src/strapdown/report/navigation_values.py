@@ -1,0 +1,206 @@
+"""Numbers of a run of navigation: how far, how well known, in units that people use."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.report.chart import break_jumps
+from strapdown.report.crash_values import GAP, plain
+from strapdown.report.error_envelope import PLANE_95
+
+__all__ = [
+    "StateBlock",
+    "at_marks",
+    "blocks_of",
+    "distance_over_ground",
+    "duration_words",
+    "half",
+    "heading_shown",
+    "length_words",
+    "plane_bound",
+    "share_words",
+    "unwrapped",
+    "worst_within",
+]
+
+Array = NDArray[np.float64]
+
+_MG = 1e-3 * MICRO_G
+#: A heading that turns by more is drawn within 0 to 360 deg.
+MOST_TURN = 900.0
+
+
+@dataclass(frozen=True)
+class StateBlock:
+    """States of one kind, with the unit that they are shown in.
+
+    Attributes
+    ----------
+    name : str
+        In words: ``gyro bias``, ``rtk: lever arm``.
+    slug : str
+    columns : tuple of str
+        Of the record.
+    labels : tuple of str
+        ``x``, ``y``, ``z``.
+    unit : str
+    factor : float
+        From SI.
+    """
+
+    name: str
+    slug: str
+    columns: tuple[str, ...]
+    labels: tuple[str, ...]
+    unit: str
+    factor: float
+
+
+def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
+    """Return the blocks of states of sensors and aids, in their order."""
+    groups: dict[str, list[str]] = {}
+    for column in record.sensors.columns:
+        groups.setdefault(str(column).rpartition("_")[0] or str(column), []).append(str(column))
+    out = []
+    for name, columns in groups.items():
+        labels = [c.removeprefix(name).lstrip("_") for c in columns]
+        # What was unknown at first, and what is known now, are both to be read.
+        sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
+        size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
+        factor, unit = _shown(record.units.get(columns[0], ""), size)
+        aid, dot, own = name.rpartition(".")
+        words = own.replace("_", " ")
+        out.append(
+            StateBlock(
+                f"{aid}: {words}" if dot else words.replace("accel ", "accelerometer "),
+                name.replace("_", "-").replace(".", "-"),
+                tuple(columns),
+                tuple(labels),
+                unit,
+                factor,
+            )
+        )
+    return tuple(out)
+
+
+def _shown(unit: str, size: float) -> tuple[float, str]:
+    """Factor and unit in which states of such a size are told."""
+    if unit == "rad/s":
+        slow = size * DEG_PER_HOUR < 1000.0
+        return (DEG_PER_HOUR, "deg/h") if slow else (math.degrees(1.0), "deg/s")
+    if unit == "m/s²":
+        micro = size * MICRO_G < 1000.0
+        return (MICRO_G, "µg") if micro else (_MG, "mg")
+    if unit == "1":
+        return (1e6, "ppm") if size < 1e-2 else (100.0, "%")
+    if unit == "rad":
+        return math.degrees(1.0), "deg"
+    if unit == "(rad/s)/(m/s²)":
+        return DEG_PER_HOUR * STANDARD_GRAVITY, "deg/h/g"
+    return 1.0, unit
+
+
+def unwrapped(heading: Array) -> Array:
+    """Headings in deg without jumps, the first of them within 0 to 360."""
+    if not heading.size:
+        return heading
+    whole = np.degrees(np.unwrap(np.radians(heading)))
+    return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
+
+
+def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
+    """Heading over the trajectory and at the marks, deg, as it is drawn, and what to say of it.
+
+    It goes on over north, unless it turns so often that nothing could be read; then NaN breaks it
+    there.
+    """
+    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
+    marks = at_marks(record, "heading")
+    if np.ptp(values) <= MOST_TURN:
+        return values, marks, "The heading goes on over north, so that no turn breaks it."
+    return (
+        break_jumps(values % 360.0),
+        break_jumps(marks % 360.0),
+        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
+    )
+
+
+def at_marks(record: NavigationRecord, column: str) -> Array:
+    """A column of the trajectory at the marks of the covariance; the heading unwrapped."""
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    values = record.trajectory[column].to_numpy(dtype=np.float64)
+    if column == "heading":
+        values = unwrapped(values)
+    return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
+
+
+def plane_bound(record: NavigationRecord) -> Array:
+    """Longer half axis, m, of the horizontal ellipse of 95 % at each mark."""
+    largest = np.linalg.eigvalsh(record.covariance[:, :2, :2])[:, 1]
+    return np.asarray(PLANE_95 * np.sqrt(np.maximum(largest, 0.0)))
+
+
+def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
+    """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
+    time = record.sd.index.to_numpy(dtype=np.float64)
+    rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
+    if not rows.size:
+        return None
+    bounds = plane_bound(record)[rows]
+    k = int(np.argmax(bounds))
+    return float(bounds[k]), float(time[rows[k]])
+
+
+def distance_over_ground(trajectory: pd.DataFrame) -> float:
+    """Way over the ground, m: the horizontal speed summed over time by the trapezoid rule."""
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
+    return float(np.sum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time)))
+
+
+def length_words(metres: float) -> str:
+    """A length: ``0.021 m``, ``13.4 m``, ``2.41 km``."""
+    size = abs(metres)
+    if not math.isfinite(size):
+        return "–"
+    if size >= 1e5:
+        return f"{plain(1e-3 * metres, 0)}{GAP}km"
+    if size >= 1000.0:
+        return f"{plain(1e-3 * metres, 2 if size < 1e4 else 1)}{GAP}km"
+    places = 1 if size >= 10.0 else 2 if size >= 1.0 else 3
+    return f"{plain(metres, places)}{GAP}m"
+
+
+def duration_words(seconds: float) -> str:
+    """A length of time: ``221 s``, ``30 min 5 s``, ``1 h 12 min``."""
+    if seconds < 10.0:
+        return f"{plain(seconds, 2)}{GAP}s"
+    whole = round(seconds)
+    if whole < 600:
+        return f"{plain(seconds, 1)}{GAP}s" if whole < 100 else f"{whole}{GAP}s"
+    if whole < 7200:
+        rest = f" {whole % 60}{GAP}s" if whole % 60 else ""
+        return f"{whole // 60}{GAP}min{rest}"
+    rest = f" {whole % 3600 // 60}{GAP}min" if whole % 3600 // 60 else ""
+    return f"{whole // 3600}{GAP}h{rest}"
+
+
+def half(sd: float) -> float:
+    """Half width of the interval of 95 %."""
+    return TWO_SIDED_95 * float(sd)
+
+
+def share_words(share: float) -> str:
+    """A share: ``97.4 %``; never rounded to all or to nothing."""
+    if not math.isfinite(share):
+        return "–"
+    places = 0 if share in (0.0, 1.0) else 1
+    value = 100.0 * share if share in (0.0, 1.0) else min(99.9, max(0.1, 100.0 * share))
+    return f"{plain(value, places)}{GAP}%"

@@ -1,0 +1,249 @@
+"""What a run of navigation came to, in sentences; terminal and page say the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from strapdown.navigation.record import Span
+from strapdown.report.alignment_values import instant
+from strapdown.report.crash_values import GAP, about, plain
+from strapdown.report.document import KeyFigure
+from strapdown.report.navigation_found import NavigationFound
+from strapdown.report.navigation_values import (
+    blocks_of,
+    distance_over_ground,
+    duration_words,
+    half,
+    length_words,
+    plane_bound,
+    worst_within,
+)
+
+__all__ = ["cautions", "headline", "key_figures", "longest_outages", "place_words"]
+
+# A heading known less than so many deg is not known.
+_NO_HEADING = 180.0
+# A bound that fell by less than this share says that the motion did not tell.
+_FELL = 0.1
+
+
+def headline(found: NavigationFound) -> str:
+    """Return where it ended, how far it went, and how well that is known."""
+    record = found.record
+    return (
+        f"Ended at {place_words(found)} after {duration_words(_duration(found))} and "
+        f"{length_words(distance_over_ground(record.trajectory))}; the place is known to "
+        f"{length_words(float(plane_bound(record)[-1]))}, the heading {_heading(found)} "
+        "(bounds of 95 %)."
+    )
+
+
+def place_words(found: NavigationFound, row: int = -1) -> str:
+    """Latitude, longitude and height of a row: ``40.096627°, −105.147448°, 1601.5 m``."""
+    last = found.record.trajectory.iloc[row]
+    lon = (float(last["lon"]) + 180.0) % 360.0 - 180.0
+    return (
+        f"{plain(float(last['lat']), 6)}°, {plain(lon, 6)}°, {plain(float(last['alt']), 1)}{GAP}m"
+    )
+
+
+def key_figures(found: NavigationFound) -> tuple[KeyFigure, ...]:
+    """Return the numbers of the top of the page."""
+    record = found.record
+    sd = record.sd.iloc[-1]
+    last = record.trajectory.iloc[-1]
+    plane = float(plane_bound(record)[-1])
+    heading = half(sd["heading"])
+    out = [
+        KeyFigure(
+            "Way and time",
+            length_words(distance_over_ground(record.trajectory)),
+            f"in {duration_words(_duration(found))}",
+            f"from {instant(float(record.trajectory.index[0]))} to "
+            f"{instant(float(record.trajectory.index[-1]))}",
+        ),
+        KeyFigure(
+            "Place at the end",
+            f"±{GAP}{length_words(plane)}",
+            f"horizontal, 95{GAP}%; height {about(float(last['alt']), half(sd['down']), 'm')}",
+            place_words(found),
+        ),
+        KeyFigure(
+            "Heading at the end",
+            "not known"
+            if heading >= _NO_HEADING
+            else about(float(last["heading"]) % 360.0, heading, "°"),
+            f"95{GAP}% bound",
+            f"roll {about(float(last['roll']), half(sd['roll']), '°')}, pitch "
+            f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
+        ),
+    ]
+    out.append(_known(found))
+    return tuple(out)
+
+
+def _known(found: NavigationFound) -> KeyFigure:
+    """What matters most beside the end: the error, the worst outage, or the worst bound."""
+    if found.errors is not None:
+        score = found.errors.score("horizontal")
+        up = found.errors.score("down")
+        return KeyFigure(
+            f"Error against {found.told.truth_name}",
+            length_words(score.rms),
+            f"horizontal, root mean square; at most {length_words(score.largest)}",
+            f"height {length_words(up.rms)}, at most {length_words(up.largest)}",
+        )
+    outages = longest_outages(found)
+    if outages:
+        aid, span, bound = max(outages, key=lambda o: o[2])
+        return KeyFigure(
+            "Largest bound in an outage",
+            f"±{GAP}{length_words(bound)}",
+            f"horizontal, 95{GAP}%, after {duration_words(span.end - span.begin)} without {aid}",
+            f"{len(outages)} {'outage' if len(outages) == 1 else 'outages'} in all",
+        )
+    bounds = plane_bound(found.record)
+    worst = int(np.argmax(bounds))
+    return KeyFigure(
+        "Largest bound",
+        f"±{GAP}{length_words(float(bounds[worst]))}",
+        f"horizontal, 95{GAP}%, at {instant(float(found.record.sd.index[worst]))}",
+        "no outage",
+    )
+
+
+def longest_outages(found: NavigationFound) -> list[tuple[str, Span, float]]:
+    """Aid, span and largest horizontal bound in m of each outage, in the order of time."""
+    out = []
+    for aid, spans in found.record.outages.items():
+        for span in spans:
+            worst = worst_within(found.record, span)
+            if worst is not None:
+                out.append((aid, span, worst[0]))
+    return sorted(out, key=lambda o: (o[1].begin, o[0]))
+
+
+def cautions(found: NavigationFound) -> tuple[tuple[str, str], ...]:
+    """Return what to be careful about, each with its number."""
+    return (
+        *_outages(found),
+        *_ended_without(found),
+        *_heading_caution(found),
+        *_memory(found),
+        *_refused(found),
+        *_not_told(found),
+    )
+
+
+def _outages(found: NavigationFound) -> list[tuple[str, str]]:
+    outages = longest_outages(found)
+    if not outages:
+        return []
+    total = sum(s.end - s.begin for _, s, _ in outages)
+    aid, span, bound = max(outages, key=lambda o: o[2])
+    count = "one outage" if len(outages) == 1 else f"{len(outages)} outages"
+    return [
+        (
+            "In outages the place is known less",
+            f"{count}, {duration_words(total)} in all; the largest bound of 95{GAP}% is "
+            f"{length_words(bound)}, at the end of {duration_words(span.end - span.begin)} without "
+            f"{aid} from {instant(span.begin)}.",
+        )
+    ]
+
+
+def _ended_without(found: NavigationFound) -> list[tuple[str, str]]:
+    end = float(found.record.trajectory.index[-1])
+    late = [(a, s) for a, s, _ in longest_outages(found) if s.end >= end - 1e-6]
+    return [
+        (
+            f"It ended without {aid}",
+            f"the last {duration_words(span.end - span.begin)}; what is said of the end is by the "
+            "inertial sensors alone, and a fix would mend it.",
+        )
+        for aid, span in late
+    ]
+
+
+def _heading_caution(found: NavigationFound) -> list[tuple[str, str]]:
+    bound = half(found.record.sd["heading"].iloc[-1])
+    if bound < 2.0:
+        return []
+    how = "is not known" if bound >= _NO_HEADING else f"is known to {plain(bound, 1)}° alone"
+    return [
+        (
+            f"The heading {how}",
+            "without fixes its error turns the way that is gone: "
+            f"{plain(min(100.0, 100.0 * math.radians(min(bound, 90.0))), 1)}{GAP}% of it aside. "
+            "Speeding up, braking and turning with fixes find it, or a receiver with two antennas.",
+        )
+    ]
+
+
+def _memory(found: NavigationFound) -> list[tuple[str, str]]:
+    out = []
+    for one in found.agreements:
+        if one.remembers:
+            out.append(
+                (
+                    f"What is left of {one.name} is no noise",
+                    f"an epoch is like the one before it (correlation {plain(one.correlation, 2)}, "
+                    f"by chance up to {plain(one.correlation_bound, 2)}): its errors last, and the "
+                    "bounds are narrower than they should be. Look for a time offset, a lever arm, "
+                    "or noise of the sensors that is stated too small.",
+                )
+            )
+    return out
+
+
+def _refused(found: NavigationFound) -> list[tuple[str, str]]:
+    rows = [
+        f"{one.rejected} of {one.epochs} epochs of {one.name}"
+        for one in found.agreements
+        if one.rejected
+    ]
+    if not rows:
+        return []
+    return [("Some observations were rejected", f"{', '.join(rows)}; they stand as crosses.")]
+
+
+def _not_told(found: NavigationFound) -> list[tuple[str, str]]:
+    """States whose bounds hardly fell."""
+    sd = found.record.sensors_sd
+    if len(sd) < 2:
+        return []
+    names = []
+    for block in blocks_of(found.record):
+        first = sd[list(block.columns)].iloc[0].to_numpy()
+        last = sd[list(block.columns)].iloc[-1].to_numpy()
+        some = [
+            label
+            for label, a, b in zip(block.labels, first, last, strict=True)
+            if a > 0.0 and b > (1.0 - _FELL) * a
+        ]
+        if some:
+            names.append(f"{block.name} {', '.join(some)}" if len(block.labels) > 1 else block.name)
+    if not names:
+        return []
+    return [
+        (
+            "This motion did not tell everything",
+            f"as unknown as at the start, to {plain(100.0 * _FELL, 0)}{GAP}%: {'; '.join(names)}.",
+        )
+    ]
+
+
+def _heading(found: NavigationFound) -> str:
+    bound = half(found.record.sd["heading"].iloc[-1])
+    return (
+        "not at all"
+        if bound >= _NO_HEADING
+        else f"to {about(0.0, bound, '°').split('±')[1].strip()}"
+    )
+
+
+def _duration(found: NavigationFound) -> float:
+    time = found.record.trajectory.index
+    return float(time[-1] - time[0])

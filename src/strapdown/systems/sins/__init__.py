@@ -1,0 +1,1 @@
+"""System C: one chain over a simulation, a recorded log, or samples as they come."""

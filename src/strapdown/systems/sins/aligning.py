@@ -1,0 +1,142 @@
+"""What a chain does at the end of a mode of alignment."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.alignment.site import Site
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation.error_filter import FilterState
+from strapdown.frames import geodetic_from_ned
+from strapdown.nav_state import NavState
+from strapdown.prefilter.prefilter import CHANNELS
+from strapdown.rotation import rotate
+from strapdown.systems.sins.fixes import fixes_until, here_by_fix, site_of_fixes
+from strapdown.systems.sins.handover import from_alignment, from_fine
+from strapdown.systems.sins.modes import CoarseMode, FineMode
+from strapdown.systems.sins.piece import Aligned
+from strapdown.tables import MOTION
+
+if TYPE_CHECKING:
+    from strapdown.systems.sins.chain import Chain, ChainState
+
+__all__ = ["align", "handed_over"]
+
+Array = NDArray[np.float64]
+
+# An instant is come to within this, s.
+INSTANT = 1e-7
+
+
+def align(chain: Chain, state: ChainState) -> Aligned:
+    """Align by what was kept of the mode that a chain is in.
+
+    Parameters
+    ----------
+    chain : Chain
+    state : ChainState
+        In a mode of alignment.
+
+    Returns
+    -------
+    Aligned
+
+    Raises
+    ------
+    DataError, DivergenceError
+        It is not possible.
+    """
+    mode = chain.modes[state.mode]
+    assert chain.sensors is not None
+    kept = _window(chain, state)
+    imu = _table(kept[:, 1:7], kept[:, 0], CHANNELS, state)
+    imu.attrs["sampling"] = chain.intake.sampling(state.intake)
+    imu.attrs["axes"] = "forward-right-down"
+    if isinstance(mode, FineMode):
+        assert state.aligned is not None
+        coarse = state.aligned.alignment
+        site, _ = _site(chain, state, coarse.q_nb)
+        increments = _table(kept[1:, 7:17], kept[1:, 0], MOTION, state)
+        fine = mode.way.align(imu, site, chain.sensors, coarse, increments=increments)
+        return Aligned(mode.name, state.begun, state.time, fine.alignment, fine)
+    assert isinstance(mode, CoarseMode)
+    site, _ = _site(chain, state, None)
+    found = mode.way.align(imu, site, chain.sensors, _fixes(chain, state))
+    return Aligned(mode.name, state.begun, state.time, found)
+
+
+def handed_over(chain: Chain, state: ChainState, found: Aligned) -> FilterState:
+    """Return the state of the filter with which navigation begins.
+
+    Parameters
+    ----------
+    chain : Chain
+    state : ChainState
+        At the end of a mode of alignment.
+    found : Aligned
+
+    Returns
+    -------
+    FilterState
+    """
+    filter_ = chain.navigator.filter
+    rest = _window(chain, state)[:, 1:7].mean(axis=0)
+    q_nb = found.alignment.q_nb
+    if found.fine is not None:
+        assert state.aligned is not None
+        _, sd = _site(chain, state, state.aligned.alignment.q_nb)
+        return from_fine(filter_, found.fine, rest, sd)
+    mode = chain.modes[state.mode]
+    if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
+        ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
+        place = here_by_fix(_fixes(chain, state), state.time, q_nb, _lever_arm(chain), ellipsoid)
+        return from_alignment(filter_, found.alignment, place.state, place.covariance, rest)
+    site, sd = _site(chain, state, q_nb)
+    start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
+    P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
+    return from_alignment(filter_, found.alignment, start, P, rest)
+
+
+def _window(chain: Chain, state: ChainState) -> Array:
+    """Steps that are aligned."""
+    kept, mode = state.kept.rows, chain.modes[state.mode]
+    if not isinstance(mode, CoarseMode):
+        return kept
+    return kept[np.searchsorted(kept[:, 0], state.time - mode.window - INSTANT) :]
+
+
+def _table(values: Array, time: Array, columns: list[str], state: ChainState) -> pd.DataFrame:
+    table = pd.DataFrame(values.copy(), index=pd.Index(time, name="time"), columns=columns)
+    table.attrs["source"] = state.intake.source
+    return table
+
+
+def _fixes(chain: Chain, state: ChainState) -> pd.DataFrame | None:
+    name = chain.fixes_from
+    return None if name is None else fixes_until(state.told[name], state.time + INSTANT)
+
+
+def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Array]:
+    """Where the sensors are, and how well that is known."""
+    if chain.site is not None:
+        return chain.site, np.asarray(chain.site_sd, dtype=np.float64)
+    ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
+    site, sd = site_of_fixes(_fixes(chain, state), state.time, ellipsoid)
+    arm = _lever_arm(chain)
+    if q_nb is None or not arm.any():
+        return site, sd
+    antenna = np.array([site.lat_deg, site.lon_deg, site.alt])
+    place = geodetic_from_ned(-rotate(q_nb, arm), antenna, ellipsoid=ellipsoid)
+    lat_deg, lon_deg, alt = place.tolist()
+    return Site(lat_deg, lon_deg, alt, ellipsoid), sd
+
+
+def _lever_arm(chain: Chain) -> Array:
+    """Of the antenna that has the fixes."""
+    aid = chain.navigator.by_name.get(chain.fixes_from or "")
+    return np.asarray(getattr(aid, "lever_arm", (0.0, 0.0, 0.0)), dtype=np.float64)

@@ -1,0 +1,298 @@
+"""The file of a run of navigation to begin with: what log and fixes tell filled in, the rest asked."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from strapdown.config.alignment import LogTable
+from strapdown.config.navigation_file import NAVIGATION_STAGES
+from strapdown.config.slots import SLOTS, Slot, options_of
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.estimation.stated_states import STATED_STATES
+from strapdown.exceptions import Finding
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.systems.alignment_draft import listed_kinds, toml_value
+from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, string
+from strapdown.systems.sins.proposal import Proposal, propose
+from strapdown.tables.checks import index_of
+
+__all__ = ["NavigationDraft", "draft_navigation"]
+
+#: What else an aid may be, as comments.
+OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
+
+
+@dataclass(frozen=True)
+class NavigationDraft:
+    """A file of a run of navigation as text.
+
+    Attributes
+    ----------
+    text : str
+    found : tuple of str
+        What log and fixes told.
+    asked : tuple of Asked
+        What only the user knows.
+    to_check : tuple of Asked
+        What was assumed.
+    findings : tuple of Finding
+        Of reading.
+    """
+
+    text: str
+    found: tuple[str, ...]
+    asked: tuple[Asked, ...]
+    to_check: tuple[Asked, ...]
+    findings: tuple[Finding, ...]
+
+
+def draft_navigation(
+    log: LogTable,
+    *,
+    folder: Path,
+    axes: str | None = None,
+    gnss: Path | None = None,
+    sensor: str | None = None,
+) -> NavigationDraft:
+    """Write the file of a run of navigation over a log.
+
+    Parameters
+    ----------
+    log : LogTable
+        With a path that can be opened.
+    folder : Path
+        Where the file will stand: other files are named from there.
+    axes, gnss, sensor
+        As `propose`.
+
+    Returns
+    -------
+    NavigationDraft
+
+    Raises
+    ------
+    DataError, ConfigError
+        A file cannot be read; the message names file, row and remedy.
+    """
+    made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
+    page = Page()
+    page.say(
+        f"Navigation over {made.recording.name}: place, velocity and attitude, and how well each "
+        "is known.",
+        "Each table is a place in the chain, and kind says what stands there; keys that begin "
+        "with # show the defaults. Then: strapdown navigate on this file.",
+    )
+    found = [*_log(page, made, folder), *_where(page, made)]
+    _axes(page, axes)
+    found += _sensors(page, made)
+    _stage(page, "prefilter", {})
+    page.blank()
+    page.say(f"Alignment: {made.how}.")
+    for name in ("coarse", "fine"):
+        _stage(page, name, made.table[name])
+    for name in ("mechanization", "filter", "damping", "recorder"):
+        _stage(page, name, {})
+    found += _aids(page, made, folder)
+    _rest(page)
+    return NavigationDraft(
+        page.text, tuple(found), tuple(page.asked), tuple(page.to_check), made.findings
+    )
+
+
+def _log(page: Page, made: Proposal, folder: Path) -> list[str]:
+    time = index_of(made.imu)
+    rate = (len(time) - 1) / float(time[-1] - time[0])
+    span = f"{len(time)} samples, {time[0]:.9g} to {time[-1]:.9g} s, {rate:.4g} Hz"
+    page.table("[log]", f"Found: {span}, {made.imu.attrs['sampling']} values.")
+    for key, value in made.table["log"].items():
+        if key == "path":
+            page.key("path", string(_from(Path(value), folder)), "from the folder of this file")
+        elif value not in (False, {}):
+            page.key(key, toml_value(value) or "")
+    page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
+    return [f"{made.recording.name}: {span}"]
+
+
+def _from(path: Path, folder: Path) -> str:
+    try:
+        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
+    except ValueError:  # on another drive
+        return path.absolute().as_posix()
+
+
+def _where(page: Page, made: Proposal) -> list[str]:
+    said = made.table.get("site")
+    where = "Where the body stands while it is aligned."
+    if said is not None:
+        page.table("[site]", where, "Found: the log states it; check that it is so.")
+        for key, value in said.items():
+            page.key(key, repr(value))
+        return [f"place: {said['lat_deg']:.6f}°, {said['lon_deg']:.6f}°"]
+    if made.gnss is not None:
+        page.blank()
+        page.say(
+            f"{where} Left out, it is that of the fixes: [site] with lat_deg, lon_deg, alt_m, "
+            "position_sd_m.",
+            "A state that is known takes the place of all alignment: [start] with lat_deg, "
+            "lon_deg, alt_m, v_ned_m_per_s, roll_deg, pitch_deg, heading_deg and position_sd_m, "
+            "velocity_sd_m_per_s, tilt_sd_deg, heading_sd_deg.",
+        )
+        return []
+    page.table("[site]", where)
+    page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive")
+    page.key("lon_deg", ASK, "only you know: longitude, east positive")
+    page.key("alt_m", "0.0", "assumed: height over the ellipsoid")
+    return []
+
+
+def _axes(page: Page, axes: str | None) -> None:
+    page.table("[axes]", "How the sensor's axes lie in the body, where the log does not say it.")
+    if axes:
+        page.key("axes", string(axes))
+    page.say(
+        'axes = "forward-left-up": where x, y, z of the sensor point; or "x,-y,-z", the axes that '
+        "point forward, right, down"
+    )
+
+
+def _sensors(page: Page, made: Proposal) -> list[str]:
+    page.table(
+        "[sensors]",
+        "How good the sensors are: every bound, and the weight of every aid, rests on it.",
+    )
+    named = made.table.get("sensors", {}).get("sensor")
+    told: list[str] = []
+    if made.noise is not None:
+        gyro, accel = made.noise
+        noise = (
+            f"{60.0 * math.degrees(gyro):.2g} deg/√h and "
+            f"{accel / STANDARD_GRAVITY * 1e6:.3g} µg/√Hz"
+        )
+        told = [f"noise while it is quiet: gyros and accelerometers {noise}"]
+        page.say(f"Found: noise of {noise} while it is quiet.")
+    if named is None:
+        page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
+    else:
+        check = "" if not made.guessed else "the sensor of the catalogue that is nearest by noise"
+        remark = "assumed: nearest of the catalogue by its noise" if made.guessed else ""
+        page.key("sensor", string(named), remark, check=check)
+    page.say(
+        f"The catalogue (strapdown modules): {', '.join(s.name for s in _whole())}; or a .toml "
+        "file of your own. In its place, or to replace numbers of it, in tables [sensors.gyro] "
+        "and [sensors.accel]: bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
+        "noise_density_ug_per_sqrt_hz, …",
+        f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
+        "biases and drifts, if not given",
+    )
+    return told
+
+
+def _whole() -> list[Any]:
+    """Sensors of the catalogue with gyros and accelerometers that measure a motion."""
+    return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
+
+
+def _stage(page: Page, name: str, chosen: Mapping[str, Any]) -> None:
+    slot = SLOTS[name]
+    default, empty = NAVIGATION_STAGES[name][1:]
+    kind = chosen.get("kind", default)
+    page.table(f"[{name}]", f"{slot.title}:", *listed_kinds(slot, empty))
+    page.key("kind", string(kind))
+    if kind in slot.entries:
+        _options(page, slot.entries[kind], chosen)
+    for key, value in chosen.items():
+        if key != "kind" and key not in _keys(slot, kind):
+            page.key(key, toml_value(value) or "", _ENDS.get(key, ""))
+
+
+#: What ends an alignment.
+_ENDS = {
+    "duration_s": "it ends then",
+    "window_s": "the newest part of it that is aligned",
+    "until_heading_sd_deg": "it ends when the heading is known so well",
+    "until_tilt_sd_deg": "and roll and pitch so well",
+}
+
+
+def _keys(slot: Slot, kind: str) -> tuple[str, ...]:
+    return tuple(o.key for o in options_of(slot.entries[kind])) if kind in slot.entries else ()
+
+
+def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
+    """Options that are chosen as keys, the others as comments with their defaults."""
+    for option in options_of(module):
+        if option.key in chosen:
+            page.key(option.key, toml_value(chosen[option.key]) or "")
+            continue
+        value = toml_value(option.default)
+        if option.slot is not None:
+            said = value if option.default is not None else '"none"'
+            page.say(f"{option.key} = {said}    of {', '.join(option.slot.entries)}")
+        elif value is not None:
+            page.say(f"{option.key} = {value}")
+        elif not option.has_default:
+            page.key(option.key, ASK, f"only you know: {_WANTED.get(option.key, 'no default')}")
+
+
+_WANTED = {
+    "heading_deg": "heading of the body at the start, clockwise from north",
+    "sd_deg": "how well it is known",
+}
+
+
+def _aids(page: Page, made: Proposal, folder: Path) -> list[str]:
+    slot = SLOTS["aiding"]
+    page.blank()
+    page.say(
+        "What tells more than the inertial sensors do: [aiding.NAME], each with a name of its own. "
+        "Kinds:",
+        *listed_kinds(slot, False),
+    )
+    if made.gnss is None:
+        page.say(
+            "None is given here: height goes away by e in 570 s without one. [aiding.gnss] and "
+            "path = …, from the folder of this file",
+        )
+    for name, aid in made.table.get("aiding", {}).items():
+        page.table(f"[aiding.{name}]")
+        page.key("kind", string(aid["kind"]))
+        page.key("path", string(_from(Path(aid["path"]), folder)))
+        _options(page, slot.entries[aid["kind"]], _with_remarks(page, aid))
+    page.say(*_other(slot, OTHER_AIDS))
+    if made.gnss is None:
+        return []
+    time, own = index_of(made.gnss), index_of(made.imu)
+    within = int(((time >= own[0]) & (time <= own[-1])).sum())
+    told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
+    if made.rest > 0.0:
+        told.append(f"it stands for the first {made.rest:.4g} s, by the fixes")
+    return told
+
+
+def _with_remarks(page: Page, aid: Mapping[str, Any]) -> Mapping[str, Any]:
+    page.say(
+        "lever_arm_m: of the antenna from the inertial sensors, forward, right, down; zero is "
+        "assumed: measure it. time_offset_sd_s above zero: stamps may be off by it, and by how "
+        "much is estimated."
+    )
+    return aid
+
+
+def _other(slot: Slot, kinds: Sequence[str]) -> list[str]:
+    return [
+        f"[aiding.{kind}] with {', '.join(o.key for o in options_of(slot.entries[kind])[1:5])}, …"
+        for kind in kinds
+        if kind in slot.entries
+    ]
+
+
+def _rest(page: Page) -> None:
+    page.table("[output]", "Forms of the trajectory: csv, parquet, kml, geojson, nav, tum.")
+    page.key("files", '["csv", "kml", "geojson"]')
+    page.blank()
+    page.say("[truth] and path = …: a reference trajectory, to hold the answer beside")

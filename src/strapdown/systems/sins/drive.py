@@ -1,0 +1,225 @@
+"""What feeds a chain: a whole record in chunks, or sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.exceptions import ConfigError
+from strapdown.navigation.engine import SAME_INSTANT
+from strapdown.navigation.record import Event, NavigationRecord, Span
+from strapdown.navigation.recorder import FullRecorder, Recorder
+from strapdown.systems.progress import Progress, silent
+from strapdown.systems.sins.chain import Chain, ChainState
+from strapdown.systems.sins.piece import Aligned, ChainPiece
+from strapdown.tables import ACCEL, GYRO, check_imu
+from strapdown.tables.checks import check_columns, source_of, values_of
+
+__all__ = ["ChainRun", "Recording", "pieces_by_sample", "pieces_of", "run_batch", "run_by_sample"]
+
+Array = NDArray[np.float64]
+
+#: Of a record that is taken at a time, s.
+CHUNK = 60.0
+CHANNELS = [*GYRO, *ACCEL]
+
+
+@dataclass(frozen=True, eq=False)
+class ChainRun:
+    """What came of a run.
+
+    Attributes
+    ----------
+    record : NavigationRecord
+    aligned : tuple of Aligned
+        What each mode of alignment found.
+    """
+
+    record: NavigationRecord
+    aligned: tuple[Aligned, ...]
+
+
+class Recording:
+    """Puts the pieces of a chain together, in what a recorder keeps of them.
+
+    Parameters
+    ----------
+    chain : Chain
+    recorder : Recorder, optional
+        All samples, if not given.
+    """
+
+    def __init__(self, chain: Chain, recorder: Recorder | None = None) -> None:
+        self._tape = (recorder or FullRecorder()).begin(chain.navigator)
+        self._aligned: list[Aligned] = []
+        self._events: list[Event] = []
+        self._modes: list[Span] = []
+        self._outages: list[tuple[str, Span]] = []
+
+    def take(self, piece: ChainPiece) -> None:
+        """Take a piece."""
+        for navigation in piece.navigation:
+            self._tape.take(navigation)
+        self._aligned += piece.aligned
+        self._events += piece.events
+        self._modes += piece.modes
+        self._outages += piece.outages
+
+    def run(self, source: str | None = None) -> ChainRun:
+        """Return everything that was taken.
+
+        Parameters
+        ----------
+        source : str, optional
+            Name for messages.
+        """
+        names = dict.fromkeys(name for name, _ in self._outages)
+        record = self._tape.record(
+            source,
+            events=tuple(sorted(self._events, key=lambda one: one.time)),
+            modes=tuple(self._modes),
+            outages={
+                name: tuple(span for of, span in self._outages if of == name) for name in names
+            },
+        )
+        return ChainRun(record, tuple(self._aligned))
+
+
+def run_batch(
+    chain: Chain,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    recorder: Recorder | None = None,
+    progress: Progress = silent,
+    chunk: float = CHUNK,
+) -> ChainRun:
+    """Run a chain over a record.
+
+    Parameters
+    ----------
+    chain : Chain
+    imu : DataFrame
+        Imu table.
+    tables : mapping of str to DataFrame, optional
+        By name of the aid.
+    recorder : Recorder, optional
+        All samples, if not given.
+    progress : callable, optional
+        Told the mode and the share that is done.
+    chunk : float, s
+        Of the record that is taken at a time: nothing longer is copied.
+
+    Returns
+    -------
+    ChainRun
+
+    Raises
+    ------
+    DataError, ConfigError, DivergenceError
+        As `Chain.advance` and `Chain.tell`.
+    """
+    recording = Recording(chain, recorder)
+    begin, end = float(imu.index[0]), float(imu.index[-1])
+    for piece in pieces_of(chain, imu, tables, chunk):
+        recording.take(piece)
+        share = 1.0 if piece.mode == "" else (piece.time - begin) / max(end - begin, 1e-9)
+        progress(piece.mode, float(np.clip(share, 0.0, 1.0)))
+    return recording.run(source_of(imu))
+
+
+def run_by_sample(
+    chain: Chain,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    recorder: Recorder | None = None,
+    ahead: float = 0.0,
+) -> ChainRun:
+    """Run a chain over a record as it would have come: sample by sample, each fix when it is due.
+
+    Parameters
+    ----------
+    chain, imu, tables, recorder
+        As `run_batch`, whose numbers it gives to the last bit.
+    ahead : float, s
+        By how much rows of tables are told before the samples of their stamps: an aid whose stamps
+        are late by a known time needs at least that.
+
+    Returns
+    -------
+    ChainRun
+    """
+    recording = Recording(chain, recorder)
+    for piece in pieces_by_sample(chain, imu, tables, ahead):
+        recording.take(piece)
+    return recording.run(source_of(imu))
+
+
+def pieces_of(
+    chain: Chain,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    chunk: float = CHUNK,
+) -> Iterator[ChainPiece]:
+    """Run a chain over a record in chunks, and give the pieces as they come; see `run_batch`."""
+    if not chunk > 0.0:
+        raise ConfigError(f"{chunk!r} s is no chunk", quantity="chunk", remedy="give seconds")
+    check_columns(imu, CHANNELS, source_of(imu))
+    state = _begun(chain, imu)
+    for name, table in (tables or {}).items():
+        state = chain.tell(state, name, table)
+    time = imu.index.to_numpy(dtype=np.float64)
+    span = max(float(time[-1] - time[0]), 0.0) if len(time) else 0.0
+    size = len(time) if span <= chunk else max(1, int(len(time) * chunk / span))
+    for at in range(0, len(time), size):
+        last = at + size >= len(time)
+        values = values_of(imu.iloc[at : at + size], CHANNELS)
+        state, piece = chain.advance(state, time[at : at + size], values, last)
+        yield piece
+
+
+def pieces_by_sample(
+    chain: Chain,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None = None,
+    ahead: float = 0.0,
+    each: Callable[[ChainState, float], ChainState] | None = None,
+) -> Iterator[ChainPiece]:
+    """Run a chain sample by sample; see `run_by_sample`.
+
+    Parameters
+    ----------
+    chain, imu, tables, ahead
+        As `run_by_sample`.
+    each : callable, optional
+        Given the state and the stamp of each sample before it is taken, returns the state: where
+        commands are given.
+    """
+    check_columns(imu, CHANNELS, source_of(imu))
+    state = _begun(chain, imu)
+    tables = tables or {}
+    stamps = {name: table.index.to_numpy(dtype=np.float64) for name, table in tables.items()}
+    told = dict.fromkeys(tables, 0)
+    time, values = imu.index.to_numpy(dtype=np.float64), values_of(imu, CHANNELS)
+    for k in range(len(time)):
+        for name, table in tables.items():
+            upto = time[k] + ahead + SAME_INSTANT
+            first, end = told[name], int(np.searchsorted(stamps[name], upto, side="right"))
+            if end > first:
+                rows = table.iloc[first:end]
+                rows.attrs = dict(table.attrs)
+                state = chain.tell(state, name, rows)
+                told[name] = end
+        if each is not None:
+            state = each(state, float(time[k]))
+        last = k + 1 == len(time)
+        state, piece = chain.advance(state, time[k : k + 1], values[k : k + 1], last)
+        yield piece
+
+
+def _begun(chain: Chain, imu: pd.DataFrame) -> ChainState:
+    check_imu(imu)
+    return chain.begin(imu.attrs["sampling"], source_of(imu))

@@ -1,0 +1,144 @@
+"""From an alignment to navigation: the state, and what is known of it and of the sensors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.fine_result import FineResult
+from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
+from strapdown.estimation.error_model import PHYSICAL
+from strapdown.nav_state import NavState
+
+__all__ = ["from_alignment", "from_fine", "from_state"]
+
+Array = NDArray[np.float64]
+
+
+def from_state(filter_: ErrorFilter, start: NavState, P: Array) -> FilterState:
+    """Begin a filter with a state and the covariance of its nine errors.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    start : NavState
+    P : ndarray, (9, 9)
+        Displacement, velocity, rotation in north-east-down; the sensors are as the model says.
+
+    Returns
+    -------
+    FilterState
+    """
+    return filter_.begin(start, _with_sensors(filter_, P))
+
+
+def from_alignment(
+    filter_: ErrorFilter, found: Alignment, start: NavState, P: Array, rest: Array
+) -> FilterState:
+    """Begin a filter with a coarse alignment.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    found : Alignment
+        Its biases, where it tells any, are taken off.
+    start : NavState
+        Place and velocity; the attitude is that of the alignment.
+    P : ndarray, (6, 6)
+        Of displacement and velocity, north-east-down.
+    rest : ndarray, (6,)
+        Mean rate and force of the record, which say what scale factors do.
+
+    Returns
+    -------
+    FilterState
+        What an attitude errs by is taken as independent of the sensors: of a tilt that is the
+        fault of an accelerometer that is pessimistic.
+    """
+    whole = np.zeros((PHYSICAL, PHYSICAL))
+    whole[:6, :6] = P
+    whole[6:9, 6:9] = found.covariance
+    start = replace(start, time=found.time, q_nb=found.q_nb)
+    if found.gyro_bias is None or found.accel_bias is None:
+        return from_state(filter_, start, whole)
+    assert found.gyro_bias_sd is not None and found.accel_bias_sd is not None
+    joint = np.zeros((PHYSICAL + 6, PHYSICAL + 6))
+    joint[:PHYSICAL, :PHYSICAL] = whole
+    sd = np.concatenate([found.gyro_bias_sd, found.accel_bias_sd])
+    joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
+    told = np.concatenate([found.gyro_bias, found.accel_bias])
+    return _with_biases(filter_, start, joint, told, rest)
+
+
+def from_fine(
+    filter_: ErrorFilter, fine: FineResult, rest: Array, site_sd: ArrayLike = (0.0, 0.0, 0.0)
+) -> FilterState:
+    """Begin a filter where a fine alignment ended, with everything that it learned.
+
+    The fine alignment has one bias for all that a sensor reads too much at rest: its covariance
+    with the attitude goes on. Where the filter has more states that read as a bias at rest (a
+    drift, a scale factor under gravity), each takes its part of it in proportion to its variance,
+    as a Kalman filter that is told their sum: with x of covariance P0 before, and ``b = A x``,
+    ``K = P0 A' (A P0 A')^-1``, the estimate is ``K b``, the covariance ``K P_b K' + (1 - K A) P0``
+    and that with an attitude ``K P_ba``. Of biases alone K is 1.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+        Of navigation; any mechanization, error model and form.
+    fine : FineResult
+    rest : ndarray, (6,)
+        Mean rate in rad/s and force in m/s² of the rest, body axes.
+    site_sd : array_like, (3,), m
+        How well the place of alignment itself is known, north, east, down.
+
+    Returns
+    -------
+    FilterState
+    """
+    old, state = fine.filter, fine.state
+    P = old.physical_covariance(state)
+    level = old.mechanization.level_from_ned(state.row)
+    turn = np.eye(len(P))
+    for at in (0, 3, 6):
+        turn[at : at + 3, at : at + 3] = level.T
+    P = turn @ P @ turn.T
+    P[0:3, 0:3] += np.diag(np.square(np.asarray(site_sd, dtype=np.float64)))
+    start = old.mechanization.nav_state(state.mechanization, state.time)
+    return _with_biases(filter_, start, P, state.sensors, np.asarray(rest))
+
+
+def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
+    """Covariance of all physical errors: the sensors as their model says."""
+    out = np.diag(np.concatenate([np.zeros(PHYSICAL), np.square(filter_.model.stacked.sd)]))
+    out[:PHYSICAL, :PHYSICAL] = P
+    return out
+
+
+def _with_biases(
+    filter_: ErrorFilter, start: NavState, joint: Array, told: Array, rest: Array
+) -> FilterState:
+    """Begin with a state whose errors are correlated with biases that were found."""
+    P0 = np.diag(np.square(filter_.model.stacked.sd))
+    A = _read_at_rest(filter_, rest)
+    parts = A @ P0 @ A.T
+    known = np.diagonal(parts) > 0.0
+    A, at = A[known], PHYSICAL + np.flatnonzero(known)
+    K = P0 @ A.T @ np.linalg.inv(A @ P0 @ A.T) if len(at) else np.zeros((len(P0), 0))
+    P = _with_sensors(filter_, joint[:PHYSICAL, :PHYSICAL])
+    left = symmetric(P0 - K @ A @ P0)
+    P[PHYSICAL:, PHYSICAL:] = symmetric(K @ joint[np.ix_(at, at)] @ K.T) + left
+    P[PHYSICAL:, :PHYSICAL] = K @ joint[at, :PHYSICAL]
+    P[:PHYSICAL, PHYSICAL:] = P[PHYSICAL:, :PHYSICAL].T
+    state = filter_.begin(start, symmetric(P))
+    return replace(state, sensors=K @ told[at - PHYSICAL])
+
+
+def _read_at_rest(filter_: ErrorFilter, rest: Array) -> Array:
+    """What each state of the sensors adds to the six channels of a body at rest, (6, k)."""
+    stacked = filter_.model.stacked
+    inputs = np.concatenate([[1.0], rest])
+    return np.vstack([np.tensordot(inputs, of, axes=1) for of in (stacked.gyro, stacked.accel)])

@@ -1,0 +1,303 @@
+"""From samples of sensors to steps of a navigator: axes, holes, pre-filter, increments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.increments.stream import IncrementStream, IncrementStreamState
+from strapdown.prefilter.prefilter import CHANNELS, Prefilter
+from strapdown.systems.sins.filtering import Filtering, FilteringState
+from strapdown.systems.sins.gaps import GapPolicy, Hole, hole_between
+
+__all__ = ["Intake", "IntakeState", "Steps"]
+
+Array = NDArray[np.float64]
+
+#: Samples at the start that tell the step of a record.
+FIRST = 64
+#: Over which the motion before a gap is judged, s.
+BEFORE = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """What the samples of a piece make.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        Ends of the steps.
+    values : ndarray, (n, 6)
+        Rates and forces there, in body axes.
+    rows : ndarray, (n, 10)
+        Motion increments.
+    opening : tuple of (float, ndarray), or None
+        Stamp and values of the sample at which the first step begins, once.
+    holes : tuple of Hole
+        That were found; steps over them may still be to come.
+    """
+
+    time: Array
+    values: Array
+    rows: Array
+    opening: tuple[float, Array] | None
+    holes: tuple[Hole, ...]
+
+
+def _no_time() -> Array:
+    return np.empty(0)
+
+
+def _no_values() -> Array:
+    return np.empty((0, 6))
+
+
+@dataclass(frozen=True, eq=False)
+class IntakeState:
+    """Between pieces.
+
+    Attributes
+    ----------
+    sampling : str
+        Of the samples.
+    source : str, optional
+    count : int
+        Samples so far.
+    usual : float, s
+        Longest usual step; nought until it is known.
+    tail_time, tail : ndarray
+        Samples that wait for that; then those of the last second, in body axes.
+    filtering : FilteringState or None
+    stream : IncrementStreamState or None
+        None where the pre-filter makes the increments, and until it is known whether it does.
+    own : bool
+        Whether it does.
+    first : tuple of (float, ndarray), or None
+        The first sample, until it is known who makes the increments.
+    waiting_time, waiting : ndarray
+        Samples that no step has ended at yet.
+    """
+
+    sampling: str
+    source: str | None
+    count: int = 0
+    usual: float = 0.0
+    tail_time: Array = field(default_factory=_no_time)
+    tail: Array = field(default_factory=_no_values)
+    filtering: FilteringState | None = None
+    stream: IncrementStreamState | None = None
+    own: bool = False
+    first: tuple[float, Array] | None = None
+    waiting_time: Array = field(default_factory=_no_time)
+    waiting: Array = field(default_factory=_no_values)
+
+
+@dataclass(frozen=True, eq=False)
+class Intake:
+    """Makes steps of samples; it holds no state.
+
+    Attributes
+    ----------
+    gyro_axes, accel_axes : ndarray, (3, 3), optional
+        From the axes of the sensors to those of the body (`sensors.axes_matrix`).
+    prefilter : Prefilter, optional
+        Its delay is taken off by the stamps of what comes out; it comes later by that.
+    stream : IncrementStream, optional
+        Linear for samples as they come, cubic after a pre-filter, if not given.
+    gaps : GapPolicy
+    """
+
+    gyro_axes: Array | None = None
+    accel_axes: Array | None = None
+    prefilter: Prefilter | None = None
+    stream: IncrementStream | None = None
+    gaps: GapPolicy = field(default_factory=GapPolicy)
+
+    @property
+    def increments(self) -> IncrementStream:
+        """The stream that is used."""
+        if self.stream is not None:
+            return self.stream
+        return IncrementStream("linear" if self.prefilter is None else "cubic")
+
+    def sampling(self, state: IntakeState) -> str:
+        """What the values of its steps are: 'instantaneous' or 'mean'."""
+        if self.prefilter is None or state.filtering is None:
+            return state.sampling
+        return self.prefilter.sampling(state.filtering.grid)
+
+    def begin(self, sampling: str = "instantaneous", source: str | None = None) -> IntakeState:
+        """Return the state before the first sample.
+
+        Parameters
+        ----------
+        sampling : {'instantaneous', 'mean'}
+        source : str, optional
+            Name for messages.
+        """
+        return IntakeState(sampling, source)
+
+    def advance(
+        self, state: IntakeState, time: Array, values: Array, last: bool = False
+    ) -> tuple[IntakeState, Steps]:
+        """Take further samples.
+
+        Parameters
+        ----------
+        state : IntakeState
+        time : ndarray, (k,), s
+        values : ndarray, (k, 6)
+            rad/s and m/s².
+        last : bool
+            Whether no sample follows.
+
+        Returns
+        -------
+        state : IntakeState
+        steps : Steps
+
+        Raises
+        ------
+        DataError
+            Time does not advance, a value is not finite, or the stamps are not even where a
+            pre-filter needs them so.
+        """
+        _check(state, time, values)
+        state = replace(state, count=state.count + len(time))
+        values = self._turned(values)
+        if not state.usual:
+            time = np.concatenate([state.tail_time, time])
+            values = np.concatenate([state.tail, values])
+            if len(time) < FIRST and not last:
+                return replace(state, tail_time=time, tail=values), _NOTHING
+            state = self._judged(state, time[:FIRST])
+        state, holes = self._holes(state, time, values)
+        return self._stepped(state, time, values, holes, last)
+
+    def _turned(self, values: Array) -> Array:
+        out = values.copy()
+        for at, matrix in ((0, self.gyro_axes), (3, self.accel_axes)):
+            if matrix is not None:
+                # Term by term: a product of matrices may add in an order that depends on its size.
+                x, y, z = (values[:, at + k, None] for k in range(3))
+                out[:, at : at + 3] = x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2]
+        return out
+
+    def _judged(self, state: IntakeState, time: Array) -> IntakeState:
+        """Learn the usual step from the first samples, and begin what needs it."""
+        if len(time) < 2:
+            raise DataError(
+                f"{len(time)} sample: navigation goes from sample to sample",
+                file=state.source,
+                quantity="time",
+                remedy="record for longer, or check that the right file was given",
+            )
+        state = replace(
+            state,
+            usual=float(np.quantile(np.diff(time), 0.95, method="lower")),
+            tail_time=_no_time(),
+            tail=_no_values(),
+        )
+        if self.prefilter is None:
+            return replace(state, stream=self.increments.begin(state.sampling))
+        means = state.sampling == "mean"
+        return replace(state, filtering=Filtering(self.prefilter).begin(time, means, state.source))
+
+    def _holes(
+        self, state: IntakeState, time: Array, values: Array
+    ) -> tuple[IntakeState, tuple[Hole, ...]]:
+        """Find gaps, and keep the last second."""
+        known = max(len(state.tail_time) - 1, 0)
+        time = np.concatenate([state.tail_time, time])
+        values = np.concatenate([state.tail, values])
+        found = []
+        wide = np.flatnonzero(np.diff(time[known:]) > self.gaps.usual * state.usual) + known
+        for k in wide.tolist():
+            first = int(np.searchsorted(time, time[k] - BEFORE))
+            sides = (float(time[k]), float(time[k + 1]))
+            found.append(hole_between(values[first : k + 1], sides, values[k + 1]))
+        if time.size:
+            first = int(np.searchsorted(time, time[-1] - BEFORE))
+            time, values = time[first:].copy(), values[first:].copy()
+        return replace(state, tail_time=time, tail=values), tuple(found)
+
+    def _stepped(
+        self,
+        state: IntakeState,
+        time: Array,
+        values: Array,
+        holes: tuple[Hole, ...],
+        last: bool,
+    ) -> tuple[IntakeState, Steps]:
+        """Make the increments."""
+        if self.prefilter is not None:
+            before = state.filtering
+            assert before is not None
+            if len(time) and state.stream is None and not state.own and state.first is None:
+                state = replace(state, first=(float(time[0]), values[0].copy()))
+            filtering, out = Filtering(self.prefilter).advance(
+                before, time, values, last, state.source
+            )
+            state = replace(state, filtering=filtering)
+            time, values = out.time, out.values
+            if not len(time) and (state.stream is None or not last):
+                return state, replace(_NOTHING, holes=holes)
+            if len(out.rows):
+                # Rows that a pre-filter makes begin with the first sample.
+                opening = state.first
+                state = replace(state, own=True, first=None)
+                return state, Steps(time, values, out.rows, opening, holes)
+            if state.stream is None:
+                begun = self.increments.begin(self.sampling(state))
+                state = replace(state, stream=begun, first=None)
+        assert state.stream is not None
+        opening = None
+        if len(time) and not len(state.stream.time):
+            opening = (float(time[0]), values[0].copy())
+        stream, ends, rows = self.increments.advance(state.stream, time, values, last)
+        if opening is not None:
+            time, values = time[1:], values[1:]
+        values = np.concatenate([state.waiting, values])
+        time = np.concatenate([state.waiting_time, time])
+        n = len(ends)
+        state = replace(
+            state, stream=stream, waiting_time=time[n:].copy(), waiting=values[n:].copy()
+        )
+        return state, Steps(ends, values[:n], rows, opening, holes)
+
+
+_NOTHING = Steps(_no_time(), _no_values(), np.empty((0, 10)), None, ())
+
+
+def _check(state: IntakeState, time: Array, values: Array) -> None:
+    """Refuse samples that cannot be used; rows count from 1 over the whole record."""
+    joined = np.concatenate([state.tail_time[-1:], time])
+    steps = np.diff(joined)
+    if not np.isfinite(time).all() or (steps.size and not steps.min() > 0.0):
+        wrong = ~np.isfinite(time) if not np.isfinite(time).all() else ~(steps > 0.0)
+        k = int(np.argmax(wrong))
+        first = len(joined) - len(time) if np.isfinite(time).all() else 0
+        row = state.count + k + (1 if first else 2)
+        told = f"{joined[k]:.9g} s is followed by {joined[min(k + 1, len(joined) - 1)]:.9g} s"
+        raise DataError(
+            f"time does not advance: {told}",
+            file=state.source,
+            row=row,
+            quantity="time",
+            remedy="sort the samples, drop repeated stamps, and look at the clock there",
+        )
+    with np.errstate(invalid="ignore", over="ignore"):
+        total = values.sum()
+    if not np.isfinite(total) and not np.isfinite(values).all():
+        row, column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
+        raise DataError(
+            f"{values[row, column]} at {time[row]:.9g} s",
+            file=state.source,
+            row=state.count + row + 1,
+            quantity=CHANNELS[column],
+            remedy="leave such samples out: a gap is bridged, or ends the run, as it is told to",
+        )

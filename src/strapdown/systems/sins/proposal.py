@@ -1,0 +1,259 @@
+"""A chain for a log: what its samples and its fixes tell of sensor, rest, motion and alignment."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.exceptions import ConfigError, Finding
+from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.recording import Recording, StatedStart
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.systems.alignment_source import body_record
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
+from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["Proposal", "propose"]
+
+Array = NDArray[np.float64]
+
+#: Windows in which noise is measured, s, and the share of them that is taken as the quiet one.
+WINDOW, QUIET = 2.0, 0.05
+#: Below it a vehicle stands, above the other its course can be seen, m/s.
+STANDS, DRIVES = 0.5, 3.0
+#: A gyro bias that leaves north to be found, and the rest that it takes.
+NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
+#: Coarse alignment of a rest takes no more than this of it, s.
+COARSE = 100.0
+#: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
+OFFSET_SD = 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A configuration as plain data, and what it rests on.
+
+    Attributes
+    ----------
+    table : dict
+        Of a run of navigation; where only the user knows, there is no key.
+    recording : Recording
+    imu : DataFrame
+        Imu table, body axes.
+    gnss : DataFrame or None
+        Gnss table, on the clock of the samples.
+    rest : float, s
+        How long the vehicle stands at the start, as far as it is known.
+    noise : tuple of float or None
+        Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
+    guessed : bool
+        Whether the sensor is only the one of the catalogue that is nearest by its noise.
+    how : str
+        Why it is aligned so, in words.
+    findings : tuple of Finding
+        Of reading.
+    """
+
+    table: dict[str, Any]
+    recording: Recording
+    imu: pd.DataFrame
+    gnss: pd.DataFrame | None
+    rest: float
+    noise: tuple[float, float] | None
+    guessed: bool
+    how: str
+    findings: tuple[Finding, ...]
+
+
+def propose(
+    log: LogTable,
+    *,
+    axes: str | None = None,
+    gnss: Path | None = None,
+    sensor: str | None = None,
+    site: tuple[float, float, float] | None = None,
+    heading_deg: float | None = None,
+) -> Proposal:
+    """Look through a log and the fixes beside it, and say how it can be navigated by.
+
+    Parameters
+    ----------
+    log : LogTable
+        With a path that can be opened.
+    axes : str, optional
+        How the sensor's axes lie, as `AxesTable.axes`.
+    gnss : Path, optional
+    sensor : str, optional
+        Of the catalogue, or a file; the nearest of the catalogue by its noise, if not given.
+    site : tuple of float, optional
+        Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
+    heading_deg : float, optional
+        Of the body at the start.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    DataError, ConfigError
+        A file cannot be read; the message names file, row and remedy.
+    """
+    recording, imu, findings = body_record(log, AxesTable(axes=axes))
+    table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
+    fixes = None
+    if gnss is not None:
+        fixes, shifted = on_clock_of(read_gnss(gnss), recording.imu)
+        findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
+    noise = _noise(imu)
+    guessed = sensor is None
+    named = sensor or (None if noise is None else _nearest(noise))
+    if named is not None:
+        table["sensors"] = {"sensor": named}
+    place = site or _place(recording.start)
+    if place is not None:
+        table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+    rest, drives = _motion(imu, fixes)
+    chosen, how = _alignment(named, rest, drives, heading_deg)
+    table |= chosen
+    if fixes is not None:
+        assert gnss is not None  # whence the fixes are
+        table["aiding"] = {
+            "gnss": {
+                "kind": "gnss",
+                "path": str(gnss),
+                "lever_arm_m": (0.0, 0.0, 0.0),
+                "update_rule": "robust",
+                **({"time_offset_sd_s": OFFSET_SD} if drives else {}),
+            }
+        }
+    return Proposal(table, recording, imu, fixes, rest, noise, guessed, how, findings)
+
+
+def _noise(imu: pd.DataFrame) -> tuple[float, float] | None:
+    """Noise densities while the record is quiet; None where it has none, or no such time."""
+    time = index_of(imu)
+    if ACCEL[0] not in imu.columns or len(time) < 64:
+        return None
+    step = float(np.median(np.diff(time)))
+    size = max(16, round(WINDOW / step))
+    count = len(time) // size
+    if count < 3:
+        return None
+    found = []
+    for columns in (GYRO, ACCEL):
+        # Second differences leave out what turns and accelerates: of white noise they have six
+        # times its variance.
+        second = np.diff(values_of(imu, columns)[: count * size], n=2, axis=0)
+        second = second[: (len(second) // size) * size].reshape(-1, size, 3)
+        sd = np.sqrt(np.square(second).mean(axis=1) / 6.0)
+        # An engine shakes one axis more than another; the quietest one tells of the sensor.
+        found.append(float(np.quantile(sd, QUIET, axis=0).min()) * math.sqrt(step))
+    gyro, accel = found
+    return (gyro, accel) if gyro > 0.0 and accel > 0.0 else None
+
+
+def _nearest(noise: tuple[float, float]) -> str:
+    """The sensor of the catalogue whose noise is nearest, by ratios."""
+    best, least = "", math.inf
+    for name in SENSORS:
+        try:
+            known = ImuUncertainty.of_sensor(load_sensor(name))
+        except ConfigError:
+            continue  # it lacks a triad
+        densities = (
+            max(known.gyro.axis("noise_density")),
+            max(known.accel.axis("noise_density")),
+        )
+        far = sum(math.log(a / b) ** 2 for a, b in zip(noise, densities, strict=True))
+        if far < least:
+            best, least = name, far
+    return best
+
+
+def _place(start: StatedStart | None) -> tuple[float, float, float] | None:
+    return None if start is None else (start.lat_deg, start.lon_deg, start.alt)
+
+
+def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]:
+    """How long it stands at the start, and whether it then drives fast enough to see a course."""
+    time = index_of(imu)
+    if fixes is None:
+        return float(time[-1] - time[0]), False
+    at = index_of(fixes)
+    within = (at >= time[0]) & (at <= time[-1])
+    if within.sum() < 2:
+        return 0.0, False
+    at, speed = at[within], _speed(fixes)[within]
+    moving = np.flatnonzero(speed > STANDS)
+    rest = float(at[moving[0]] - time[0]) if moving.size else float(time[-1] - time[0])
+    return max(rest, 0.0), bool((speed > DRIVES).any())
+
+
+def _speed(fixes: pd.DataFrame) -> Array:
+    """Speed over ground at each fix; of places where the receiver measures none."""
+    measured = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
+    speed = np.linalg.norm(values_of(fixes, VELOCITY_COLUMNS)[:, :2], axis=1)
+    if measured.all():
+        return np.asarray(speed)
+    lat, lon, _ = np.radians(values_of(fixes, GEODETIC)).T
+    north = np.diff(lat) * 6.37e6
+    east = np.diff(lon) * 6.37e6 * np.cos(lat[:-1])
+    sd = values_of(fixes, POSITION_SD)[:, :2].max(axis=1)
+    way = np.maximum(np.hypot(north, east) - 3.0 * sd[1:], 0.0)
+    along = np.concatenate([[0.0], way / np.diff(index_of(fixes))])
+    return np.where(measured, speed, along)
+
+
+def _alignment(
+    sensor: str | None, rest: float, drives: bool, heading_deg: float | None
+) -> tuple[dict[str, Any], str]:
+    """Coarse and fine alignment that such a record allows, and why."""
+    if heading_deg is not None:
+        coarse = {"kind": "known_heading", "heading_deg": heading_deg, "sd_deg": 2.0}
+        length = min(max(rest, 1.0), 10.0)
+        return (
+            {"coarse": {**coarse, "duration_s": length}, "fine": {"kind": "none"}},
+            f"levelled by {length:g} s, with the heading that is stated",
+        )
+    if rest >= LEAST_REST and sensor is not None and _finds_north(sensor):
+        coarse_s = float(math.floor(min(COARSE, rest / 3.0)))
+        fine_s = float(math.floor(min(rest, 600.0) - coarse_s))
+        return (
+            {
+                "coarse": {"kind": "inertial_frame", "duration_s": coarse_s},
+                "fine": {"kind": "filter", "duration_s": fine_s},
+            },
+            f"it stands for {rest:.4g} s, and its gyros can find north",
+        )
+    if drives:
+        return (
+            {
+                "coarse": {
+                    "kind": "gnss_course",
+                    "window_s": 60.0,
+                    "until_heading_sd_deg": 3.0,
+                    "until_tilt_sd_deg": 3.0,
+                },
+                "fine": {"kind": "none"},
+            },
+            "by its course, once it drives: its forward axis is taken to point where it goes",
+        )
+    return (
+        {"coarse": {"kind": "known_heading", "duration_s": 10.0}, "fine": {"kind": "none"}},
+        "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
+    )
+
+
+def _finds_north(sensor: str) -> bool:
+    return max(ImuUncertainty.of_sensor(load_sensor(sensor)).gyro.axis("bias")) <= NORTH

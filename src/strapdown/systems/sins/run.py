@@ -1,0 +1,104 @@
+"""A run of navigation, from its specification to everything that a report tells."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from strapdown.config.choice import make_choice
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation_checks import given_of, uncertainty_of
+from strapdown.config.slots import SLOTS
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.evaluation.trajectory_summary import DifferenceSummary, summarise_differences
+from strapdown.navigation.recorder import Recorder
+from strapdown.systems.attitude_source import input_files
+from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
+from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.source import NavigationSource, read_navigation_source
+
+__all__ = ["run_navigation"]
+
+#: Shares of a whole run at which its chain begins and ends.
+BEGUN, ENDED = 0.15, 0.8
+#: Of the record that is taken at a time, s: so often progress is told.
+CHUNK = 20.0
+
+
+@one_thread()
+def run_navigation(
+    spec: NavigationSpec, file: Path | None = None, progress: Progress = silent
+) -> NavigationResult:
+    """Read a record and its aids, align, and navigate.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+        With absolute paths.
+    file : Path, optional
+        Where it was read from: an input, too.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    NavigationResult
+
+    Raises
+    ------
+    ConfigError
+        A file is not there, or an option cannot be.
+    DataError
+        A record cannot be read, or it cannot be navigated by; the message names file, row,
+        quantity and remedy.
+    DivergenceError
+        The state left what the mechanization can do.
+    """
+    progress("reading", 0.02)
+    source = read_navigation_source(spec)
+    sensors = uncertainty_of(spec)
+    chain = make_chain(spec, sensors)
+    recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+
+    def told(mode: str, share: float) -> None:
+        progress(f"{mode} {share:.0%}", BEGUN + (ENDED - BEGUN) * share)
+
+    progress("aligning" if spec.start is None else "navigating", BEGUN)
+    run = run_batch(chain, source.imu, source.tables, recorder, told, CHUNK)
+    progress("comparing", ENDED)
+    differences, errors = _against_truth(run.record.trajectory, source, spec)
+    files = () if file is None else (input_files("configuration", str(file), (file,)),)
+    aligned = {one.mode: one for one in run.aligned}
+    coarse, fine = aligned.get("coarse"), aligned.get("fine")
+    findings = [
+        *source.findings,
+        *(f for one in run.aligned for f in one.alignment.findings),
+        *(() if fine is None or fine.fine is None else fine.fine.findings),
+    ]
+    return NavigationResult(
+        spec=spec,
+        source=source,
+        ellipsoid=find_ellipsoid(spec.ellipsoid),
+        sensors=sensors,
+        coarse=None if coarse is None else coarse.alignment,
+        fine=None if fine is None else fine.fine,
+        record=run.record,
+        differences=differences,
+        errors=errors,
+        inputs=(*files, *source.inputs),
+        findings=tuple(dict.fromkeys(findings)),
+    )
+
+
+def _against_truth(
+    trajectory: pd.DataFrame, source: NavigationSource, spec: NavigationSpec
+) -> tuple[pd.DataFrame | None, DifferenceSummary | None]:
+    if source.truth is None:
+        return None, None
+    differences = trajectory_differences(trajectory, source.truth, find_ellipsoid(spec.ellipsoid))
+    return differences, summarise_differences(differences)

@@ -1,0 +1,86 @@
+"""BodyVelocity tables: a velocity measured along the axes of an instrument, as by Doppler."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.exceptions import DataError
+from strapdown.tables.checks import (
+    check_columns,
+    check_positive_sd,
+    check_rows,
+    check_time,
+    index_of,
+    joined,
+    source_of,
+    values_of,
+)
+
+BODY_VELOCITY = ["vx", "vy", "vz", "vx_sd", "vy_sd", "vz_sd"]
+
+# What measures its velocity by Doppler or a camera is slower, m/s.
+FASTEST = 400.0
+
+
+def body_velocity_table(
+    time: ArrayLike, velocity: ArrayLike, velocity_sd: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make a BodyVelocity table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        On the clock of the inertial sensors.
+    velocity : array_like, (n, 3), m/s
+        Relative to the Earth, along the instrument's forward, right, down.
+    velocity_sd : array_like, (n, 3) or (3,), m/s
+        Infinite where an axis was not measured.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_body_velocity`.
+    """
+    sd = np.tile(velocity_sd, (np.size(time), 1)) if np.ndim(velocity_sd) == 1 else velocity_sd
+    table = joined(time, BODY_VELOCITY, source, velocity=(velocity, 3), velocity_sd=(sd, 3))
+    check_body_velocity(table)
+    return table
+
+
+def check_body_velocity(table: pd.DataFrame) -> None:
+    """Check a BodyVelocity table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a standard deviation is
+        not above zero, or a velocity is beyond 400 m/s.
+    """
+    source = source_of(table)
+    check_columns(table, BODY_VELOCITY, source)
+    check_time(index_of(table), source)
+    check_rows(values_of(table, BODY_VELOCITY[:3]), BODY_VELOCITY[:3], source)
+    check_positive_sd(table, BODY_VELOCITY[3:], source)
+    velocity = values_of(table, BODY_VELOCITY[:3])
+    beyond = np.argwhere(np.abs(velocity) > FASTEST)
+    if len(beyond):
+        row, column = (int(i) for i in beyond[0])
+        raise DataError(
+            f"{velocity[row, column]:.6g} m/s is faster than such an instrument measures",
+            file=source,
+            row=row + 1,
+            quantity=BODY_VELOCITY[column],
+            remedy="give m/s: mm/s are divided by 1000; drop rows that are no velocities",
+        )

@@ -1,0 +1,114 @@
+"""Heading tables: where a compass or the baseline of two antennas points."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.exceptions import DataError
+from strapdown.tables.checks import (
+    check_columns,
+    check_positive_sd,
+    check_rows,
+    check_time,
+    index_of,
+    joined,
+    source_of,
+    values_of,
+)
+
+HEADING = ["heading", "heading_sd"]
+
+TURN = 2.0 * math.pi
+# Part of a full turn in rad that a record fills, and that two rows leap, where it is in rad.
+FILLED, LEAPT = 0.97, 0.9
+# A standard deviation of a heading is below, deg: an even distribution has 104.
+MOST_SD = 110.0
+
+
+def heading_table(
+    time: ArrayLike, heading: ArrayLike, heading_sd: ArrayLike, source: str | None = None
+) -> pd.DataFrame:
+    """Make a Heading table.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+        On the clock of the inertial sensors.
+    heading : array_like, (n,), deg
+        Clockwise from north, -360 to 360.
+    heading_sd : array_like, (n,) or float, deg
+        Of the noise of each; infinite where nothing was measured.
+    source : str, optional
+        Name for messages.
+
+    Returns
+    -------
+    DataFrame
+
+    Raises
+    ------
+    DataError
+        Shapes disagree, or as `check_heading`.
+    """
+    sd = np.full(np.size(time), heading_sd) if np.ndim(heading_sd) == 0 else heading_sd
+    table = joined(time, HEADING, source, heading=(heading, None), heading_sd=(sd, None))
+    check_heading(table)
+    return table
+
+
+def check_heading(table: pd.DataFrame) -> None:
+    """Check a Heading table.
+
+    Parameters
+    ----------
+    table : DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, a value is not finite, time does not advance, a standard deviation is
+        not above zero or finite beyond 110 deg, a heading is beyond a turn, or all are within a
+        turn in rad, and leap by one.
+    """
+    source = source_of(table)
+    check_columns(table, HEADING, source)
+    check_time(index_of(table), source)
+    check_rows(values_of(table, ["heading"]), ["heading"], source)
+    check_positive_sd(table, ["heading_sd"], source)
+    heading, sd = values_of(table, HEADING).T
+    beyond = np.flatnonzero(np.abs(heading) > 360.0)
+    if beyond.size:
+        row = int(beyond[0])
+        raise DataError(
+            f"a heading of {heading[row]:.6g} deg is more than a turn",
+            file=source,
+            row=row + 1,
+            quantity="heading",
+            remedy="give degrees clockwise from north, 0 to 360; hundredths are divided by 100",
+        )
+    wide = np.flatnonzero(np.isfinite(sd) & (sd > MOST_SD))
+    if wide.size:
+        row = int(wide[0])
+        raise DataError(
+            f"a standard deviation of {sd[row]:.6g} deg says nothing of a heading",
+            file=source,
+            row=row + 1,
+            quantity="heading_sd",
+            remedy="give it in deg, and inf where nothing was measured",
+        )
+    leaps = np.abs(np.diff(heading))
+    in_radians = np.ptp(heading) <= 1.001 * TURN if len(heading) else False
+    if in_radians and np.ptp(heading) > FILLED * TURN and leaps.max() > LEAPT * TURN:
+        row = int(np.argmax(leaps)) + 1
+        raise DataError(
+            f"all headings are within {heading.min():.4g} to {heading.max():.4g}, and leap from "
+            f"{heading[row - 1]:.4g} to {heading[row]:.4g}, as radians do",
+            file=source,
+            row=row + 1,
+            quantity="heading",
+            remedy="give degrees: multiply by 57.29578",
+        )

@@ -1,0 +1,213 @@
+"""Fixes of other formats: seven columns, tables with names, arrays; and what is wrong in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
+from strapdown.tables import GNSS, check_gnss
+from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+
+KF = [
+    "456300.000 30.44478468337 114.47186919892 21.26567 0.010 0.009 0.019",
+    "456301.000 30.44478452606 114.47186918825 21.28777 0.010 0.009 0.020",
+    "456302.000 30.44478450000 114.47186918000 21.29000 0.011 0.009 0.019",
+]
+HEAD = "time,lat,lon,alt,VN,VE,VD,north_sd,east_sd,down_sd,VN_sd,VE_sd,VD_sd"
+ROW = "45.0,15.0,100.0,1.0,2.0,-0.5,0.01,0.02,0.03,0.1,0.2,0.3"
+
+
+def written(folder, text, name="gnss.csv", encoding="utf-8"):
+    path = folder / name
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+def table_of(folder, head, rows):
+    return read_gnss(written(folder, "\n".join([head, *rows]) + "\n"))
+
+
+def test_kf_gins(tmp_path):
+    table = read_gnss(written(tmp_path, "\n".join(KF) + "\n", "gnss.txt"))
+    check_gnss(table)
+    rows = np.array([[float(f) for f in line.split()] for line in KF])
+    assert np.array_equal(table.index, rows[:, 0])
+    assert np.array_equal(table[[*GEODETIC, *POSITION_SD]].to_numpy(), rows[:, 1:])
+    assert np.isinf(table[VELOCITY_SD].to_numpy()).all()
+    assert table.attrs["clock"] == "gps-seconds-of-week" and table.attrs["gps_week"] is None
+    more = "\n".join(f"{line} 1.0 2.0 3.0 0.1 0.2 0.3" for line in KF)
+    table = read_gnss(written(tmp_path, more + "\n", "gnss.txt"))
+    assert table[[*VELOCITY, *VELOCITY_SD]].iloc[2].tolist() == [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]
+
+
+def test_the_table_itself_by_text_and_parquet(tmp_path):
+    table = table_of(tmp_path, HEAD, [f"-1.0,{ROW}", f"-0.9,{ROW}"])
+    assert list(table.columns) == GNSS
+    assert table.iloc[0].tolist() == [float(f) for f in ROW.split(",")] + [1.0]
+    assert table.attrs["clock"] == "relative"
+    table.reset_index().to_parquet(tmp_path / "gnss.parquet")
+    again = read_gnss(tmp_path / "gnss.parquet")
+    pd.testing.assert_frame_equal(again, table)
+
+
+@pytest.mark.parametrize(
+    ("head", "factors"),
+    [
+        ("# gps_sow_s,lat_deg,lon_deg,h_ell_m,vN,vE,vD,sdN,sdE,sdU,sdvN,sdvE,sdvU", {}),
+        (
+            "tow,Latitude,Longitude,Height (m),vel_north [m/s],vel_east [m/s],vel_down [m/s],"
+            "std_n,std_e,std_d,std_vn,std_ve,std_vd",
+            {},
+        ),
+        (
+            "Time [ms],lat_rad,lon_rad,alt_km,VN_km_h,VE_km_h,VU_km_h,north_sd_mm,east_sd_mm,"
+            "up_sd_mm,sdVN_cm_s,sdVE_cm_s,sdVU_cm_s",
+            {
+                "time": 1e-3,
+                "lat": 180 / np.pi,
+                "lon": 180 / np.pi,
+                "alt": 1e3,
+                **dict.fromkeys(VELOCITY, 1 / 3.6),
+                "VD": -1 / 3.6,
+                **dict.fromkeys(POSITION_SD, 1e-3),
+                **dict.fromkeys(VELOCITY_SD, 1e-2),
+            },
+        ),
+    ],
+)
+def test_names_and_units(tmp_path, head, factors):
+    numbers = [1000.0, 0.7, 0.2, 1.5, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0]
+    names = ["time", *GNSS[:-1]]
+    table = table_of(tmp_path, head, [",".join(map(str, numbers))])
+    got = table.reset_index().iloc[0]
+    for name, number in zip(names, numbers, strict=True):
+        assert got[name] == number * factors.get(name, 1.0), name
+
+
+def test_car_rtk(recordings):
+    path = recordings("car_rtk") / "part1_gnss_rtk.csv"
+    table = read_gnss(path)
+    rows = np.loadtxt(path, delimiter=",")
+    assert np.array_equal(table.index, rows[:, 0])
+    assert np.array_equal(table[GNSS[:-1]].to_numpy(), rows[:, 1:13])
+    assert set(table["quality"]) <= {4.0, 5.0}
+    assert table.attrs["clock"] == "gps-seconds-of-week"
+
+
+def test_week_dates_and_unix(tmp_path):
+    head = "week,sow,lat,lon,alt,sdn,sde,sdu"
+    table = table_of(tmp_path, head, ["2297,604799.5,1,2,3,1,1,1", "2298,0.5,1,2,3,1,1,1"])
+    assert table.index.tolist() == [604799.5, 604800.5] and table.attrs["gps_week"] == 2297
+    head = "utc,lat,lon,alt,sdn,sde,sdu"
+    table = table_of(tmp_path, head, ["2024-01-15T03:04:05.250Z,1,2,3,1,1,1"])
+    assert table.attrs["clock"] == "unix" and table.index[0] == 1705287845.25
+
+
+def test_heights_over_the_sea(tmp_path):
+    head = "time,lat,lon,altitude_msl,sdn,sde,sdu"
+    with pytest.raises(DataError, match="the height is over the sea"):
+        table_of(tmp_path, head, ["0,1,2,3,1,1,1"])
+    table = table_of(tmp_path, f"{head},geoid_separation", ["0,1,2,3,1,1,1,45.5"])
+    assert table["alt"].iloc[0] == 48.5
+
+
+def test_what_is_missing_in_a_row(tmp_path):
+    rows = [f"0,{ROW}", "1,45.0,15.0,100.0,,,,0.01,0.02,,0.1,0.2,0.3"]
+    table = table_of(tmp_path, HEAD, rows)
+    assert np.isinf(table.loc[1.0, [*VELOCITY_SD, "down_sd"]]).all()
+    assert table.loc[1.0, "north_sd"] == 0.01
+    rows = [f"{r},1" for r in (f"0,{ROW}",)] + ["1,,,,,,,,,,,,,0"]
+    table = table_of(tmp_path, f"{HEAD},quality", rows)
+    assert table.index.tolist() == [0.0]
+    assert any("left out without a place" in f.what for f in table.attrs["findings"])
+
+
+def test_speed_and_course_are_said_not_to_be_used(tmp_path):
+    table = table_of(tmp_path, "time,lat,lon,alt,speed,course,sdn,sde,sdu", ["0,1,2,3,4,5,1,1,1"])
+    assert any("speed and course" in f.what for f in table.attrs["findings"])
+
+
+def test_arrays_of_python_ins(tmp_path):
+    place = np.array([[55.0, 37.0, 150.0], [55.1, 37.1, 151.0]])
+    np.savez(tmp_path / "drive.npz", fix_time=[1.0, 2.0], fix=place)
+    with pytest.raises(DataError, match="state position_sd"):
+        read_gnss(tmp_path / "drive.npz")
+    table = read_gnss(tmp_path / "drive.npz", GnssOptions(position_sd=1.0))
+    assert np.array_equal(table[GEODETIC].to_numpy(), place)
+    assert (table[POSITION_SD].to_numpy() == 1.0).all()
+    np.savez(tmp_path / "drive.npz", fix_time=[1.0, 2.0], fix=place[:, :2])
+    with pytest.raises(DataError, match=r"shapes \(2,\) and \(2, 2\)"):
+        read_gnss(tmp_path / "drive.npz", GnssOptions(position_sd=1.0))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-8-sig", "cp1252"])
+def test_encodings(tmp_path, encoding):
+    text = f"{HEAD.replace('lat', 'lat [°]')}\n0,{ROW}\n1,{ROW}\n"
+    assert len(read_gnss(written(tmp_path, text, encoding=encoding))) == 2
+
+
+def test_repair_leaves_rows_out(tmp_path):
+    rows = [f"0,{ROW}", f"0,{ROW}", f"nan,{ROW}", "2,,15,100" + ROW[15:], f"3,{ROW}"]
+    path = written(tmp_path, "\n".join([HEAD, *rows]) + "\n")
+    with pytest.raises(DataError, match="row 4, time: its stamp is no number"):
+        read_gnss(path)
+    table = read_gnss(path, GnssOptions(repair=True))
+    assert table.index.tolist() == [0.0, 3.0]
+
+
+FAST = [f"{k},{45 + 1e-4 * k},15,100,11.1,0,0,0.01,0.01,0.01,0.1,0.1,0.1" for k in range(40)]
+
+
+def swapped_names(line):
+    fields = line.split(",")
+    return ",".join([fields[0], fields[2], fields[1], *fields[3:]])
+
+
+@pytest.mark.parametrize(
+    ("head", "rows", "message"),
+    [
+        (HEAD, [f"0,{ROW}", f"0,{ROW}"], "row 3, time: the stamp 0 s is that of a row before"),
+        (HEAD, [f"1,{ROW}", f"0,{ROW}"], "row 3, time: the stamp 0 s comes after 1 s"),
+        (HEAD, [f"0,{ROW},7"], "row 2: 14 fields, where the first line has 13"),
+        (HEAD, [f"0,{ROW.replace('0.02', 'x')}"], "row 2, east_sd: 'x' is not a number"),
+        (HEAD, [f"0,{ROW.replace('0.02', '0')}"], "row 2, east_sd: 0 is no standard deviation"),
+        (HEAD, [f"0,{ROW.replace('0.02', '-2')}"], "row 2, east_sd: -2 is no standard deviation"),
+        (HEAD, [f"0,{ROW.replace('45.0', '')}"], "row 2, lat: it is no number"),
+        (HEAD, [f"0,{ROW.replace('45.0', '95.0')}"], "row 2, lat: a latitude of 95 deg is beyond"),
+        (HEAD.replace("lat", "lat_m"), [f"0,{ROW}"], "lat: 'm' is no unit of it (column 'lat_m')"),
+        (HEAD.replace("VE", "V2", 1), [f"0,{ROW}"], "VE: it is missing, while VN is there"),
+        (HEAD.replace("lon", "x"), [f"0,{ROW}"], "missing columns: lon"),
+        (HEAD.replace("lon", "latitude"), [f"0,{ROW}"], "lat: columns 'lat' and 'latitude' could"),
+        ("time,lat,lon,alt", ["0,1,2,3"], "no standard deviations of the places are in it"),
+        (f"{HEAD},quality", [f"0,{ROW},9"], "row 2, quality: a quality of 9 is unknown"),
+        (f"{HEAD},Q", [f"0,{ROW},9"], "row 2, Q: a solution of kind 9 is unknown"),
+        (HEAD, [], "row 1: a header, and no data under it"),
+        (HEAD, [swapped_names(r) for r in FAST], "lat, lon: the velocity (11.1 m/s) is not that"),
+    ],
+)
+def test_refused(tmp_path, head, rows, message):
+    with pytest.raises(DataError) as error:
+        table_of(tmp_path, head, rows)
+    assert str(error.value).startswith("gnss.csv, ") or str(error.value).startswith("gnss.csv: ")
+    assert message in str(error.value)
+    assert error.value.finding.remedy
+
+
+def test_no_file_of_fixes(tmp_path):
+    with pytest.raises(ConfigError, match="there is no such file"):
+        read_gnss(tmp_path / "none.csv")
+    with pytest.raises(DataError, match="this is a folder"):
+        read_gnss(tmp_path)
+    with pytest.raises(DataError, match="the file is empty"):
+        read_gnss(written(tmp_path, ""))
+    with pytest.raises(DataError, match="of no known format of fixes"):
+        read_gnss(written(tmp_path, "x", "a.docx"))
+    with pytest.raises(DataError, match="no text: it holds zero bytes"):
+        read_gnss(written(tmp_path, "\0\1\2" * 100, "a.pos"))
+    with pytest.raises(ConfigError, match="'rtk' is no format of fixes"):
+        read_gnss(written(tmp_path, "x"), GnssOptions(format="rtk"))
+    with pytest.raises(ConfigError, match="is no standard deviation"):
+        GnssOptions(position_sd=0.0)

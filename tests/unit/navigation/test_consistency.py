@@ -1,0 +1,173 @@
+"""Innovations that are as expected are left in peace, and those that are not are told apart."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from strapdown.exceptions import ConfigError
+from strapdown.navigation.consistency import consistency_of, consistency_of_all, whiteness
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from innovations import LABELS, innovation_table
+
+
+def verdicts(normalised):
+    return consistency_of("gnss.position", innovation_table(normalised)).verdicts
+
+
+@pytest.mark.parametrize(("epochs", "runs"), [(60, 150), (300, 200), (1800, 100)])
+def test_rate_of_false_alarms(epochs, runs):
+    rng = np.random.default_rng(epochs)
+    tables = [innovation_table(rng.normal(size=(epochs, 3))) for _ in range(runs)]
+    wrong = sum(not consistency_of("x", table).consistent for table in tables)
+    # One in a hundred is stated; more than this number comes once in ten thousand times.
+    assert wrong <= binom.isf(1e-4, runs, 0.01)
+
+
+def test_rate_of_false_alarms_is_not_far_below_what_is_stated():
+    rng = np.random.default_rng(7)
+    wrong = sum(
+        not consistency_of(
+            "x", innovation_table(rng.normal(size=(200, 3))), false_alarm=0.5
+        ).consistent
+        for _ in range(100)
+    )
+    # Evenly divided among tests that depend on each other: well over half of what is stated.
+    assert wrong > binom.ppf(1e-4, 100, 0.25)
+
+
+@pytest.mark.parametrize("factor", [2.0, 0.5])
+def test_a_wrong_standard_deviation_is_named_with_its_factor(factor):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        found = verdicts(factor * rng.normal(size=(120, 3)))
+        size = [one for one in found if one.kind == ("understated" if factor > 1 else "overstated")]
+        assert {one.component for one in size} == set(LABELS)
+        for one in size:
+            said = float(one.what.split("scatters ")[1].split()[0])
+            # 1 / sqrt(2 n) of it is its standard deviation; five of them.
+            assert abs(said / factor - 1.0) < 5.0 / np.sqrt(240.0)
+            assert one.since == 0.0
+
+
+def test_a_bias_of_one_standard_deviation_is_of_its_component_alone():
+    rng = np.random.default_rng(2)
+    for _ in range(20):
+        found = verdicts(rng.normal((1.0, 0.0, 0.0), 1.0, (120, 3)))
+        assert found[0].kind == "bias"
+        assert found[0].component == LABELS[0]
+        assert not [one for one in found if one.component != LABELS[0]]
+        # The bias is no scatter.
+        assert {one.kind for one in found} == {"bias"}
+
+
+def test_coloured_noise_follows_itself():
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        white = rng.normal(size=(300, 3))
+        coloured = np.empty_like(white)
+        coloured[0] = white[0]
+        for k in range(1, len(white)):
+            coloured[k] = 0.5 * coloured[k - 1] + np.sqrt(0.75) * white[k]
+        found = [one for one in verdicts(coloured) if one.kind == "correlated"]
+        assert len(found) >= 2
+        assert all("+0." in one.what and "coloured" in one.meaning for one in found)
+
+
+def test_an_observation_that_is_believed_too_much_is_taken_back():
+    rng = np.random.default_rng(4)
+    white = rng.normal(size=(301, 1))
+    found = verdicts((white[1:] - white[:-1]) / np.sqrt(2.0))
+    assert found[0].kind == "correlated"
+    assert "takes back" in found[0].meaning
+
+
+def test_a_jump_is_dated():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        u = rng.normal(size=(400, 3))
+        u[250:, 1] += 1.5
+        found = verdicts(u)
+        assert found[0].kind == "change"
+        assert found[0].component == LABELS[1]
+        # The time of a jump of the mean by d standard deviations is known to a few 1/d² epochs.
+        assert abs(found[0].since - 250.0) < 15.0
+        assert found[0].p <= 0.01
+
+
+def test_what_scatters_more_from_some_time_on_is_dated_too():
+    rng = np.random.default_rng(6)
+    u = rng.normal(size=(400, 3))
+    u[200:] *= 2.5
+    found = [one for one in verdicts(u) if one.kind == "change"]
+    assert {one.component for one in found} == set(LABELS)
+    assert all(abs(one.since - 200.0) < 20.0 for one in found)
+
+
+def test_gross_errors_are_counted_and_are_not_held_against_the_filter():
+    rng = np.random.default_rng(8)
+    u = rng.normal(size=(300, 3))
+    u[30::30] = 50.0
+    out = consistency_of("x", innovation_table(u))
+    assert out.consistent
+    assert [one.kind for one in out.verdicts] == ["gross"] * 3
+    assert all(one.since == 30.0 and "9 gross errors in 300" in one.what for one in out.verdicts)
+    assert all(one.gross == 9 and one.count == 300 for one in out.components)
+    assert out.nis["nis"].max() == pytest.approx(7500.0)
+
+
+def test_numbers_of_a_run():
+    rng = np.random.default_rng(9)
+    u = rng.normal(size=(95, 2))
+    u[3, 0] = np.nan
+    out = consistency_of("x", innovation_table(u), window=30)
+    assert list(out.nis["components"][:5]) == [2, 2, 2, 1, 2]
+    assert out.nis["nis"].iloc[5] == pytest.approx(u[5] @ u[5])
+    assert out.nis["upper"].iloc[5] == pytest.approx(7.377759)
+    # Three windows and the rest.
+    assert list(out.windows["epochs"]) == [30, 30, 30, 5]
+    assert list(out.windows["since"]) == [0.0, 30.0, 60.0, 90.0]
+    first = u[:30].ravel()
+    first = first[~np.isnan(first)]
+    assert out.windows["nis"].iloc[0] == pytest.approx(np.mean(first**2))
+    one = out.components[1]
+    assert one.scale == pytest.approx(np.sqrt(np.mean(u[:, 1] ** 2)))
+    assert one.bias == pytest.approx(u[:, 1].mean())
+    assert one.bias_in_unit == pytest.approx(2.0 * u[:, 1].mean())
+    assert one.inside == pytest.approx(np.mean(np.abs(u[:, 1]) <= 1.959964))
+    assert one.scale_bounds[0] < 1.0 < one.scale_bounds[1]
+
+
+def test_whiteness_is_ljung_and_box():
+    # Of four numbers by hand: about their mean -1, 1, 1, -1, so rho_1 = -1/4 and rho_2 = -1/2.
+    rho, p = whiteness(np.array([1.0, 3.0, 3.0, 1.0]), 2)
+    assert rho == pytest.approx([-0.25, -0.5])
+    q = 4.0 * 6.0 * (0.0625 / 3.0 + 0.25 / 2.0)
+    assert p == pytest.approx(np.exp(-0.5 * q))
+
+
+def test_too_few_epochs_say_so():
+    out = consistency_of("x", innovation_table(np.zeros((4, 3))))
+    assert out.consistent is False
+    assert {one.kind for one in out.verdicts} == {"few"}
+
+
+def test_all_of_a_record():
+    table = innovation_table(np.random.default_rng(0).normal(size=(50, 3)))
+    out = consistency_of_all({"a.position": table, "b.position": table})
+    assert list(out) == ["a.position", "b.position"]
+    assert out["b.position"].name == "b.position"
+
+
+@pytest.mark.parametrize(
+    ("given", "what"), [({"window": 1}, "window"), ({"false_alarm": 0.0}, "false")]
+)
+def test_what_makes_no_sense_is_refused(given, what):
+    with pytest.raises(ConfigError, match=what):
+        consistency_of("x", innovation_table(np.zeros((50, 1))), **given)

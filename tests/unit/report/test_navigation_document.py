@@ -1,0 +1,272 @@
+"""The report of a run of navigation says what its record holds, in words and tables."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from plotly.offline import get_plotlyjs
+from tests.unit.report.navigation_records import one_epoch, record, shifted, told, without_aids
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.report.document import ChartBlock, Items, KeyFigures, Paragraph, TableBlock
+from strapdown.report.document_html import document_page
+from strapdown.report.navigation_document import navigation_document
+from strapdown.report.navigation_found import examine
+from strapdown.report.navigation_tables import (
+    end_table,
+    error_table,
+    event_table,
+    observation_table,
+    outage_table,
+    state_table,
+    withheld_table,
+)
+from strapdown.report.navigation_told import Withheld
+from strapdown.report.navigation_trust import trust
+from strapdown.report.navigation_values import (
+    distance_over_ground,
+    duration_words,
+    length_words,
+    share_words,
+)
+from strapdown.report.navigation_words import cautions, headline, key_figures
+
+
+def plain(text):
+    return text.replace("\u00a0", " ")
+
+
+def rows(block):
+    return {row[0]: [plain(cell) for cell in row[1:]] for row in block.rows}
+
+
+def test_the_headline_is_the_end_of_the_record():
+    made = record()
+    found = examine(told(made))
+    last = made.trajectory.iloc[-1]
+    said = plain(headline(found))
+    assert f"{last['lat']:.6f}°, {last['lon']:.6f}°" in said
+    assert "after 120 s and 959.2 m" in said  # 8 m/s over 119.9 s
+    assert "known to 7.34 m" in said  # 2.4477 * 3 m
+    assert "heading to 0.98°" in said  # 1.96 * 0.5 deg
+
+
+def test_the_end_stands_in_the_table():
+    made = record(place=(-33.75, -70.6, 560.0), course=200.0)
+    table = rows(end_table(examine(told(made))))
+    assert table["heading"] == ["200.00 ± 0.98°"] * 2
+    assert table["horizontal ±"] == ["7.34 m"] * 2
+    assert table["velocity north"][1] == "−7.52 ± 0.20 m/s"  # 8 cos 200
+    assert table["place"][0].startswith("−33.75")
+    assert "−70.60" in table["place"][0]
+
+
+def test_longitudes_that_went_on_are_told_within_half_a_turn():
+    made = record(place=(10.0, 179.9995, 0.0), course=90.0)
+    made.trajectory["lon"] = np.mod(made.trajectory["lon"], 360.0)
+    assert made.trajectory["lon"].iloc[-1] > 180.0
+    assert "−179.99" in plain(headline(examine(told(made))))
+
+
+def test_outages_are_told_with_their_largest_bound():
+    found = examine(told(record()))
+    assert outage_table(found).rows[0][1:] == ("50\u00a0s", "30.0\u00a0s", "73.4\u00a0m")
+    said = dict(cautions(found))
+    assert "73.4" in said["In outages the place is known less"]
+    assert plain(key_figures(found)[-1].value) == "± 73.4 m"
+    assert outage_table(examine(told(record(outage=None)))) is None
+
+
+def test_a_run_that_ends_in_an_outage_says_so():
+    found = examine(told(record(outage=(90.0, 120.0))))
+    assert any("ended without rtk" in head for head, _ in cautions(found))
+
+
+def test_observations_are_counted():
+    found = examine(told(record()))
+    (row,) = observation_table(found).rows
+    (one,) = found.agreements
+    table = found.record.innovations["rtk.position"]
+    assert row[:4] == ("rtk.position", str(len(table)), "1", "0")
+    used = table[table["weight north, m"] > 0.0]
+    squares = np.mean([used[f"nu {x}"] ** 2 / 4.0 for x in one.labels])
+    assert float(row[4]) == pytest.approx(np.sqrt(squares), abs=0.005)
+    assert one.inside
+
+
+@pytest.mark.parametrize(("factor", "word"), [(3.0, "scatters more"), (0.2, "scatters less")])
+def test_what_does_not_agree_speaks_against_it(factor, word):
+    made = record()
+    table = made.innovations["rtk.position"]
+    table[[c for c in table if c.startswith("nu ")]] *= factor
+    found = trust(examine(told(made)))
+    assert found.verdict == "reserve"
+    assert any(word in why for good, why in found.reasons if not good)
+
+
+def test_what_lasts_speaks_against_it():
+    made = record(seconds=300.0, outage=None, reject=())
+    table = made.innovations["rtk.position"]
+    table["nu north, m"] = 2.0 * np.sin(np.arange(len(table)) / 5.0) * np.sqrt(2.0)
+    found = examine(told(made))
+    assert found.agreements[0].remembers
+    assert trust(found).verdict == "reserve"
+    assert any("no noise" in head for head, _ in cautions(found))
+
+
+def test_many_rejections_speak_against_it():
+    found = trust(examine(told(record(reject=range(20)))))
+    assert any("were rejected" in why for good, why in found.reasons if not good)
+
+
+def test_a_good_run_can_be_trusted():
+    made = record()
+    found = trust(examine(told(made, truth=shifted(made.trajectory, north=1.0))))
+    assert found.verdict == "trusted", found.sentence
+    assert "100" in found.sentence
+
+
+def test_a_run_beyond_its_bounds_cannot():
+    made = record(outage=None)
+    found = examine(told(made, truth=shifted(made.trajectory, north=30.0)))
+    assert trust(found).verdict == "distrusted"
+    assert found.errors.score("horizontal").share == 0.0
+    assert rows(error_table(found))["horizontal, m"][0] == "30.0"
+
+
+def test_a_truth_of_another_time_is_refused():
+    made = record()
+    truth = made.trajectory.set_index(made.trajectory.index + 1e4)
+    truth.index.name = "time"
+    with pytest.raises(DataError, match="instant in common"):
+        examine(told(made, truth=truth))
+
+
+def test_states_are_told_with_what_was_known_before():
+    table = rows(state_table(examine(told(record()))))
+    # exp(-119 / 30) of the bound of the first mark is left.
+    assert table["gyro bias x"][2] == "98.1 %"
+    assert table["gyro bias y"][2] == "0 %"
+    assert table["rtk: time offset"][0] == "0.1250 ± 0.0036 s"
+    said = dict(cautions(examine(told(record()))))
+    assert "gyro bias y" in said["This motion did not tell everything"]
+    assert "gyro bias x" not in said["This motion did not tell everything"]
+
+
+def test_what_was_withheld_is_scored():
+    made = record()
+    given = told(
+        made,
+        withheld=(Withheld("rtk", 50.0, 80.0, 12.0, 20.0), Withheld("rtk", 1.0, 2.0, 9.0, 3.0)),
+    )
+    found = examine(given)
+    table = withheld_table(found)
+    assert [row[-1] for row in table.rows] == ["yes", "no"]
+    assert table.strong == (1,)
+    assert trust(found).verdict == "distrusted"
+
+
+def test_events_beyond_what_can_be_read_are_in_the_json():
+    made = record()
+    many = replace(made, events=made.events * 50)
+    assert "10 more stand in navigation.json" in event_table(examine(told(many))).caption
+
+
+def test_numbers_are_said_as_people_say_them():
+    assert [plain(length_words(x)) for x in (0.0213, 2.5, 13.42, 2410.0, 28400.0, 2.5e5)] == [
+        "0.021 m",
+        "2.50 m",
+        "13.4 m",
+        "2.41 km",
+        "28.4 km",
+        "250 km",
+    ]
+    assert [
+        plain(duration_words(x)) for x in (0.5, 30.25, 221.4, 1805.0, 1800.0, 7200.0, 8000.0)
+    ] == [
+        "0.50 s",
+        "30.2 s",
+        "221 s",
+        "30 min 5 s",
+        "30 min",
+        "2 h",
+        "2 h 13 min",
+    ]
+    assert [plain(share_words(x)) for x in (1.0, 0.99999, 0.974, 0.0, 1e-5)] == [
+        "100 %",
+        "99.9 %",
+        "97.4 %",
+        "0 %",
+        "0.1 %",
+    ]
+    assert distance_over_ground(record().trajectory) == pytest.approx(8.0 * 119.9)
+
+
+def words(document):
+    out = [document.title, document.subtitle]
+    for block in (*document.front, *(b for s in document.sections for b in s.blocks)):
+        match block:
+            case Paragraph(text=text):
+                out.append(text)
+            case Items(rows=those):
+                out += [f"{head} {text}" for head, text in those]
+            case KeyFigures(figures=figures):
+                out += [f"{f.value} {f.bound} {f.note}" for f in figures]
+            case TableBlock(rows=those):
+                out += [" ".join(row) for row in those]
+            case ChartBlock(chart=chart):
+                out.append(f"{chart.title} {chart.caption}")
+    return out
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda made: made,
+        without_aids,
+        one_epoch,
+        lambda made: one_epoch(without_aids(made)),
+        lambda made: replace(
+            without_aids(made),
+            sensors=made.sensors.iloc[:, :0],
+            sensors_sd=made.sensors_sd.iloc[:, :0],
+        ),
+    ],
+)
+def test_any_run_has_a_report_without_numbers_that_are_none(make):
+    document = navigation_document(told(make(record())), "out")
+    for text in words(document):
+        assert not re.search(r"\bnan\b|\binf\b|None\b(?!\.)", text), text
+    titles = [s.title for s in document.sections]
+    assert titles[0] == "The answer"
+    assert titles[-1] == "Conventions"
+
+
+def test_findings_stand_with_their_remedies():
+    made = record()
+    findings = (Finding("the velocity is late", file="rtk.csv", remedy="estimate its offset"),)
+    document = navigation_document(told(made, findings=findings), "out")
+    (section,) = [s for s in document.sections if s.slug == "findings"]
+    assert section.blocks[0].rows[0] == (
+        "rtk.csv",
+        "the velocity is late. estimate its offset.",
+    )
+
+
+def test_the_page_needs_no_network_and_is_the_same_twice(sketched):
+    given = told(record(), name="<script>alert(1)</script>.csv")
+    page = document_page(navigation_document(given, "out"))
+    assert page == document_page(navigation_document(given, "out"))
+    assert "<script>alert" not in page
+    own = page.replace(get_plotlyjs(), "")
+    assert not re.search(r'(?:src|href)="https?:', own)
+
+
+def test_a_long_run_makes_no_long_page(sketched):
+    made = record(seconds=3600.0, rate=50.0)
+    document = navigation_document(told(made), "out")
+    # Beside plotly itself, which is 4.7 MB.
+    assert len(document_page(document)) - len(get_plotlyjs()) < 1.5e6
