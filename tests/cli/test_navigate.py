@@ -103,7 +103,7 @@ def test_the_answer_is_within_its_bounds(navigated):
     assert abs(off["heading"]) < 4.0 * found["end"]["heading_sd_deg"]
     # Fixes of 0.5 m, taken together: better than a single one.
     errors = found["against"]["errors"]
-    assert errors["horizontal"]["rms"] < 0.7
+    assert errors["horizontal"]["rms_m"] < 0.7
 
 
 def test_what_is_written(navigated):
@@ -156,7 +156,7 @@ def test_a_simulation_with_outage_outliers_and_full_rate(run_cli, tmp_path, undr
     assert done.code == 0, done.err
     found = json.loads(done.out)
     # The robust rule bears the outliers of 50 standard deviations.
-    assert found["against"]["errors"]["position"]["rms"] < 2.0
+    assert found["against"]["errors"]["horizontal"]["rms_m"] < 2.0
     assert any(e["kind"] == "outage" for e in found["events"])
     csv = read_raw(tmp_path / "out" / "trajectory.csv").columns
     parquet = read_raw(tmp_path / "out" / "trajectory.parquet").columns
