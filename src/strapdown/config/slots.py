@@ -86,7 +86,6 @@ UNITS = {
     "ZeroVelocity.window": "s",
     "attenuation": "db",
     "correlation_time": "s",
-    "dive": "rad_per_m_per_s2",
     "force_sd": "m_per_s2",
     "gravity": "m_per_s2",
     "height_limits": "m",
@@ -98,7 +97,6 @@ UNITS = {
     "lever_arm": "m",
     "rate": "hz",
     "rate_sd_deg": "per_s",
-    "slip": "rad_per_m_per_s2",
 }
 
 
