@@ -1,4 +1,4 @@
-"""`strapdown navigate`: what it writes, that it is run again alike, that bad input leaves nothing."""
+"""`strapdown navigate`: what it writes, that it is run again alike, what bad input is told."""
 
 from __future__ import annotations
 
