@@ -115,7 +115,8 @@ class NavigationSiteTable(TableSpec):
 class NavigationSensorsTable(SensorsTable):
     """What is not known of the sensors, and which of it the filter estimates."""
 
-    #: Names of blocks of states; biases and their drifts, if not given.
+    #: Names of blocks of states; biases, drifts, and scale factors and misalignments that are
+    #: stated, if not given.
     states: tuple[Word, ...] | None = None
 
 

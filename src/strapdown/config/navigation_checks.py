@@ -79,6 +79,7 @@ class _Checks(SourceChecks):
         yield partial(self.begins, spec)
         for name in STAGES:
             yield partial(self.stage, spec, name)
+        yield partial(self.height, spec)
         yield partial(self.modes, spec)
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
@@ -132,8 +133,19 @@ class _Checks(SourceChecks):
     def stage(self, spec: NavigationSpec, name: str) -> None:
         self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
 
+    def height(self, spec: NavigationSpec) -> None:
+        """A height that is damped has a loop of its own."""
+        if getattr(spec.mechanization, "height", "") == "damped":
+            raise self.refuse(
+                ("mechanization", "height"),
+                "the filter has no states for the loop that damps the height",
+                'write "free", and give heights by an aid (barometer, gnss); or "held"',
+            )
+
     def modes(self, spec: NavigationSpec) -> None:
         """What ends each alignment, and what is said of one that is not there."""
+        if spec.start is not None:
+            return
         for stage in ("coarse", "fine"):
             given = getattr(spec, stage)
             ends = [n for n in ENDS if getattr(given, n, None) is not None]

@@ -18,6 +18,7 @@ from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.channels import channel_findings
 from strapdown.systems.sins.drive import run_batch
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
@@ -62,8 +63,11 @@ def run_navigation(
     """
     progress("reading", 0.02)
     source = read_navigation_source(spec)
-    looked = look_through(spec, source.imu, source.tables)
+    progress("looking through", 0.1)
     sensors = uncertainty_of(spec)
+    looked = look_through(spec, source.imu, source.tables)
+    # What is simulated has the errors that it was told to have.
+    channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
     chain = make_chain(spec, sensors)
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
 
@@ -79,6 +83,7 @@ def run_navigation(
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [
         *source.findings,
+        *channels,
         *looked,
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
