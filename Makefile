@@ -63,11 +63,13 @@ messages: $(VENV)/.test
 
 statements: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' tests/cli/test_reproduce.py \
-		tests/unit/systems/test_reproduce_tadic.py
+		tests/unit/systems/test_reproduce_tadic.py \
+		tests/unit/systems/test_reproduce_chernodarov.py
 
 pictures: $(VENV)/.test
 	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py \
-		tests/unit/systems/test_reproduce_tadic.py
+		tests/unit/systems/test_reproduce_tadic.py \
+		tests/unit/systems/test_reproduce_chernodarov.py
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

@@ -104,12 +104,15 @@ def test_the_manual_has_the_statements_of_this_code():
 
 
 @pytest.mark.slow
-def test_tadic_is_written_and_verified_like_the_other(tmp_path, run_cli):
-    out = tmp_path / "tadic"
-    found = run_cli("reproduce", "tadic", "--out", out)
+@pytest.mark.parametrize(
+    ("paper", "figures"), [("tadic", (6, 7, 8, 9)), ("chernodarov", range(4, 12))]
+)
+def test_the_longer_ones_are_written_and_verified_like_the_other(paper, figures, tmp_path, run_cli):
+    out = tmp_path / paper
+    found = run_cli("reproduce", paper, "--out", out)
     assert found.code == 0, found.err
     result = json.loads((out / "reproduction.json").read_text())
-    assert {"fig6", "fig7", "fig8", "fig9"} <= {p.stem for p in (out / "figures").iterdir()}
+    assert {f"fig{k}" for k in figures} <= {p.stem for p in (out / "figures").iterdir()}
     assert result["headline"] in found.out
     page = (out / "report.html").read_text()
     assert not re.search(r'(src|href)="(?!#)', page.split("</main>")[0])

@@ -263,9 +263,8 @@ def continuity_from(during: float, later: float, clean: float, both: float) -> S
         "maintenance of the continuity and global character of navigational determinations",
         HOLDS if holds else DOES_NOT_HOLD,
         "",
-        "Two minutes without fixes, of a unit that has been observed for five minutes of driving: "
-        "what a rest does not tell, turns and speeding up do. Continuity is judged; that a wander "
-        "azimuth knows no pole is another page's (mechanization).",
+        "Two minutes without fixes on the drive; robust, by Huber. Continuity is judged. That a "
+        "wander azimuth knows no pole is shown with the mechanization.",
         (
             Evidence("largest error in two minutes of outage", during, "m"),
             Evidence("from a minute after it", later, "m"),
