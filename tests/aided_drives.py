@@ -145,12 +145,12 @@ def run(navigator, motion, seed, tables, until=None, pieces=1):
 def error_now(navigator, motion, state):
     used = navigator.filter.mechanization
     return state_error(
-        used.nav_state(state.mechanization, state.time), truth_at(motion, state.time)
+        used.nav_state(state.engine.mechanization, state.time), truth_at(motion, state.time)
     )
 
 
 def estimate(navigator, state, name):
     """Estimates of a block, and their covariance."""
     at = navigator.filter.model.columns_of[name]
-    P = navigator.filter.physical_covariance(state.filter)
-    return state.filter.sensors[at.start - 9 : at.stop - 9], P[at, at]
+    P = navigator.filter.physical_covariance(state.engine.filter)
+    return state.engine.filter.sensors[at.start - 9 : at.stop - 9], P[at, at]

@@ -46,15 +46,19 @@ def after_outage(rule, sds):
     time, rows = town.increments()
     at = int(np.searchsorted(time, OUTAGE[1] - 0.1))
     state, _ = navigator.advance(navigator.tell(state, "gnss", table), time[:at], rows[:at])
-    used = navigator.filter.mechanization
-    P = navigator.filter.physical_covariance(state.filter)[:9, :9]
+    used, engine = navigator.filter.mechanization, state.engine
+    P = navigator.filter.physical_covariance(engine.filter)[:9, :9]
     # Along the direction in which places are known worst, and velocity and tilt with it as they
     # have grown together.
     value, vector = np.linalg.eigh(P[:2, :2])
     away = P[:, :2] @ vector[:, 1] / np.sqrt(value[1])
     away[2] = 0.0
-    moved = used.correct(state.mechanization, -sds * away)
-    state = replace(state, mechanization=moved, row=used.history_row(moved))
+    moved = used.correct(engine.mechanization, -sds * away)
+    row = used.history_row(moved)
+    engine = replace(
+        engine, mechanization=moved, row=row, open_history=np.r_[engine.open_history[:-1], [row]]
+    )
+    state = replace(state, engine=engine)
     size = sds * float(np.sqrt(value[1]))
     return size, navigator.advance(state, time[at:], rows[at:])[1]
 
@@ -123,19 +127,46 @@ def test_a_receiver_three_times_worse_than_it_says_is_found_out():
     assert ratio(run(FULL, WrongSd(position_factor=1.0 / 3.0))[1]) > 2.0
 
 
+@pytest.mark.parametrize("name", ["ned", "wander_azimuth"])
+def test_an_arm_and_an_offset_that_were_not_known_are_found(name):
+    aid = town.gnss(
+        lever_arm=(0.0, 0.0, 0.0), lever_arm_sd=1.5, time_offset_sd=0.2, time_offset=0.05
+    )
+    navigator, state = town.begun(aid, name=name)
+    last = town.run(navigator, state, town.fixes(time_offset=0.15))[1].marks[-1]
+    columns = navigator.filter.model.columns_of
+    arm, offset = (
+        slice(columns[f"gnss.{what}"].start - 9, columns[f"gnss.{what}"].stop - 9)
+        for what in ("lever_arm", "time_offset")
+    )
+    # Assumed less true: nothing less the arm, 0.05 s less 0.15 s.
+    truth = np.r_[-np.array(town.ARM), -0.1]
+    found = np.r_[last.sensors[arm], last.sensors[offset]]
+    sd = np.r_[last.sensors_sd[arm], last.sensors_sd[offset]]
+    assert np.abs(found - truth).max() / sd.max() < 4.0
+    assert (np.abs(found - truth) < 4.0 * sd).all()
+    # On a level road the height of the antenna is not told from that of the car.
+    assert (sd[[0, 1, 3]] < [0.3, 0.3, 0.03]).all()
+    assert sd[2] > 0.5
+
+
 def test_what_was_learnt_goes_on_over_a_cut():
-    navigator, state = town.begun(town.gnss(rule=TUKEY))
+    # With velocities that come late, so that an epoch is before those of earlier rows, and is told
+    # by so much before the samples.
+    aid = town.gnss(rule=TUKEY, velocity_delay=0.75, time_offset_sd=0.01)
+    navigator, state = town.begun(aid)
     table = inject_gnss_faults(town.fixes(), [Outliers(share=0.1, size=50.0)], seed=7)
+    table = table[table.index > 1.0]
     time, rows = town.increments()
-    whole, _ = run(TUKEY, Outliers(share=0.1, size=50.0))
+    whole, _ = town.run(navigator, state, table)
     told = 0
     for lo in range(0, len(time), 1234):
         end = min(lo + 1234, len(time))
-        more = int(np.searchsorted(table.index, time[end - 1], side="right"))
+        more = int(np.searchsorted(table.index, time[end - 1] + 0.8))
         if more > told:
             state = navigator.tell(state, "gnss", table.iloc[told:more])
         told = more
         state, _ = navigator.advance(state, time[lo:end], rows[lo:end])
     assert state.scales == whole.scales
-    assert (state.mechanization == whole.mechanization).all()
-    assert (state.filter.covariance == whole.filter.covariance).all()
+    assert (state.engine.mechanization == whole.engine.mechanization).all()
+    assert (state.engine.filter.covariance == whole.engine.filter.covariance).all()

@@ -37,7 +37,8 @@ BEYOND = 1.000001
 # A call hands over what belongs together:
 # - kinds: (mechanization, form, whether the height is held);
 # - model: (terms of gyros, terms of accelerometers, decay, drive, noise (2, 3), earth, options);
-# - states: (mechanization, covariance, sensors, times), which go on in place;
+# - states: (mechanization, covariance, sensors, times, newest increment without errors), which go
+#   on in place;
 # - group: (rows of the history, the first at its start; increments), of what is not closed yet;
 # - room: arrays to work in.
 
@@ -52,7 +53,7 @@ def close_group(kinds, model, states, group, count, room):
         return -1
     which, form, held = kinds
     gyro_terms, accel_terms, decay, drive, noise, earth, _ = model
-    _, covariance, sensors, times = states
+    _, covariance, sensors, times, _ = states
     open_history, open_rows = group
     f, phi, tail, q, work, matrix, level, after, whole, added = room
     q_at, up = Q_NB, -1.0
@@ -108,7 +109,7 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
     `room` is of errors of readings, (2, 7, 3).
     """
     gyro_terms, accel_terms, _, _, _, earth, options = model
-    state, _, sensors, times = states
+    state, _, sensors, times, newest = states
     open_history, open_rows = group
     closing, errors, heights = room
     made = 0
@@ -145,4 +146,5 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
         count = last
         made = end
         times[AT_STEP] = time[end - 1]
+        newest[:] = open_rows[last - 1]
     return ALL, made, count

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 
 from strapdown._kernels.covariance import dense_update
-from strapdown._kernels.earth import E2, A
+from strapdown._kernels.earth import E2, RATE, A
 from strapdown._kernels.error_loop import (
     ALL,
     AT_COVARIANCE,
@@ -30,10 +30,12 @@ from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.ned import V as V_N
 from strapdown._kernels.ned_level import ned_correct
 from strapdown._kernels.rotation import dcm_from_quat
+from strapdown._kernels.rotation_vector import cross
 from strapdown._kernels.split_increment import split_increment
 from strapdown._kernels.wander import ALT as WANDER_ALT
 from strapdown._kernels.wander import Q_WB
 from strapdown._kernels.wander import V as V_W
+from strapdown._kernels.wander_geometry import earth_axis
 from strapdown._kernels.wander_level import geodetic_from_wander, wander_correct
 
 # Of a fix: what it is of, three numbers, three variances.
@@ -58,37 +60,81 @@ def level_place(which, state, turn):
 
 
 @njit(cache=True, error_model="numpy")
-def meet_fix(which, state, earth, arm, of_place, fix, turn, z, H, R):
-    """Fill the observation of a fix: computed less measured, north, east, down.
+def swept(which, state, earth, gyro_terms, last, c, x, y, w, speed, h):
+    """Add to a velocity, and to its dependence on the errors, what an arm adds; level axes.
 
-    A place is that of an antenna `arm` away, body axes; a velocity is that of the sensors.
+    ``W x r`` of the arm r = (x, y, w), with ``W = C w_ib - w_ie`` the rate of the body relative to
+    the Earth; `c` is C_lb, `last` the newest increment.
+    """
+    if which == WANDER:
+        kx, ky, kz = earth_axis(state[0], state[1], state[2], state[3])
+    else:
+        kx, ky, kz = state[COSINE], 0.0, -state[SINE]
+    p, q, r = last[1] / last[0], last[2] / last[0], last[3] / last[0]
+    ix = c[0] * p + c[1] * q + c[2] * r
+    iy = c[3] * p + c[4] * q + c[5] * r
+    iz = c[6] * p + c[7] * q + c[8] * r
+    wx, wy, wz = ix - earth[RATE] * kx, iy - earth[RATE] * ky, iz - earth[RATE] * kz
+    sx, sy, sz = cross(wx, wy, wz, x, y, w)
+    speed[0] += sx
+    speed[1] += sy
+    speed[2] += sz
+    for j in range(3):
+        # By a turn e_j: the arm by -r x e_j, the rate of the body by -(C w_ib) x e_j.
+        ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
+        ax, ay, az = cross(wx, wy, wz, *cross(x, y, w, ex, ey, ez))
+        bx, by, bz = cross(x, y, w, *cross(ix, iy, iz, ex, ey, ez))
+        h[0, 6 + j] += bx - ax
+        h[1, 6 + j] += by - ay
+        h[2, 6 + j] += bz - az
+    for e in range(gyro_terms.shape[0]):
+        m, axis, j = int(gyro_terms[e, 0]), int(gyro_terms[e, 1]), 9 + int(gyro_terms[e, 2])
+        weight = gyro_terms[e, 3]
+        if m > 0:
+            weight *= last[m] / last[0]
+        dx, dy, dz = cross(x, y, w, c[axis], c[3 + axis], c[6 + axis])
+        h[0, j] -= weight * dx
+        h[1, j] -= weight * dy
+        h[2, j] -= weight * dz
+
+
+@njit(cache=True, error_model="numpy")
+def meet_fix(which, state, earth, gyro_terms, last, arm, of_place, fix, turn, z, h, H, R):
+    """Fill the observation of a fix of an antenna: computed less measured, north, east, down.
+
+    `arm` is that of the antenna, body axes; `h` is room to work in, as large as H.
     """
     q_at, v_at = (Q_WB, V_W) if which == WANDER else (Q_NB, V_N)
     lat, lon, alt = level_place(which, state, turn)
-    H[:, :] = 0.0
-    R[:] = fix[VARIANCE : VARIANCE + 3]
-    if not of_place:
-        for i in range(3):
-            z[i] = -fix[VALUE + i]
-            for j in range(3):
-                z[i] += turn[i, j] * state[v_at + j]
-                H[i, 3 + j] = turn[i, j]
-        return
-    z[0], z[1], z[2] = displacement(
-        lat, lon, alt, fix[VALUE], fix[VALUE + 1], fix[VALUE + 2], earth[A], earth[E2]
-    )
     c = dcm_from_quat(state[q_at], state[q_at + 1], state[q_at + 2], state[q_at + 3])
     x = c[0] * arm[0] + c[1] * arm[1] + c[2] * arm[2]
     y = c[3] * arm[0] + c[4] * arm[1] + c[5] * arm[2]
     w = c[6] * arm[0] + c[7] * arm[1] + c[8] * arm[2]
+    R[:] = fix[VARIANCE : VARIANCE + 3]
+    h[:, :] = 0.0
+    told = np.empty(3)
+    if of_place:
+        told[0], told[1], told[2] = x, y, w
+        z[0], z[1], z[2] = displacement(
+            lat, lon, alt, fix[VALUE], fix[VALUE + 1], fix[VALUE + 2], earth[A], earth[E2]
+        )
+        h[0, 0] = h[1, 1] = h[2, 2] = 1.0
+        # -[arm x]
+        h[0, 7], h[0, 8] = w, -y
+        h[1, 6], h[1, 8] = -w, x
+        h[2, 6], h[2, 7] = y, -x
+    else:
+        for i in range(3):
+            told[i] = state[v_at + i]
+            z[i] = -fix[VALUE + i]
+            h[i, 3 + i] = 1.0
+        if x != 0.0 or y != 0.0 or w != 0.0:
+            swept(which, state, earth, gyro_terms, last, c, x, y, w, told, h)
     for i in range(3):
-        a, b, d = turn[i, 0], turn[i, 1], turn[i, 2]
-        z[i] += a * x + b * y + d * w
-        H[i, 0], H[i, 1], H[i, 2] = a, b, d
-        # -C_nl [arm x]
-        H[i, 6] = d * y - b * w
-        H[i, 7] = a * w - d * x
-        H[i, 8] = b * x - a * y
+        for j in range(3):
+            z[i] += turn[i, j] * told[j]
+        for j in range(H.shape[1]):
+            H[i, j] = turn[i, 0] * h[0, j] + turn[i, 1] * h[1, j] + turn[i, 2] * h[2, j]
 
 
 @njit(cache=True, error_model="numpy")
@@ -160,11 +206,12 @@ def over_fixes(
     An instant within `same` seconds of another is the same.
     """
     which, form, _ = kinds
-    state, covariance, sensors, times = states
+    state, covariance, sensors, times, last = states
     open_history, _ = group
     earth = model[5]
     n, size = 9 + sensors.shape[0], covariance.shape[0]
-    x, z, R, H = np.empty(size), np.empty(3), np.empty(3), np.empty((3, size))
+    x, z, R = np.empty(size), np.empty(3), np.empty(3)
+    h, H = np.empty((3, size)), np.empty((3, size))
     turn, P, after = np.empty((3, 3)), np.empty((n, n)), np.empty((size, size))
     cut = np.empty((2, rows.shape[1]))
     between = np.empty((1, history.shape[1]))
@@ -221,7 +268,7 @@ def over_fixes(
         if bad >= 0:
             return BAD, made, count, done
         of_place = fixes[done, CODE] == place_code
-        meet_fix(which, state, earth, arm, of_place, fixes[done], turn, z, H, R)
+        meet_fix(which, state, earth, model[0], last, arm, of_place, fixes[done], turn, z, h, H, R)
         x[:] = 0.0
         told[done, 2] = 1.0
         if form == UD:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown._kernels.level import AXIS
+from strapdown.aiding.point_velocity import turn_of_body
 from strapdown.aiding.view import DISPLACEMENT, ROTATION, VELOCITY, View
 from strapdown.earth import gravity
 from strapdown.estimation.error_model import PHYSICAL
@@ -75,10 +76,9 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
     """
     C = view.C_lb
     r = C @ arm
-    inertial = C @ view.rate
     spin = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
-    W = inertial - spin
-    of_gyro, of_accel = _of_sensors(view)
+    turn, of_turn = turn_of_body(view)
+    W = C @ turn
     arm_at = view.place(arm_name) if view.has(arm_name) else None
     across, turning = cross_matrix(r), cross_matrix(W)
 
@@ -86,9 +86,8 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
     d_arm[:, ROTATION] = -across
     if arm_at is not None:
         d_arm[:, arm_at] = C
-    d_W = np.zeros((3, view.columns))
-    d_W[:, ROTATION] = -cross_matrix(inertial)
-    d_W[:, PHYSICAL:] = C @ of_gyro
+    d_W = C @ of_turn
+    d_W[:, ROTATION] -= turning
 
     swept = turning @ r
     d_swept = turning @ d_arm - across @ d_W
@@ -102,7 +101,7 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
     d_acc = turning @ d_swept - cross_matrix(swept) @ d_W
     d_acc[:, ROTATION] -= cross_matrix(force)
     d_acc[:, VELOCITY] -= 2.0 * cross_matrix(spin)
-    d_acc[:, PHYSICAL:] += C @ of_accel
+    d_acc[:, PHYSICAL:] += C @ _of_accel(view)
     return place, velocity, Moving(value, d_acc)
 
 
@@ -112,8 +111,7 @@ def _at(where: slice, columns: int) -> Array:
     return out
 
 
-def _of_sensors(view: View) -> tuple[Array, Array]:
-    """Errors of rate and force by the states of the sensors, (3, k)."""
-    stacked = view.model.stacked
+def _of_accel(view: View) -> Array:
+    """Errors of the force by the states of the sensors, (3, k), body axes."""
     felt = np.concatenate([[1.0], view.rate, view.force])
-    return np.tensordot(felt, stacked.gyro, 1), np.tensordot(felt, stacked.accel, 1)
+    return np.tensordot(felt, view.model.stacked.accel, 1)

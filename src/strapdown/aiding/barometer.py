@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -50,9 +50,9 @@ class Barometer(TableAid):
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    bias_sd: float = 90.0
-    walk: float = 5.0
-    correlation_time: float = 0.0
+    bias_sd: float = field(default=90.0, metadata={"unit": "m"})
+    walk: float = field(default=5.0, metadata={"unit": "m_per_sqrt_h"})
+    correlation_time: float = field(default=0.0, metadata={"unit": "s"})
 
     kind: ClassVar[str] = "barometer"
     summary: ClassVar[str] = "heights by the pressure of the air, with their bias"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -15,6 +15,7 @@ from strapdown.aiding.checks import check_number, check_numbers
 from strapdown.aiding.point_velocity import point_velocity
 from strapdown.aiding.vehicle_axes import VehicleAxes
 from strapdown.aiding.view import View
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.sensor_states import SensorStates
 
@@ -33,10 +34,10 @@ class NoSlip(WatchingAid):
     Lateral and vertical velocity of the point, in axes of the vehicle, are zero but for
 
     * what road and suspension do, `lateral_sd` and `vertical_sd`;
-    * the slip angle of the tyres, which is the force to the side that they bear, times `slip`:
-      a lateral velocity of ``slip v f_y``;
-    * the pitch of the body on its springs, which goes with the force along it: a vertical one of
-      ``dive v f_x``.
+    * the slip angle of the tyres, which grows with the force to the side that they bear, by
+      `slip_deg_per_g`: a lateral velocity of ``slip v f_y``;
+    * the pitch of the body on its springs, which grows with the force along it, by
+      `dive_deg_per_g`: a vertical one of ``dive v f_x``.
 
     These last over `correlation_time`, and to a filter every observation is new: its variance is
     that of the errors times ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``,
@@ -56,14 +57,14 @@ class NoSlip(WatchingAid):
         the vehicle moves and GNSS tells where to.
     lateral_sd, vertical_sd : float, m/s
         Of the velocities at an instant, straight on.
-    slip : float, rad/(m/s²)
-        Slip angle of the rear tyres by lateral force; 4 deg/g by default.
-    dive : float, rad/(m/s²)
-        Pitch of the body by longitudinal force; 2 deg/g by default.
+    slip_deg_per_g : float, deg/g
+        Slip angle of the rear tyres by lateral force.
+    dive_deg_per_g : float, deg/g
+        Pitch of the body by longitudinal force.
     correlation_time : float, s
     interval : float, s
         Between observations: they are at its multiples, or the first sample after.
-    largest_rate_deg : float, deg/s
+    largest_rate_deg_per_s : float, deg/s
         While the vehicle turns faster about its vertical, as it does when it skids, nothing is
         observed.
     largest_heading_sd_deg : float, deg
@@ -75,13 +76,13 @@ class NoSlip(WatchingAid):
     pitch_deg: float = 0.0
     yaw_deg: float = 0.0
     mounting_sd_deg: tuple[float, float] = (0.0, 0.0)
-    lateral_sd: float = 0.03
-    vertical_sd: float = 0.06
-    slip: float = 0.007
-    dive: float = 0.0035
-    correlation_time: float = 0.5
+    lateral_sd: float = field(default=0.03, metadata={"unit": "m_per_s"})
+    vertical_sd: float = field(default=0.06, metadata={"unit": "m_per_s"})
+    slip_deg_per_g: float = 4.0
+    dive_deg_per_g: float = 2.0
+    correlation_time: float = field(default=0.5, metadata={"unit": "s"})
     interval: float = 0.5
-    largest_rate_deg: float = 45.0
+    largest_rate_deg_per_s: float = 45.0
     largest_heading_sd_deg: float = 20.0
 
     kind: ClassVar[str] = "no_slip"
@@ -95,9 +96,9 @@ class NoSlip(WatchingAid):
             check_number(self, name, low=-360.0, high=360.0)
         for name in ("lateral_sd", "vertical_sd", "interval"):
             check_number(self, name, low=0.0, above=True)
-        for name in ("largest_rate_deg", "largest_heading_sd_deg"):
+        for name in ("largest_rate_deg_per_s", "largest_heading_sd_deg"):
             check_number(self, name, low=0.0, above=True)
-        for name in ("slip", "dive", "correlation_time"):
+        for name in ("slip_deg_per_g", "dive_deg_per_g", "correlation_time"):
             check_number(self, name, low=0.0)
 
     @property
@@ -132,14 +133,13 @@ class NoSlip(WatchingAid):
         velocity, H = axes.of_vehicle(view, self.name, velocity, H)
         C_vb = axes.now(view, self.name)
         rate, force = C_vb @ values[:3], C_vb @ values[3:6]
-        if abs(rate[2]) > math.radians(self.largest_rate_deg):
+        if abs(rate[2]) > math.radians(self.largest_rate_deg_per_s):
             return []
-        sd = np.array(
-            [
-                math.hypot(self.lateral_sd, self.slip * velocity[0] * force[1]),
-                math.hypot(self.vertical_sd, self.dive * velocity[0] * force[0]),
-            ]
-        )
+        lateral, vertical = np.radians([self.slip_deg_per_g, self.dive_deg_per_g]) * [
+            velocity[0] * force[1] / STANDARD_GRAVITY,
+            velocity[0] * force[0] / STANDARD_GRAVITY,
+        ]
+        sd = np.hypot([self.lateral_sd, self.vertical_sd], [lateral, vertical])
         R = sd**2 * self._longer()
         return [Observation(f"{self.name}.velocity", velocity[1:], H[1:], R, LABELS)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -63,7 +63,7 @@ class StandstillAid(WatchingAid):
     window : float, s
     threshold : float
         The statistic of a rest is below it: one, if the noise is as stated.
-    rate_sd_deg, force_sd : float, deg/s and m/s²
+    rate_sd_deg_per_s, force_sd : float, deg/s and m/s²
         Of the noise of one sample at rest, an idling engine included.
     gravity : float, m/s²
         Of the place, for detectors that use it.
@@ -75,10 +75,10 @@ class StandstillAid(WatchingAid):
     """
 
     detector: str = "force_variance"
-    window: float = 1.0
+    window: float = field(default=1.0, metadata={"unit": "s"})
     threshold: float = 3.0
-    rate_sd_deg: float = 0.2
-    force_sd: float = 0.05
+    rate_sd_deg_per_s: float = 0.2
+    force_sd: float = field(default=0.05, metadata={"unit": "m_per_s2"})
     gravity: float = 9.81
     interval: float = 0.5
     largest_speed: float = 0.5
@@ -92,7 +92,7 @@ class StandstillAid(WatchingAid):
                 quantity="detector",
                 remedy=nearest(str(self.detector), STANDSTILL_DETECTORS),
             )
-        for name in ("window", "threshold", "rate_sd_deg", "force_sd", "gravity"):
+        for name in ("window", "threshold", "rate_sd_deg_per_s", "force_sd", "gravity"):
             check_number(self, name, low=0.0, above=True)
         for name in ("interval", "gate"):
             check_number(self, name, low=0.0)
@@ -158,7 +158,7 @@ class StandstillAid(WatchingAid):
             return None
         rate, force = within[:, RATE].copy(), within[:, FORCE].copy()
         statistic = STANDSTILL_DETECTORS[self.detector].statistic(
-            rate, force, math.radians(self.rate_sd_deg), self.force_sd, self.gravity
+            rate, force, math.radians(self.rate_sd_deg_per_s), self.force_sd, self.gravity
         )
         if not statistic < self.threshold:
             return None

@@ -33,16 +33,16 @@ Array = NDArray[np.float64]
 class ZeroRate(StandstillAid):
     """No turn relative to the Earth, where a detector says so: the mean rate over the window.
 
-    Its variance is that of the samples in the window over their number, and `sd_deg` squared
+    Its variance is that of the samples in the window over their number, and `sd_deg_per_s` squared
     beside it; where windows overlap, as much more as each sample is used more than once.
 
     Attributes
     ----------
-    sd_deg : float, deg/s
+    sd_deg_per_s : float, deg/s
         Of the mean rate of what is called a standstill, beyond the noise: a body that sways.
     """
 
-    sd_deg: float = 0.005
+    sd_deg_per_s: float = 0.005
 
     kind: ClassVar[str] = "zero_rate"
     summary: ClassVar[str] = "no turn at a standstill that is detected: bias of the gyros"
@@ -50,7 +50,7 @@ class ZeroRate(StandstillAid):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_number(self, "sd_deg", low=0.0, above=True)
+        check_number(self, "sd_deg_per_s", low=0.0, above=True)
 
     def observe(self, view: View, values: Array) -> list[Observation]:
         """Return the rate less the Earth's, body axes, unless the velocity is far from zero."""
@@ -63,7 +63,7 @@ class ZeroRate(StandstillAid):
         H[:, ROTATION] = -C_bl @ cross_matrix(earth)
         count = float(values[COUNT])
         used = max(self.window / self.interval, 1.0) if self.interval else count
-        R = used * (values[RATE_VARIANCE] / count + math.radians(self.sd_deg) ** 2)
+        R = used * (values[RATE_VARIANCE] / count + math.radians(self.sd_deg_per_s) ** 2)
         return [Observation(f"{self.name}.rate", z, H, R, LABELS)]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -30,7 +30,7 @@ class ZeroVelocity(StandstillAid):
         independent.
     """
 
-    sd: float = 0.02
+    sd: float = field(default=0.02, metadata={"unit": "m_per_s"})
 
     kind: ClassVar[str] = "zero_velocity"
     summary: ClassVar[str] = "zero velocity at a standstill that is detected"

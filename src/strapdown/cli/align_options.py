@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,7 @@ from strapdown.exceptions import ConfigError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.formats.columns import parse_column_option
 
-__all__ = ["flag_words", "spec_of_flags"]
+__all__ = ["as_flag", "flag_words", "refused_flag", "spec_of_flags"]
 
 #: Flags by the place in a specification.
 FLAGS = {
@@ -35,7 +35,9 @@ FLAGS = {
 _STAGES = {"coarse": "--method", "prefilter": "--prefilter"}
 
 
-def flag_words(source: Path, given: Mapping[str, Any]) -> None:
+def flag_words(
+    source: Path, given: Mapping[str, Any], what: str = "the file of an alignment"
+) -> None:
     """Refuse flags beside a file that says all of it.
 
     Raises
@@ -47,7 +49,7 @@ def flag_words(source: Path, given: Mapping[str, Any]) -> None:
         return
     flag = "--" + written[0].removesuffix("_s").replace("_", "-")
     raise ConfigError(
-        "the file of an alignment says how it is run, and this is said beside it",
+        f"{what} says how it is run, and this is said beside it",
         file=source.name,
         quantity=flag,
         remedy="write it in the file; --out, --force, --json and --quiet go with both",
@@ -115,13 +117,21 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     try:
         return alignment_spec(table)
     except ValidationError as error:
-        raise _refused(error.errors()[0]) from None
+        raise refused_flag(error.errors()[0]) from None
     except ConfigError as error:
-        raise _as_flag(error) from None
+        raise as_flag(error) from None
 
 
-def _refused(error: Any) -> ConfigError:
-    """What pydantic finds in flags, in our words."""
+def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> ConfigError:
+    """What pydantic finds in flags, in our words.
+
+    Parameters
+    ----------
+    error : dict
+        One of `ValidationError.errors`.
+    flag : callable, optional
+        The flag of a place in a specification; those of ``strapdown align``, if not given.
+    """
     path = [str(p) for p in error["loc"]]
     context = error.get("ctx", {})
     if error["type"] == "missing":
@@ -133,13 +143,14 @@ def _refused(error: Any) -> ConfigError:
         remedy = context.get("remedy") or "give another value"
     if context.get("key"):
         path.append(context["key"])
-    return ConfigError(what, quantity=_flag(", ".join(path)), remedy=remedy)
+    return ConfigError(what, quantity=(flag or _flag)(", ".join(path)), remedy=remedy)
 
 
-def _as_flag(error: StrapdownError) -> StrapdownError:
+def as_flag(error: StrapdownError, flag: Callable[[str], str] | None = None) -> StrapdownError:
+    """The error with the flag in place of the place in a specification."""
     f = error.finding
     return type(error)(
-        f.what, file=f.file, row=f.row, quantity=_flag(f.quantity or ""), remedy=f.remedy
+        f.what, file=f.file, row=f.row, quantity=(flag or _flag)(f.quantity or ""), remedy=f.remedy
     )
 
 

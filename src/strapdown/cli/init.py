@@ -11,7 +11,7 @@ from strapdown.cli.log_options import AccelUnit, Axes, GyroUnit, Rate, Sampling,
 
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"
-NAVIGATE_EPILOG = "Example: strapdown init navigate log.csv --gnss fixes.csv, then strapdown navigate navigate.toml"
+NAVIGATE_EPILOG = "Example: strapdown init navigate log.csv --gnss fixes.csv"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
 
 # Of what was left out.

@@ -3,23 +3,105 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-EPILOG = "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
+from strapdown.cli.log_options import (
+    AccelUnit,
+    Axes,
+    Columns,
+    GyroUnit,
+    Rate,
+    Repair,
+    Sampling,
+    TimeUnit,
+)
+
+EPILOG = (
+    "Example: strapdown navigate log.csv --gnss fixes.csv --sensor adis16470   |   "
+    "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
+)
 MOST = 6  # findings on the terminal
-_OUT = "What to write"
+_WITH, _RUN, _OUT = "With what", "What to run", "What to write"
 
 
 def navigate(
     source: Annotated[
         Path,
-        typer.Argument(metavar="CONFIG.toml", help="The file of a run of navigation."),
+        typer.Argument(
+            metavar="LOG|CONFIG.toml",
+            help="A log of gyros and accelerometers, or the file of a run of navigation.",
+        ),
     ],
+    gnss: Annotated[
+        Path | None,
+        typer.Option(metavar="FIXES", help="Fixes of a satellite receiver.", rich_help_panel=_WITH),
+    ] = None,
+    lever_arm: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Of its antenna from the sensors, forward, right, down, m (0,0,0).",
+            rich_help_panel=_WITH,
+        ),
+    ] = None,
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE",
+            help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
+            ".toml file of your own.",
+            rich_help_panel=_WITH,
+        ),
+    ] = None,
+    lat: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG", help="Latitude at the start, without fixes.", rich_help_panel=_WITH
+        ),
+    ] = None,
+    lon: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=_WITH),
+    ] = None,
+    alt: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=_WITH),
+    ] = None,
+    heading: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG",
+            help="Heading at the start, where neither the gyros nor a course can tell it.",
+            rich_help_panel=_WITH,
+        ),
+    ] = None,
+    truth: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A trajectory to compare with.", rich_help_panel=_WITH),
+    ] = None,
+    from_s: Annotated[
+        float | None,
+        typer.Option(
+            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
+    ] = None,
+    rate: Rate = None,
+    sampling: Sampling = None,
+    columns: Columns = None,
+    gyro_unit: GyroUnit = None,
+    accel_unit: AccelUnit = None,
+    time_unit: TimeUnit = None,
+    axes: Axes = None,
+    repair: Repair = False,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (CONFIG-navigate).", rich_help_panel=_OUT),
+        typer.Option(metavar="DIR", help="Folder to make (LOG-navigate).", rich_help_panel=_OUT),
     ] = None,
     force: Annotated[
         bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
@@ -34,7 +116,9 @@ def navigate(
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
     from strapdown.bundle import check_destination, write_timing
+    from strapdown.cli.align_options import flag_words
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.navigate_options import navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.config.navigation_file import read_navigation_spec
     from strapdown.exceptions import Finding
@@ -43,10 +127,36 @@ def navigate(
 
     folder = out or Path(f"{source.resolve().stem}-navigate")
     check_destination(folder, force)
+    given: dict[str, Any] = {
+        "gnss": gnss,
+        "lever_arm": lever_arm,
+        "sensor": sensor,
+        "lat": lat,
+        "lon": lon,
+        "alt": alt,
+        "heading": heading,
+        "truth": truth,
+        "from_s": from_s,
+        "duration": duration,
+        "rate": rate,
+        "sampling": sampling,
+        "columns": columns,
+        "gyro_unit": gyro_unit,
+        "accel_unit": accel_unit,
+        "time_unit": time_unit,
+        "axes": axes,
+        "repair": repair or None,
+    }
+    own = source.suffix.lower() == ".toml"
     with progress(quiet or json) as show:
         report = Stopwatch(show)
-        spec = read_navigation_spec(source)
-        result = run_navigation(spec, source, report)
+        if own:
+            flag_words(source, given, "the file of a run")
+            spec = read_navigation_spec(source)
+        else:
+            report("looking through", 0.01)
+            spec = navigation_of_flags(source, given)
+        result = run_navigation(spec, source if own else None, report)
         seal = write_navigation(result, folder, force=force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)

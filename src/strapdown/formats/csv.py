@@ -7,7 +7,7 @@ import itertools
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,7 +124,7 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
             remedy="check that the recording was saved and copied whole",
         )
     rows, lines = _whole_lines(top.data, len(top.names), top.separator, text, name, findings)
-    columns = _parse(lines, len(top.names), top.separator)
+    columns = _parse(lines, len(top.names), top.separator, name)
     return _log(name, files, top, columns, np.array(rows), comments, findings)
 
 
@@ -321,7 +321,7 @@ def _was_cut(
     return not _NUMBER.fullmatch(fields[-1]) or short
 
 
-def _parse(lines: list[str], count: int, separator: str | None) -> Columns:
+def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Columns:
     """Parse the lines under the header, each number to the double nearest to it."""
     decimal = "," if separator != "," and _comma_is_decimal(lines, separator) else "."
     if separator is None:
@@ -330,7 +330,17 @@ def _parse(lines: list[str], count: int, separator: str | None) -> Columns:
     odd = next((line for line in lines if "0x" in line or "0X" in line), "")
     hexadecimal = [k for k, f in enumerate(fields_of(odd, separator)) if _HEX.fullmatch(f)]
     body = "\n".join(lines).encode()
-    return parsed(body, count, separator or "\t", decimal=decimal, text=hexadecimal)
+    # Between blanks a quote is a letter.
+    quote: str | Literal[False] = '"' if separator else False
+    between = separator or "\t"
+    try:
+        return parsed(body, count, between, decimal=decimal, quote=quote, text=hexadecimal)
+    except ValueError as error:
+        raise DataError(
+            f"the rows cannot be taken apart: {str(error).splitlines()[0]}",
+            file=name,
+            remedy="look for a quote without its other, and correct that row",
+        ) from None
 
 
 def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,7 @@ def parsed(
     delimiter: str,
     *,
     decimal: str = ".",
+    quote: str | Literal[False] = '"',
     text: Sequence[int] = (),
 ) -> Columns:
     """Parse lines, each number to the double nearest to it.
@@ -103,6 +104,8 @@ def parsed(
     count : int
         Columns.
     delimiter, decimal : str
+    quote : str or False
+        Around fields that hold the delimiter.
     text : sequence of int
         Columns that are left as they stand.
 
@@ -124,7 +127,9 @@ def parsed(
         read_options=pa_csv.ReadOptions(
             column_names=[str(k) for k in range(count)], use_threads=False
         ),
-        parse_options=pa_csv.ParseOptions(delimiter=delimiter, ignore_empty_lines=False),
+        parse_options=pa_csv.ParseOptions(
+            delimiter=delimiter, quote_char=quote, ignore_empty_lines=False
+        ),
         convert_options=pa_csv.ConvertOptions(
             decimal_point=decimal,
             null_values=list(NULLS),

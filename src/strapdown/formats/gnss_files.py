@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats import gnss_columns, gnss_kf_gins, gnss_pos, pyins
+from strapdown.formats import gnss_columns, gnss_kf_gins, gnss_nmea, gnss_pos, pyins
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions, table_of_fixes
 
 __all__ = ["GNSS_READERS", "GnssOptions", "GnssReader", "read_gnss"]
@@ -27,6 +27,7 @@ class GnssReader:
 #: In the order in which they are tried.
 GNSS_READERS: dict[str, GnssReader] = {
     "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
+    "nmea": GnssReader("NMEA 0183: GGA, RMC, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
     "kf-gins": GnssReader(
         "KF-GINS fixes, 7 or 13 columns without a header", gnss_kf_gins.detect, gnss_kf_gins.read
     ),

@@ -35,6 +35,7 @@ QUALITY = {0: 0, 1: 4, 2: 5, 3: 2, 4: 2, 5: 1, 6: 3, 7: 6}
 _TO_UTC = {"UTC": 0.0, "JST": -9.0 * 3600.0}
 _HEAD = re.compile(r"%\s*(GPST|UTC|JST)\b[\s,;\t]*(.*)", re.I)
 _DAYS_OF_1980 = 3657  # from 1970-01-01 to 1980-01-06
+_XYZ = ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)"]
 _AGAIN = "write it again with RTKLIB, as lat/lon/height over the ellipsoid"
 
 
@@ -171,6 +172,17 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
         )
     separator = next((s for s in ",;\t" if s in match[2]), " ")
     names = [n for n in re.split(r"[\s,;]+", match[2].strip()) if n]
+    form = next((f for f in ("(deg)", "(d'\")") if f"latitude{f}" in names), "")
+    places = [f"latitude{form}", f"longitude{form}", "height(m)"] if form else _XYZ
+    missing = [p for p in (*places, "Q") if p not in names]
+    if missing or len(set(names)) < len(names):
+        raise DataError(
+            f"the line that names the columns is damaged: it names {', '.join(names)}",
+            file=file,
+            row=row,
+            quantity=", ".join(missing) or None,
+            remedy=_AGAIN,
+        )
     return _Layout(match[1].upper(), names, separator, row)
 
 
@@ -206,6 +218,13 @@ def _columns(
             )
         )
         plain, widths = plain[:-1], widths[:-1]
+    if not plain:
+        raise DataError(
+            "its only line under the header is cut",
+            file=file,
+            row=held[0][0],
+            remedy="copy the file again",
+        )
     for (row, _), width in zip(plain, widths, strict=True):
         if width != len(names):
             raise DataError(
@@ -221,7 +240,7 @@ def _columns(
     columns = columns_at_once(body, len(names), None) if body.isascii() else None
     if columns is None or any(c.dtype.kind not in "iuf" for c in columns):
         _refuse_words(plain, names, file)
-    assert columns is not None
+        columns = list(np.array(body.split(), dtype=np.float64).reshape(-1, len(names)).T)
     return {n: np.asarray(c, dtype=np.float64) for n, c in zip(names, columns, strict=True)}, rows
 
 
@@ -303,7 +322,7 @@ def _level(named: dict[str, Array], columns: dict[str, Array]) -> _Four:
 
 
 def _ecef(named: dict[str, Array]) -> _Four:
-    xyz = _stack(named, ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)"])
+    xyz = _stack(named, _XYZ)
     assert xyz is not None
     place = geodetic_from_ecef(xyz)
     to_level = q_ne(place[:, 0], place[:, 1])

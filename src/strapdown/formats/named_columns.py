@@ -15,7 +15,7 @@ from strapdown.formats import read_raw
 from strapdown.formats.recording import RawLog
 from strapdown.tables import NED, POSITION_SD
 
-__all__ = ["read_reference_path"]
+__all__ = ["columns_of", "read_reference_path"]
 
 Array = NDArray[np.float64]
 
@@ -29,10 +29,14 @@ UNITS: dict[str, tuple[str, float]] = {
     "deg": ("deg", 1.0),
     "m/s": ("m/s", 1.0),
     "km/h": ("m/s", 1.0 / 3.6),
+    "Pa": ("Pa", 1.0),
+    "hPa": ("Pa", 100.0),
+    "mbar": ("Pa", 100.0),
+    "kPa": ("Pa", 1000.0),
 }
 _HEAD = re.compile(r"\s*([A-Za-z][A-Za-z_ ]*?)\s*(?:[\[(]\s*([^\])]+?)\s*[\])])?\s*")
 _ENDINGS = {"_m_per_s": "m/s", "_km_per_h": "km/h", "_mm": "mm", "_ms": "ms", "_deg": "deg"}
-_ENDINGS |= {"_m": "m", "_s": "s"}
+_ENDINGS |= {"_hpa": "hPa", "_kpa": "kPa", "_pa": "Pa", "_m": "m", "_s": "s"}
 
 
 def read_reference_path(path: str | Path) -> pd.DataFrame:
@@ -58,7 +62,7 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
     """
     raw = read_raw(Path(path))
     units = {"time": "s"} | dict.fromkeys([*NED, *POSITION_SD], "m")
-    found = _columns(raw, units, ["time", *NED])
+    found = columns_of(raw, units, ["time", *NED])
     has_sd = [name for name in POSITION_SD if name in found]
     if has_sd and len(has_sd) < len(POSITION_SD):
         missing = next(name for name in POSITION_SD if name not in found)
@@ -75,8 +79,26 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
     return table
 
 
-def _columns(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> dict[str, Array]:
-    """Columns by their name, in the units of the tables."""
+def columns_of(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> dict[str, Array]:
+    """Return columns by their name, in the units of the tables.
+
+    Parameters
+    ----------
+    raw : RawLog
+    units : mapping of str to str
+        Unit of each column that there may be.
+    wanted : sequence of str
+        Those that there must be.
+
+    Returns
+    -------
+    dict of str to ndarray, (n,)
+
+    Raises
+    ------
+    DataError
+        A column is missing, of an unknown unit, or holds what is no number.
+    """
     by_lower = {name.lower(): name for name in units}
     found: dict[str, Array] = {}
     for head, values in raw.columns.items():

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
 from strapdown.formats import npz
+from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.recording import RawLog
 from strapdown.tables import trajectory_table
@@ -133,4 +134,6 @@ def read_truth(path: Path) -> pd.DataFrame:
         As `read`, or as `trajectory_table`.
     """
     time, truth = _arrays(path, "time", "truth", 9)
-    return trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)
+    table = trajectory_table(time, truth[:, :3], truth[:, 3:6], truth[:, 6:], source=path.name)
+    table.attrs["findings"] = ()
+    return with_clock(table, Clock(RELATIVE))

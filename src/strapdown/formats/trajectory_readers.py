@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import csv, parquet, pyins, trajectory_nav
+from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
@@ -69,7 +70,8 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         A Trajectory table. Names may carry a unit: ``lat_deg``, ``Latitude (rad)``, ``vel_north
         [m/s]``, ``time_ms``; without one degrees, metres and seconds are taken. A velocity up is
         turned. Dates count in seconds from 1970. ``attrs``: ``source``, the name of the file;
-        ``ellipsoid``, where a comment states it, or None; ``findings``, a tuple of Finding.
+        ``ellipsoid``, where a comment states it, or None; its clock (`clocks`); ``findings``, a
+        tuple of Finding.
 
     Raises
     ------
@@ -114,6 +116,9 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     )
     with path.open("rb") as stream:
         stated = _ELLIPSOID.search(stream.read(4096).decode("utf-8", "replace"))
+    first = float(values["time"][0])
+    dated = raw.columns[found["time"].source].dtype.kind in "MO"
+    with_clock(table, Clock(clock_of_name(found["time"].source, first, dated=dated)))
     table.attrs["ellipsoid"] = stated.group(1) if stated else None
     table.attrs["findings"] = (*raw.findings, *judged)
     return table

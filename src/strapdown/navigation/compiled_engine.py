@@ -112,7 +112,14 @@ class CompiledEngine(Engine):
         self._sensors = state.filter.sensors.copy()
         self._times = np.array([state.filter.time, state.time])
         self.mechanization = state.mechanization.copy()
-        self._states = (self.mechanization, self._covariance, self._sensors, self._times)
+        self._newest = state.last.copy()
+        self._states = (
+            self.mechanization,
+            self._covariance,
+            self._sensors,
+            self._times,
+            self._newest,
+        )
         self._group = (np.empty((LARGEST_GROUP + 1, used.row)), np.empty((LARGEST_GROUP, 10)))
         closing = (
             np.empty((9, width)),
@@ -261,10 +268,9 @@ class CompiledEngine(Engine):
         if why == kernel.BAD:
             raise self._no_covariance()
         self._note()
-        self.time = float(self._times[kernel.AT_STEP])
+        self.time, self.last = float(self._times[kernel.AT_STEP]), self._newest.copy()
         if self._count:
             self.row = self._group[0][self._count].copy()
-            self.last = self._group[1][self._count - 1].copy()
         else:
             self.row = self.filter.row
 

@@ -110,7 +110,7 @@ class Navigator:
             return None
         aid = self.aids[0]
         plain = aid.rule is None and self.filter.rule is None and not aid.states()
-        return aid if plain and (not aid.use_velocity or not any(aid.lever_arm)) else None
+        return aid if plain else None
 
     @cached_property
     def by_name(self) -> dict[str, Aid]:

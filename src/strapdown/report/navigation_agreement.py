@@ -148,9 +148,9 @@ def agreements(record: NavigationRecord) -> tuple[Agreement, ...]:
 
 def chi_square_far(freedom: float) -> float:
     """Quantile of chi-square that as few exceed as exceed three standard deviations."""
-    from scipy.stats import chi2, norm
+    from scipy.special import chdtri, ndtr
 
-    return float(chi2.isf(2.0 * norm.sf(3.0), freedom))
+    return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
 
 
 def _agreement(name: str, table: pd.DataFrame) -> Agreement:

@@ -129,24 +129,34 @@ def velocity_chart(told: NavigationTold) -> Chart:
 
 def attitude_chart(told: NavigationTold) -> Chart:
     """Roll, pitch and heading with their bounds."""
-    panels = tuple(_state_panel(told, name, name, f"{name}, deg") for name in EULER)
+    heading, marks, said = heading_shown(told.record)
+    panels = [_state_panel(told, name, name, f"{name}, deg") for name in EULER[:2]]
+    panels.append(_state_panel(told, "heading", "heading", "heading, deg", (heading, marks)))
     return over_time(
         "attitude",
         "Attitude",
-        heading_shown(told.record)[2],
-        panels,
+        said,
+        tuple(panels),
         told.record,
     )
 
 
-def _state_panel(told: NavigationTold, column: str, error: str, label: str) -> Panel:
-    """A quantity of the trajectory, its bound at the marks, and the truth where there is one."""
+def _state_panel(
+    told: NavigationTold,
+    column: str,
+    error: str,
+    label: str,
+    shown: tuple[Array, Array] | None = None,
+) -> Panel:
+    """A quantity of the trajectory, its bound at the marks, and the truth where there is one.
+
+    What is shown of it over the trajectory and at the marks is given where it is not the column.
+    """
     record = told.record
     time = record.trajectory.index.to_numpy(dtype=np.float64)
-    values = record.trajectory[column].to_numpy(dtype=np.float64)
-    here = at_marks(record, column)
-    if column == "heading":
-        values, here, _ = heading_shown(record)
+    if shown is None:
+        shown = record.trajectory[column].to_numpy(dtype=np.float64), at_marks(record, column)
+    values, here = shown
     lines = [curve("navigated", time, values, BLUE, width=1.3, buckets=BUCKETS)]
     if told.truth is not None:
         lines.append(_true(told, column, values))

@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.exceptions import Finding
+from strapdown.navigation.record import NavigationRecord
 from strapdown.report.navigation_agreement import Agreement
 from strapdown.report.navigation_conventions import CONVENTIONS
 from strapdown.report.navigation_errors import Score
 from strapdown.report.navigation_found import NavigationFound, examine
 from strapdown.report.navigation_result import told_of
 from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_values import distance_over_ground, plane_bound
-from strapdown.report.navigation_words import cautions, headline, longest_outages
+from strapdown.report.navigation_values import distance_over_ground, plane_bound, worst_within
+from strapdown.report.navigation_words import cautions, headline
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
@@ -97,15 +98,7 @@ def navigation_json(
             for name in record.sensors.columns
         },
         "observations": {one.name: _innovations(one) for one in found.agreements},
-        "outages": [
-            {
-                "aid": aid,
-                "from_s": span.begin,
-                "to_s": span.end,
-                "largest_horizontal_bound_95_m": _number(bound),
-            }
-            for aid, span, bound in longest_outages(found)
-        ],
+        "outages": _outages(record),
         "withheld": [
             {
                 "aid": w.aid,
@@ -152,6 +145,24 @@ def _against(found: NavigationFound) -> dict[str, Any] | None:
         "nees_of": errors.freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
     }
+
+
+def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
+    """Each with the largest bound at a mark in it; None where there is no mark."""
+    out = []
+    for aid, spans in record.outages.items():
+        for span in spans:
+            worst = worst_within(record, span)
+            bound = None if worst is None else _number(worst[0])
+            out.append(
+                {
+                    "aid": aid,
+                    "from_s": span.begin,
+                    "to_s": span.end,
+                    "largest_horizontal_bound_95_m": bound,
+                }
+            )
+    return out
 
 
 def _score(score: Score) -> dict[str, Any]:

@@ -27,7 +27,7 @@ __all__ = ["ellipse_rows", "plan_chart"]
 
 Array = NDArray[np.float64]
 
-MOST_POINTS, MOST_FIXES = 1500, 600
+MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # From here on a plan is in kilometres.
 _FAR = 20e3
 # Ellipses: so many at ends of outages, and along the way; the largest as a share of the view.
@@ -36,6 +36,8 @@ _AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.05
 _BAR, _ARROW, _CORNER = 0.12, 0.05, 0.22
 # Height of the plan over its width, at most.
 _TALL = 0.9
+# A letter and a line of text, as shares of the width and of the height.
+_LETTER, _TEXT = 0.0082, 0.04
 # What moves less has no path, m.
 NO_PATH = 0.05
 
@@ -113,10 +115,18 @@ def plan_chart(told: NavigationTold) -> Chart | None:
 def _rows(told: NavigationTold) -> NDArray[np.intp]:
     """Rows that keep the course, and those at which a mode or an outage begins or ends."""
     table = told.record.trajectory
-    rows = thin(table, MOST_POINTS, told.ellipsoid).rows
+    rows = _course(table, told)
     spans = [*told.record.modes, *(s for v in told.record.outages.values() for s in v)]
     edges = np.searchsorted(table.index.to_numpy(), [t for s in spans for t in (s.begin, s.end)])
     return np.unique(np.concatenate([rows, np.clip(edges, 0, len(table) - 1)]))
+
+
+def _course(table: pd.DataFrame, told: NavigationTold) -> NDArray[np.intp]:
+    """Rows that keep the course, the last among them."""
+    # No vehicle leaves its course between samples of so many a run.
+    step = max(1, len(table) // MOST_SAMPLES)
+    rows = step * thin(table.iloc[::step], MOST_POINTS, told.ellipsoid).rows
+    return np.append(rows, len(table) - 1) if rows[-1] < len(table) - 1 else rows
 
 
 def _with_margin(view: View) -> View:
@@ -226,7 +236,7 @@ def _truth(plane: _Plane) -> list[Line]:
     within = truth[(truth.index >= time[0]) & (truth.index <= time[-1])]
     if within.empty:
         return []
-    rows = thin(within, MOST_POINTS, plane.told.ellipsoid).rows
+    rows = _course(within, plane.told)
     return [Line("truth", *plane.of(within.iloc[rows]), BLACK, "dot", 1.2)]
 
 
@@ -331,7 +341,7 @@ def _labels(
     words = tuple(
         f"{length_words(float(bounds[k]))} after {duration_words(s.end - s.begin)}" for k, s in ends
     )
-    taken = [np.column_stack([m.x, m.y]) for m in marks if m.labels]
+    taken = [_text(m, view) for m in marks if m.labels]
     obstacles = np.vstack([view.corners, np.column_stack(path)[:: max(1, path[0].size // 150)]])
     places = place_labels(points[:, 0], points[:, 1], words, np.vstack([obstacles, *taken]))
     return [
@@ -348,6 +358,18 @@ def _labels(
             legend=False,
         )
     ]
+
+
+def _text(mark: Line, view: View) -> Array:
+    """Points on the labels of marks, about where they stand, (n, 2)."""
+    letter, line = _LETTER * view.width, _TEXT * float(view.high[1] - view.low[1])
+    found = [np.column_stack([mark.x, mark.y])]
+    for x, y, label, (side, rise) in zip(mark.x, mark.y, mark.labels, mark.places, strict=True):
+        length = letter * len(label)
+        left = x + side * 1.5 * letter - 0.5 * (1 - side) * length
+        along = np.linspace(left, left + length, 5)
+        found.append(np.column_stack([along, np.full(5, y + rise * line)]))
+    return np.vstack(found)
 
 
 def _scale(view: View, path: tuple[Array, Array], unit: str) -> list[Line]:

@@ -54,6 +54,8 @@ def strip(record: NavigationRecord) -> Panel | None:
     begins = [float(time[0]), *(m.begin for m in record.modes)]
     finishes = [float(time[-1]), *(m.end for m in record.modes)]
     whole = Span("", min(begins), max(finishes))
+    # Before that aids were not used for navigation, but for an alignment.
+    going = Span("", float(time[0]), float(time[-1]))
     rows: list[str] = []
     fills: list[Fill] = []
     # From end to end, whatever stands in the rows.
@@ -67,7 +69,7 @@ def strip(record: NavigationRecord) -> Panel | None:
         at = float(len(rows))
         rows.append(aid)
         out = record.outages.get(aid, ())
-        used = _between(out, whole) if aid in record.outages else _stretches(_epochs(record, aid))
+        used = _between(out, going) if aid in record.outages else _stretches(_epochs(record, aid))
         fills.append(_bar("used", used, at, 0.3, GREEN))
         if out:
             fills.append(_bar("outage", out, at, 0.13, VERMILLION))

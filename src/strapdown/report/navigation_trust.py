@@ -66,8 +66,9 @@ def _short(found: NavigationFound) -> str:
     if used:
         worst = max(used, key=lambda a: abs(a.ratio - 1.0))
         parts.append(
-            f"{worst.name} scatters {plain(worst.ratio, 2)} times as much as was expected"
-            + (f", the farthest off of {len(used)}" if len(used) > 1 else "")
+            "what was observed scatters as it was expected to "
+            f"({'' if len(used) == 1 else 'farthest off: '}{worst.name}, "
+            f"{plain(worst.ratio, 2)} times as much)"
         )
     if not parts:
         return "nothing was observed that could speak for it or against it"

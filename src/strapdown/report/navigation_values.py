@@ -111,7 +111,7 @@ def unwrapped(heading: Array) -> Array:
     """Headings in deg without jumps, the first of them within 0 to 360."""
     if not heading.size:
         return heading
-    whole = np.degrees(np.unwrap(np.radians(heading)))
+    whole = np.unwrap(heading, period=360.0)
     return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
 
 
@@ -121,8 +121,9 @@ def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
     It goes on over north, unless it turns so often that nothing could be read; then NaN breaks it
     there.
     """
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
     values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
-    marks = at_marks(record, "heading")
+    marks = np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
     if np.ptp(values) <= MOST_TURN:
         return values, marks, "The heading goes on over north, so that no turn breaks it."
     return (
@@ -133,11 +134,9 @@ def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
 
 
 def at_marks(record: NavigationRecord, column: str) -> Array:
-    """A column of the trajectory at the marks of the covariance; the heading unwrapped."""
+    """A column of the trajectory, but for the heading, at the marks of the covariance."""
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     values = record.trajectory[column].to_numpy(dtype=np.float64)
-    if column == "heading":
-        values = unwrapped(values)
     return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
 
 

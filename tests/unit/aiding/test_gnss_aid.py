@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,10 @@ def test_every_column_is_the_central_difference_of_the_nonlinear_observation(nam
     for row in rows_of(AID, table_of([55.0001, 37.0001, 310.0], [29.0, -19.0, 0.0])):
         H = AID.observe(seen(used, model, state, base), row)[0].H
         for j in range(model.physical_size):
+            if row[0] and j == view.place("rtk.time_offset").start:
+                # To a velocity the offset is noise, and no column.
+                assert not H[:, j].any()
+                continue
             step = 1e-4 if j >= 6 else 1e-1
             error = np.zeros(model.physical_size)
             error[j] = step
@@ -136,6 +142,22 @@ def test_an_offset_of_time_is_met_to_the_second_order():
         assert np.abs(z[1]).max() < jerk * late**2 / 2.0 + 2.0 * speed**2 / 6.3e6 * late
         # And without the second order it would not be met.
         assert 0.5 * np.linalg.norm(acceleration) * late**2 > 10.0 * jerk * late**3 / 6.0
+
+
+def test_shaking_tells_nothing_of_the_offset():
+    view = replace(view_of("ned"), covariance_of=lambda: np.eye(view_of("ned").columns) * 0.04)
+    row = rows_of(AID, table_of([55.0, 37.0, 300.0], [30.0, -20.0, 1.0], sd=0.1))[1]
+    still, shaken = (
+        AID.observe(replace(view, force=FORCE + more), row)[0]
+        for more in (np.zeros(3), np.array([3.0, 0.0, 0.0]))
+    )
+    assert (still.z == shaken.z).all()
+    # An acceleration of 3 m/s² times 0.2 s, in one direction, beside what there was.
+    assert still.R.min() >= 0.01
+    assert shaken.R.sum() > still.R.sum()
+    plain = replace(AID, time_offset_sd=0.0)
+    (told,) = plain.observe(view_of("ned", plain), row)
+    assert np.abs(told.R - 0.01).max() < 1e-15
 
 
 def test_epochs_are_where_the_fixes_were_made():

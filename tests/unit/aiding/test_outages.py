@@ -47,7 +47,13 @@ def attitude(error):
 #: The aid, what it is told, the end of the outage, what is compared, and the part that is left of
 #: it at most: median of the runs, over that without the aid.
 CASES = {
-    "no_slip": (NoSlip(name="aid", slip=0.0, dive=0.0), None, 100.0, horizontal, 0.7),
+    "no_slip": (
+        NoSlip(name="aid", slip_deg_per_g=0.0, dive_deg_per_g=0.0),
+        None,
+        100.0,
+        horizontal,
+        0.7,
+    ),
     "odometer": (
         Odometer(name="aid"),
         lambda seed: simulate_odometer(drive(), WheelSpeed(2.0, scale=0.01), seed=seed),
@@ -113,7 +119,7 @@ def test_a_compass_keeps_a_heading_that_nothing_else_tells():
 
 def test_the_rates_of_a_rest_keep_the_attitude_of_what_follows():
     gnss = Gnss(name="gnss")
-    still = ZeroRate(name="aid", sd_deg=1e-4)
+    still = ZeroRate(name="aid", sd_deg_per_s=1e-4)
     alone = medians((gnss,), None, 60.0, attitude, lost=11.0)
     aided = medians((gnss, still), None, 60.0, attitude, lost=11.0)
     assert aided < 0.8 * alone, (aided, alone)

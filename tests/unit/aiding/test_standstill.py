@@ -112,7 +112,11 @@ def test_a_window_is_as_long_as_it_says_and_of_the_past():
     rate, force = rest(600, 7)
     force[300] += 20.0
     aid = ZeroVelocity(
-        name="stop", window=1.0, interval=0.0, force_sd=FORCE_SD, rate_sd_deg=math.degrees(RATE_SD)
+        name="stop",
+        window=1.0,
+        interval=0.0,
+        force_sd=FORCE_SD,
+        rate_sd_deg_per_s=math.degrees(RATE_SD),
     )
     time, rows = steps(rate, force)
     found = times_of(aid, time, rows)
@@ -141,7 +145,7 @@ def test_epochs_are_an_interval_apart_on_the_multiples_of_it():
 
 def test_stops_of_a_drive_are_found():
     """On multiples of half a second, of which the window is within the rest."""
-    aid = ZeroVelocity(name="stop", force_sd=0.01, rate_sd_deg=0.1)
+    aid = ZeroVelocity(name="stop", force_sd=0.01, rate_sd_deg_per_s=0.1)
     found = times_of(aid, *increments_of(drive(), 0))
     expected = np.concatenate([np.arange(1.5, 12.1, 0.5), np.arange(109.5, 119.9, 0.5)])
     assert np.isin(np.round(expected, 6), np.round(found, 6)).all()
@@ -149,7 +153,7 @@ def test_stops_of_a_drive_are_found():
 
 def test_steady_travel_is_not_taken_for_a_rest():
     """Along a straight road at constant speed the detector is satisfied, and the velocity not."""
-    aid = ZeroVelocity(name="stop", force_sd=0.01, rate_sd_deg=0.1)
+    aid = ZeroVelocity(name="stop", force_sd=0.01, rate_sd_deg_per_s=0.1)
     time, rows = increments_of(drive(), 0)
     assert ((times_of(aid, time, rows) > 62.0) & (times_of(aid, time, rows) < 70.0)).sum() > 5
     navigator = navigator_of((Gnss(name="gnss"), aid))

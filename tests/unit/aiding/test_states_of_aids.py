@@ -133,8 +133,8 @@ def mountings(seed):
             mounting_sd_deg=(2.0, 2.0),
             lateral_sd=1e-3,
             vertical_sd=1e-3,
-            slip=0.0,
-            dive=0.0,
+            slip_deg_per_g=0.0,
+            dive_deg_per_g=0.0,
             correlation_time=0.0,
         ),
     )
@@ -176,7 +176,7 @@ def test_mountings_are_found():
 
 def resting(seed):
     """A rest of 12 s without anything else: the bias of the gyros."""
-    navigator = navigator_of((ZeroVelocity(name="stop"), ZeroRate(name="still", sd_deg=1e-5)))
+    navigator = navigator_of((ZeroVelocity(name="stop"), ZeroRate(name="still", sd_deg_per_s=1e-5)))
     state, _ = run(navigator, drive(), seed, {}, until=12.0)
     rng = np.random.default_rng([seed, 1])
     return differences(navigator, state, {"gyro_bias": GYRO_BIAS * rng.standard_normal(3)})

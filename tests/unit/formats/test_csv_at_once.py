@@ -62,3 +62,8 @@ def test_numbers_are_the_nearest_doubles():
 def test_runs_of_blanks(run):
     gap = b" " * run
     assert single_blanks(gap + b"a" + gap + b"b" + gap + b"\n" + gap + b"c\n") == b"a b\nc\n"
+
+
+def test_between_blanks_a_quote_is_a_letter():
+    log = csv.parse(b'4.5 5 6\n1 "2 3\n', "x", ())
+    assert log.columns["column 2"].tolist() == ["5", '"2']

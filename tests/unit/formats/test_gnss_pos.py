@@ -147,6 +147,10 @@ def test_zero_means_unknown(tmp_path):
             },
             "row 3, lat, lon: it holds the way from the base station",
         ),
+        (
+            {"header": LEVEL.replace(" height(m)", " heit(m)")},
+            "row 3, height(m): the line that names the columns is damaged",
+        ),
         ({"header": "nothing of use"}, "no line names its columns"),
         ({"rows": []}, "row 3: a header, and no solution under it"),
         ({"rows": [row(), row(later(1)) + " 1.0", row(later(2))]}, "row 5: 20 numbers"),
@@ -186,3 +190,10 @@ def test_a_file_that_is_cut(tmp_path):
     table = read_gnss(path)
     assert len(table) == 1
     assert [f.row for f in table.attrs["findings"] if "is cut" in f.what] == [5]
+
+
+def test_a_file_of_one_line_that_is_cut(tmp_path):
+    path = pos(tmp_path, [row()])
+    path.write_bytes(path.read_bytes()[:-60])
+    with pytest.raises(DataError, match=r"row 4: its only line under the header is cut"):
+        read_gnss(path)

@@ -8,7 +8,7 @@ import pytest
 
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
-from strapdown.formats.clocks import GPS, Clock, clock_of, with_clock
+from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of, with_clock
 from strapdown.formats.decimal_rows import write_decimals
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.formats.trajectory_writers import TrajectoryFileOptions, write_trajectory
@@ -144,6 +144,7 @@ def test_arrays_of_python_ins(tmp_path):
     assert np.array_equal(recording.imu[[*GYRO, *ACCEL]].to_numpy(), imu)
     assert recording.imu.attrs["sampling"] == "instantaneous"
     truth = read_trajectory(tmp_path / "drive.npz")
+    assert truth.attrs["findings"] == () and clock_of(truth) == Clock(RELATIVE)
     assert np.array_equal(truth.to_numpy(), table.to_numpy())
     np.savez(tmp_path / "drive.npz", time=table.index, imu=imu[:, :5])
     with pytest.raises(DataError, match=r"shapes \(2000,\) and \(2000, 5\)"):

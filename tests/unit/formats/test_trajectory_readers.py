@@ -52,7 +52,14 @@ def test_our_own_files_come_back_to_the_bit(tmp_path):
     assert np.array_equal(back.to_numpy(), track.to_numpy())
     assert np.array_equal(back.index, track.index)
     assert list(back.columns) == TRAJECTORY
-    assert back.attrs == {"source": "track.csv", "ellipsoid": "pz90.11", "findings": ()}
+    assert back.attrs == {
+        "source": "track.csv",
+        "ellipsoid": "pz90.11",
+        "findings": (),
+        "clock": "relative",
+        "clock_origin": 0.0,
+        "gps_week": None,
+    }
 
 
 def test_random_numbers_come_back_to_the_bit(tmp_path):

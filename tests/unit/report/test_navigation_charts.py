@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.unit.report.navigation_records import (
@@ -25,7 +27,7 @@ from strapdown.report.navigation_innovation_charts import innovation_chart, nis_
 from strapdown.report.navigation_plan import ellipse_rows, plan_chart
 from strapdown.report.navigation_strip import strip
 from strapdown.report.navigation_thinning import broken, kept_rows, thin_fill
-from strapdown.report.navigation_values import at_marks, heading_shown, plane_bound, unwrapped
+from strapdown.report.navigation_values import heading_shown, plane_bound, unwrapped
 from strapdown.report.plotly_chart import figure
 
 
@@ -155,7 +157,9 @@ def test_headings_go_on_over_north():
     fill = panel.fills[0]
     at = made.sd.index.get_loc(100.0)
     middle = 0.5 * (fill.low + fill.high)[fill.x == 100.0]
-    assert middle == pytest.approx(at_marks(made, "heading")[at], abs=1e-9)
+    # Sample 1000 of those that go on by 0.02 deg each; `at` is the mark of that instant.
+    assert middle == pytest.approx(350.0 + 0.02 * 999, abs=1e-9)
+    assert heading_shown(made)[1][at] == pytest.approx(350.0 + 0.02 * 999, abs=1e-9)
 
 
 def test_a_heading_that_turns_and_turns_is_broken_at_north():
@@ -195,6 +199,15 @@ def test_the_strip_shows_modes_aids_and_what_was_rejected():
     (lost,) = named(panel, "rejected")
     assert lost.x.tolist() == [21.0]
     assert strip(without_aids(record())) is None
+
+
+def test_before_navigation_no_aid_is_used():
+    made = record(outage=None)
+    aligned = (Span("coarse", -60.0, -30.0), Span("fine", -30.0, 0.1))
+    panel = strip(replace(made, modes=(*aligned, *made.modes)))
+    fills = {fill.name: fill for fill in panel.fills}
+    assert fills["coarse"].x.tolist() == [-60.0, -30.0]
+    assert fills["used"].x.tolist() == [0.1, 120.0]
 
 
 def test_the_strip_of_an_aid_that_comes_and_goes():

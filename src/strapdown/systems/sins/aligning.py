@@ -118,7 +118,10 @@ def _table(values: Array, time: Array, columns: list[str], state: ChainState) ->
 
 def _fixes(chain: Chain, state: ChainState) -> pd.DataFrame | None:
     name = chain.fixes_from
-    return None if name is None else fixes_until(state.told[name], state.time + INSTANT)
+    if name is None:
+        return None
+    offset = float(getattr(chain.navigator.by_name[name], "time_offset", 0.0))
+    return fixes_until(state.told[name], state.time + INSTANT, offset)
 
 
 def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Array]:
@@ -126,7 +129,7 @@ def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Ar
     if chain.site is not None:
         return chain.site, np.asarray(chain.site_sd, dtype=np.float64)
     ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
-    site, sd = site_of_fixes(_fixes(chain, state), state.time, ellipsoid)
+    site, sd = site_of_fixes(_fixes(chain, state), state.begun, state.time, ellipsoid)
     arm = _lever_arm(chain)
     if q_nb is None or not arm.any():
         return site, sd

@@ -29,6 +29,8 @@ Three = tuple[float, float, float]
 
 #: A step as it is kept during an alignment: time, six values, ten increments.
 KEPT = 17
+#: How long what an aid was told is kept in navigation, where a gap may need it again, s.
+REMEMBERED = 60.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ class ChainState:
     aligned : Aligned or None
         What the mode before ended with.
     told : mapping of str to tuple of DataFrame
-        Tables that aids were told before navigation.
+        Tables that aids were told, as long as an alignment may need them.
     commands : tuple of Command
         That are still to come.
     holes : tuple of Hole
@@ -206,7 +208,9 @@ class Chain:
             The table is not valid.
         """
         if state.navigator is not None:
-            return replace(state, navigator=self.navigator.tell(state.navigator, name, table))
+            told = self.navigator.tell(state.navigator, name, table)
+            state = replace(state, navigator=told)
+            return self._remembering(state, name, table) if self._aligns_anew else state
         aid = self.navigator.by_name.get(name)
         if not isinstance(aid, TableAid):
             raise ConfigError(
@@ -216,7 +220,7 @@ class Chain:
             )
         # What is wrong with it is said when it comes, and not after an alignment.
         aid.epochs(table)
-        return replace(state, told={**state.told, name: (*state.told[name], table)})
+        return self._remembering(state, name, table)
 
     def command(self, state: ChainState, word: str) -> ChainState:
         """Take a command that holds from the next sample on.
@@ -268,6 +272,17 @@ class Chain:
     def finish(self, state: ChainState) -> tuple[ChainState, ChainPiece]:
         """Say that no sample follows; as the last piece does with `last`."""
         return self.advance(state, np.empty(0), np.empty((0, 6)), last=True)
+
+    @property
+    def _aligns_anew(self) -> bool:
+        return self.intake.gaps.beyond == "align"
+
+    def _remembering(self, state: ChainState, name: str, table: pd.DataFrame) -> ChainState:
+        """Keep a table for what is to begin; in navigation, without what is long past."""
+        known = state.told[name]
+        if state.navigator is not None:
+            known = tuple(one for one in known if one.index[-1] > state.time - REMEMBERED)
+        return replace(state, told={**state.told, name: (*known, table)})
 
     def _tables(self) -> tuple[str, ...]:
         return tuple(aid.name for aid in self.navigator.aids if isinstance(aid, TableAid))

@@ -1,4 +1,4 @@
-"""The file of a run of navigation to begin with: what log and fixes tell filled in, the rest asked."""
+"""The file of a run of navigation to begin with: what log and fixes tell, and what is asked."""
 
 from __future__ import annotations
 
@@ -189,6 +189,17 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
         "biases and drifts, if not given",
     )
+    for triad in ("gyro", "accel"):
+        stated = made.table.get("sensors", {}).get(triad)
+        if stated is None:
+            continue
+        page.table(
+            f"[sensors.{triad}]",
+            "Found: it shakes far beyond its data sheet; half of the time so much, x, y, z:",
+        )
+        for key, value in stated.items():
+            page.key(key, toml_value(value) or "")
+        told.append(f"{triad}s shake far beyond the data sheet: {key} {list(value)}")
     return told
 
 

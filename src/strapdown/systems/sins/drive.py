@@ -126,7 +126,7 @@ def run_batch(
     begin, end = float(imu.index[0]), float(imu.index[-1])
     for piece in pieces_of(chain, imu, tables, chunk):
         recording.take(piece)
-        share = 1.0 if piece.mode == "" else (piece.time - begin) / max(end - begin, 1e-9)
+        share = (piece.time - begin) / max(end - begin, 1e-9)
         progress(piece.mode, float(np.clip(share, 0.0, 1.0)))
     return recording.run(source_of(imu))
 

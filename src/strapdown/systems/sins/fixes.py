@@ -42,7 +42,9 @@ class Place:
     covariance: Array
 
 
-def fixes_until(tables: Sequence[pd.DataFrame], time: float) -> pd.DataFrame | None:
+def fixes_until(
+    tables: Sequence[pd.DataFrame], time: float, offset: float = 0.0
+) -> pd.DataFrame | None:
     """Return the fixes up to an instant as one table.
 
     Parameters
@@ -50,16 +52,20 @@ def fixes_until(tables: Sequence[pd.DataFrame], time: float) -> pd.DataFrame | N
     tables : sequence of DataFrame
         Gnss tables, one after the other.
     time : float, s
+    offset : float, s
+        Stamps less the time of the inertial sensors.
 
     Returns
     -------
     DataFrame or None
-        None where there is none.
+        By the time of the inertial sensors; None where there is none.
     """
     if not tables:
         return None
     joined = tables[0] if len(tables) == 1 else pd.concat(tables)
-    out: pd.DataFrame = joined[joined.index <= time]
+    out: pd.DataFrame = joined[joined.index - offset <= time]
+    if offset:
+        out = out.set_axis(out.index - offset)
     out.attrs = dict(tables[0].attrs)
     if out.empty:
         return None
@@ -68,15 +74,16 @@ def fixes_until(tables: Sequence[pd.DataFrame], time: float) -> pd.DataFrame | N
 
 
 def site_of_fixes(
-    fixes: pd.DataFrame | None, time: float, ellipsoid: Ellipsoid
+    fixes: pd.DataFrame | None, begin: float, time: float, ellipsoid: Ellipsoid
 ) -> tuple[Site, Array]:
     """Return where a body stands, by the median of its fixes.
 
     Parameters
     ----------
     fixes : DataFrame or None
-    time : float, s
-        For messages.
+        Until `time`.
+    begin, time : float, s
+        Of the rest. Without a fix in it the newest one before is taken.
     ellipsoid : Ellipsoid
 
     Returns
@@ -90,9 +97,10 @@ def site_of_fixes(
     DataError
         There is no fix with a place.
     """
-    place, sd, _ = _good(fixes, POSITION_SD, time)
-    lat, lon, alt = np.median(place, axis=0).tolist()
-    return Site(lat, lon, alt, ellipsoid), np.asarray(sd.min(axis=0))
+    place, sd, stamps = _good(fixes, POSITION_SD, time)
+    first = min(int(np.searchsorted(stamps, begin)), len(stamps) - 1)
+    lat, lon, alt = np.median(place[first:], axis=0).tolist()
+    return Site(lat, lon, alt, ellipsoid), np.asarray(sd[first:].min(axis=0))
 
 
 def here_by_fix(

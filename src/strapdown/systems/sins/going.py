@@ -302,6 +302,7 @@ class Going:
 
     def _begin_navigation(self, begun: FilterState) -> None:
         chain, state = self._chain, self._state
+        anew = chain.intake.gaps.beyond == "align"
         navigator = chain.navigator.begin_from(begun)
         for name, tables in state.told.items():
             for table in tables:
@@ -309,6 +310,6 @@ class Going:
         self._state = replace(
             state,
             navigator=navigator,
-            told=dict.fromkeys(state.told, ()),
+            told=state.told if anew else dict.fromkeys(state.told, ()),
             deliveries=chain.deliveries.started(state.deliveries, begun.time),
         )

@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 FIRST = 64
 #: Over which the motion before a gap is judged, s.
 BEFORE = 1.0
+# Stamps are rounded: a step of exactly so many usual ones is no gap.
+ROUNDED = 1.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,7 +217,9 @@ class Intake:
         time = np.concatenate([state.tail_time, time])
         values = np.concatenate([state.tail, values])
         found = []
-        wide = np.flatnonzero(np.diff(time[known:]) > self.gaps.usual * state.usual) + known
+        wide = (
+            np.flatnonzero(np.diff(time[known:]) > self.gaps.usual * ROUNDED * state.usual) + known
+        )
         for k in wide.tolist():
             first = int(np.searchsorted(time, time[k] - BEFORE))
             sides = (float(time[k]), float(time[k + 1]))
@@ -275,18 +279,23 @@ _NOTHING = Steps(_no_time(), _no_values(), np.empty((0, 10)), None, ())
 
 def _check(state: IntakeState, time: Array, values: Array) -> None:
     """Refuse samples that cannot be used; rows count from 1 over the whole record."""
-    joined = np.concatenate([state.tail_time[-1:], time])
-    steps = np.diff(joined)
-    if not np.isfinite(time).all() or (steps.size and not steps.min() > 0.0):
-        wrong = ~np.isfinite(time) if not np.isfinite(time).all() else ~(steps > 0.0)
-        k = int(np.argmax(wrong))
-        first = len(joined) - len(time) if np.isfinite(time).all() else 0
-        row = state.count + k + (1 if first else 2)
-        told = f"{joined[k]:.9g} s is followed by {joined[min(k + 1, len(joined) - 1)]:.9g} s"
+    if not np.isfinite(time).all():
+        row = int(np.argmin(np.isfinite(time)))
         raise DataError(
-            f"time does not advance: {told}",
+            f"not a finite number ({time[row]})",
             file=state.source,
-            row=row,
+            row=state.count + row + 1,
+            quantity="time",
+            remedy="leave the sample out",
+        )
+    stamps = np.concatenate([state.tail_time[-1:], time])
+    steps = np.diff(stamps)
+    if steps.size and not steps.min() > 0.0:
+        k = int(np.argmax(~(steps > 0.0)))
+        raise DataError(
+            f"time does not advance: {stamps[k]:.9g} s is followed by {stamps[k + 1]:.9g} s",
+            file=state.source,
+            row=state.count + k + 2 - (len(stamps) - len(time)),
             quantity="time",
             remedy="sort the samples, drop repeated stamps, and look at the clock there",
         )

@@ -11,7 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.aiding.gnss_clock import time_offset
+from strapdown.aiding.gnss_delay import velocity_delay
 from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
@@ -29,14 +32,25 @@ Array = NDArray[np.float64]
 
 #: Windows in which noise is measured, s, and the share of them that is taken as the quiet one.
 WINDOW, QUIET = 2.0, 0.05
+#: Beyond so many times the noise of its data sheet a triad shakes, and that is stated in its place.
+LOUD = 3.0
+NOISE_KEYS = (
+    ("gyro", "noise_density_deg_per_sqrt_h", math.radians(1.0) / 60.0),
+    ("accel", "noise_density_ug_per_sqrt_hz", 1e-6 * STANDARD_GRAVITY),
+)
 #: Below it a vehicle stands, above the other its course can be seen, m/s.
 STANDS, DRIVES = 0.5, 3.0
 #: A gyro bias that leaves north to be found, and the rest that it takes.
 NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
 #: Coarse alignment of a rest takes no more than this of it, s.
 COARSE = 100.0
+#: An alignment by a course ends when angles are known so well, deg.
+WELL = 3.0
 #: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
 OFFSET_SD = 0.2
+#: What the motion tells of clocks is taken where it is so many standard deviations, and a delay
+#: where it is at least so long, s; an offset is left to the filter to find to this, s.
+SURE, LEAST_DELAY, LEAST_OFFSET_SD = 4.0, 0.01, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +68,7 @@ class Proposal:
         Gnss table, on the clock of the samples.
     rest : float, s
         How long the vehicle stands at the start, as far as it is known.
-    noise : tuple of float or None
+    noise : tuple of float, (2,), or None
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
         Whether the sensor is only the one of the catalogue that is nearest by its noise.
@@ -69,7 +83,7 @@ class Proposal:
     imu: pd.DataFrame
     gnss: pd.DataFrame | None
     rest: float
-    noise: tuple[float, float] | None
+    noise: tuple[float, ...] | None
     guessed: bool
     how: str
     findings: tuple[Finding, ...]
@@ -115,11 +129,13 @@ def propose(
     if gnss is not None:
         fixes, shifted = on_clock_of(read_gnss(gnss), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
-    noise = _noise(imu)
+    scatter = _scatter(imu)
+    # An engine shakes one axis more than another; the quietest one tells of the sensor.
+    noise = None if scatter is None else tuple(scatter.quiet.min(axis=1).tolist())
     guessed = sensor is None
     named = sensor or (None if noise is None else _nearest(noise))
     if named is not None:
-        table["sensors"] = {"sensor": named}
+        table["sensors"] = {"sensor": named, **_louder(scatter, named)}
     place = site or _place(recording.start)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
@@ -134,14 +150,30 @@ def propose(
                 "path": str(gnss),
                 "lever_arm_m": (0.0, 0.0, 0.0),
                 "update_rule": "robust",
-                **({"time_offset_sd_s": OFFSET_SD} if drives else {}),
+                **_clock(fixes, imu, drives),
             }
         }
     return Proposal(table, recording, imu, fixes, rest, noise, guessed, how, findings)
 
 
-def _noise(imu: pd.DataFrame) -> tuple[float, float] | None:
-    """Noise densities while the record is quiet; None where it has none, or no such time."""
+@dataclass(frozen=True, eq=False)
+class Scatter:
+    """Noise densities of a record, axis by axis.
+
+    Attributes
+    ----------
+    quiet : ndarray, (2, 3)
+        Of gyros in rad/s/√Hz and accelerometers in m/s²/√Hz, while it is quiet.
+    usual : ndarray, (2, 3)
+        Half of the time, what shakes included.
+    """
+
+    quiet: Array
+    usual: Array
+
+
+def _scatter(imu: pd.DataFrame) -> Scatter | None:
+    """Noise densities; None where the record has none, or is too short."""
     time = index_of(imu)
     if ACCEL[0] not in imu.columns or len(time) < 64:
         return None
@@ -150,20 +182,32 @@ def _noise(imu: pd.DataFrame) -> tuple[float, float] | None:
     count = len(time) // size
     if count < 3:
         return None
-    found = []
-    for columns in (GYRO, ACCEL):
+    quiet, usual = np.empty((2, 2, 3))
+    for k, columns in enumerate((GYRO, ACCEL)):
         # Second differences leave out what turns and accelerates: of white noise they have six
         # times its variance.
-        second = np.diff(values_of(imu, columns)[: count * size], n=2, axis=0)
+        second = np.diff(values_of(imu, columns), n=2, axis=0)
         second = second[: (len(second) // size) * size].reshape(-1, size, 3)
-        sd = np.sqrt(np.square(second).mean(axis=1) / 6.0)
-        # An engine shakes one axis more than another; the quietest one tells of the sensor.
-        found.append(float(np.quantile(sd, QUIET, axis=0).min()) * math.sqrt(step))
-    gyro, accel = found
-    return (gyro, accel) if gyro > 0.0 and accel > 0.0 else None
+        sd = np.sqrt(np.square(second).mean(axis=1) / 6.0) * math.sqrt(step)
+        quiet[k], usual[k] = np.quantile(sd, QUIET, axis=0), np.median(sd, axis=0)
+    return Scatter(quiet, usual) if quiet.min() > 0.0 else None
 
 
-def _nearest(noise: tuple[float, float]) -> str:
+def _louder(scatter: Scatter | None, sensor: str | None) -> dict[str, dict[str, Any]]:
+    """Noise to state in place of a data sheet's, of triads that shake far beyond it."""
+    if scatter is None or sensor is None:
+        return {}
+    known = ImuUncertainty.of_sensor(load_sensor(sensor))
+    out: dict[str, dict[str, Any]] = {}
+    for k, (triad, key, unit) in enumerate(NOISE_KEYS):
+        sheet = np.asarray(getattr(known, triad).axis("noise_density"))
+        if (scatter.usual[k] > LOUD * sheet).any():
+            stated = np.maximum(scatter.usual[k], sheet) / unit
+            out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated)}
+    return out
+
+
+def _nearest(noise: tuple[float, ...]) -> str:
     """The sensor of the catalogue whose noise is nearest, by ratios."""
     best, least = "", math.inf
     for name in SENSORS:
@@ -215,6 +259,18 @@ def _speed(fixes: pd.DataFrame) -> Array:
     return np.where(measured, speed, along)
 
 
+def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, float]:
+    """How late the receiver's velocities and stamps are, where the motion tells it."""
+    late = velocity_delay(fixes)
+    delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
+    found = time_offset(fixes, imu, delay)
+    out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
+    if found is None:
+        return out | ({"time_offset_sd_s": OFFSET_SD} if drives else {})
+    sd = max(2.0 * found.sd, LEAST_OFFSET_SD)
+    return out | {"time_offset_s": round(found.offset, 3), "time_offset_sd_s": round(sd, 3)}
+
+
 def _alignment(
     sensor: str | None, rest: float, drives: bool, heading_deg: float | None
 ) -> tuple[dict[str, Any], str]:
@@ -242,8 +298,8 @@ def _alignment(
                 "coarse": {
                     "kind": "gnss_course",
                     "window_s": 60.0,
-                    "until_heading_sd_deg": 3.0,
-                    "until_tilt_sd_deg": 3.0,
+                    "until_heading_sd_deg": WELL,
+                    "until_tilt_sd_deg": _tilt(sensor),
                 },
                 "fine": {"kind": "none"},
             },
@@ -253,6 +309,14 @@ def _alignment(
         {"coarse": {"kind": "known_heading", "duration_s": 10.0}, "fine": {"kind": "none"}},
         "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
     )
+
+
+def _tilt(sensor: str | None) -> float:
+    """A tilt that a course can find, deg: accelerometers leave one of their bias over g."""
+    if sensor is None:
+        return WELL
+    bias = max(ImuUncertainty.of_sensor(load_sensor(sensor)).accel.axis("bias"))
+    return max(WELL, float(math.ceil(2.0 * math.degrees(bias / STANDARD_GRAVITY))))
 
 
 def _finds_north(sensor: str) -> bool:

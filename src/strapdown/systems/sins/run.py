@@ -19,6 +19,7 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
 
@@ -61,6 +62,7 @@ def run_navigation(
     """
     progress("reading", 0.02)
     source = read_navigation_source(spec)
+    looked = look_through(spec, source.imu, source.tables)
     sensors = uncertainty_of(spec)
     chain = make_chain(spec, sensors)
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
@@ -77,6 +79,7 @@ def run_navigation(
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [
         *source.findings,
+        *looked,
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
     ]

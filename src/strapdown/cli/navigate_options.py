@@ -1,0 +1,154 @@
+"""Flags of ``strapdown navigate`` as the specification of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from strapdown.cli.align_options import as_flag, refused_flag
+from strapdown.config.alignment import LogTable
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation_file import navigation_spec
+from strapdown.exceptions import ConfigError
+from strapdown.formats.columns import parse_column_option
+from strapdown.systems.sins.proposal import propose
+
+__all__ = ["navigation_of_flags"]
+
+#: Flags by the place in a specification.
+FLAGS = {
+    "site, lat_deg": "--lat",
+    "site, lon_deg": "--lon",
+    "site, alt_m": "--alt",
+    "sensors, sensor": "--sensor",
+    "axes, axes": "--axes",
+    "coarse, heading_deg": "--heading",
+    "aiding, gnss, path": "--gnss",
+    "aiding, gnss, lever_arm_m": "--lever-arm",
+    "truth, path": "--truth",
+    "log, from_s": "--from",
+    "log, duration_s": "--duration",
+    "log, sampling": "--sampling",
+    "log, rate_hz": "--rate",
+    "log, gyro_unit": "--gyro-unit",
+    "log, accel_unit": "--accel-unit",
+    "log, time_unit": "--time-unit",
+}
+
+
+def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
+    """Return the specification that flags make, with what the log and the fixes tell.
+
+    Parameters
+    ----------
+    log : Path
+    given : mapping
+        By flag, None where it is not given.
+
+    Returns
+    -------
+    NavigationSpec
+
+    Raises
+    ------
+    ConfigError
+        A value does not fit, or what is needed is not said; the message names the flag.
+    DataError
+        A file cannot be read.
+    """
+    try:
+        table = LogTable(
+            path=str(log),
+            columns=parse_column_option(given["columns"] or []),
+            gyro_unit=given["gyro_unit"],
+            accel_unit=given["accel_unit"],
+            time_unit=given["time_unit"],
+            sampling=given["sampling"],
+            rate_hz=given["rate"],
+            repair=bool(given["repair"]),
+            from_s=given["from_s"],
+            duration_s=given["duration"],
+        )
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise refused_flag({**first, "loc": ("log", *first["loc"])}, _flag) from None
+    proposal = propose(
+        table,
+        axes=given["axes"],
+        gnss=given["gnss"],
+        sensor=given["sensor"],
+        site=_site(given),
+        heading_deg=given["heading"],
+    )
+    if given["sensor"] is None:
+        near = proposal.table.get("sensors", {}).get("sensor")
+        raise ConfigError(
+            "nothing says how good the sensors are, and without that no position has a bound, and "
+            "no aid a weight",
+            quantity="--sensor",
+            remedy="name one of the catalogue (strapdown modules) or a .toml file of your own"
+            + (f"; nearest by the noise of the log is {near}" if near else ""),
+        )
+    whole = {"name": log.resolve().stem, **proposal.table}
+    coarse = whole["coarse"]
+    if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
+        raise ConfigError(
+            "nothing tells the heading: there is neither a rest with gyros that find north, nor a "
+            "drive with fixes",
+            quantity="--heading",
+            remedy="give --heading in degrees from north, or --gnss with fixes of a drive; or "
+            "write a file (strapdown init navigate)",
+        )
+    if "site" not in whole and proposal.gnss is None:
+        raise ConfigError(
+            "nothing says where it begins: there are no fixes",
+            quantity="--lat",
+            remedy="give --lat and --lon in degrees and --alt in metres, or --gnss",
+        )
+    if given["lever_arm"] is not None:
+        if "aiding" not in whole:
+            raise ConfigError(
+                "there is no receiver whose antenna it would be of",
+                quantity="--lever-arm",
+                remedy="give --gnss, too",
+            )
+        whole["aiding"]["gnss"]["lever_arm_m"] = _arm(given["lever_arm"])
+    if given["truth"] is not None:
+        whole["truth"] = {"path": str(given["truth"])}
+    try:
+        return navigation_spec(whole)
+    except ValidationError as error:
+        raise refused_flag(error.errors()[0], _flag) from None
+    except ConfigError as error:
+        raise as_flag(error, _flag) from None
+
+
+def _flag(place: str) -> str:
+    return FLAGS.get(place, place)
+
+
+def _site(given: Mapping[str, Any]) -> tuple[float, float, float] | None:
+    lat, lon, alt = given["lat"], given["lon"], given["alt"]
+    if lat is None and lon is None and alt is None:
+        return None
+    for value, flag in ((lat, "--lat"), (lon, "--lon")):
+        if value is None:
+            raise ConfigError(
+                "a place has a latitude and a longitude", quantity=flag, remedy=f"give {flag}, too"
+            )
+    return lat, lon, alt or 0.0
+
+
+def _arm(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(
+            f"'{text}' is no lever arm",
+            quantity="--lever-arm",
+            remedy="give three numbers in m, forward, right, down: --lever-arm 0.5,0,-1.2",
+        ) from None
+    return x, y, z

@@ -1,0 +1,198 @@
+"""Fixes of a receiver's sentences (NMEA 0183): GGA, with the date of RMC or ZDA, GST's deviations.
+
+Sentences of one instant follow each other. GGA has the place, its quality and the height over the
+geoid with that of the geoid; RMC and ZDA the date; GST the standard deviations of latitude,
+longitude and height. Speed and course of RMC are no velocity, for none says how fast it climbs.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import reduce
+from operator import xor
+from pathlib import Path
+
+import numpy as np
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.clocks import RELATIVE, UNIX, Clock
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+
+__all__ = ["detect", "read"]
+
+_SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})\s*$")
+_DAY = 86400.0
+_NAN3 = (np.nan, np.nan, np.nan)
+
+
+def detect(path: Path) -> bool:
+    """Tell by a sentence among the first lines."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as stream:
+        head = stream.read(csv.HEAD).decode("latin-1")
+    return any(line.startswith(("$GP", "$GN", "$GL", "$GA", "$GB")) for line in head.splitlines())
+
+
+@dataclass
+class _Epoch:
+    """What the sentences of one time of day say."""
+
+    row: int
+    time: float
+    place: tuple[float, float, float] = _NAN3
+    sd: tuple[float, float, float] = _NAN3
+    quality: float = np.nan
+    day: float | None = None
+
+
+def read(path: Path, options: GnssOptions) -> Fixes:
+    """Read the fixes of sentences.
+
+    Parameters
+    ----------
+    path : Path
+    options : GnssOptions
+
+    Returns
+    -------
+    Fixes
+        On the clock of 1970 where a date is in it, otherwise in seconds of the first day.
+        Sentences whose checksum is wrong are left out, and counted.
+
+    Raises
+    ------
+    DataError
+        It holds no GGA, a field of one is no number, or a GGA is without the height of the geoid.
+    """
+    text, findings = csv.decoded(path.read_bytes(), path.name)
+    epochs: list[_Epoch] = []
+    wrong: list[int] = []
+    for row, line in enumerate(text.splitlines(), 1):
+        start = line.find("$")
+        if start < 0:
+            continue
+        match = _SENTENCE.match(line[start:])
+        if match is None or not _whole(match):
+            wrong.append(row)
+            continue
+        _take(epochs, match[2], match[3].split(","), row, path.name)
+    fixed = [e for e in epochs if np.isfinite(e.quality)]
+    if not fixed:
+        raise DataError(
+            "it holds no GGA sentence that is whole",
+            file=path.name,
+            remedy="let the receiver write GGA, and RMC or ZDA for the date, GST for its precision",
+        )
+    if wrong:
+        findings.append(
+            Finding(
+                f"{len(wrong)} line{'s' if len(wrong) > 1 else ''} left out: no sentence with a "
+                "right checksum",
+                file=path.name,
+                row=wrong[0],
+            )
+        )
+    time, clock = _times(fixed)
+    sd = np.array([e.sd for e in fixed])
+    return Fixes(
+        name=path.name,
+        time=time,
+        place=np.array([e.place for e in fixed]),
+        rows=np.array([e.row for e in fixed], dtype=np.int64),
+        clock=clock,
+        position_sd=sd if np.isfinite(sd).any() else None,
+        quality=np.array([e.quality for e in fixed]),
+        zero_is_unknown=True,
+        findings=findings,
+    )
+
+
+def _whole(match: re.Match[str]) -> bool:
+    body = f"{match[1]}{match[2]},{match[3]}"
+    return reduce(xor, body.encode("latin-1", "replace"), 0) == int(match[4], 16)
+
+
+def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: str) -> None:
+    needed = {"GGA": 11, "GST": 8, "RMC": 9, "ZDA": 4}.get(kind)
+    if needed is None:
+        return
+    if len(fields) < needed:
+        raise DataError(
+            f"a {kind} of {len(fields)} fields, where it has {needed} or more",
+            file=file,
+            row=row,
+            quantity=kind,
+            remedy="correct or delete that line",
+        )
+    if not fields[0]:
+        return
+
+    def number(k: int, what: str) -> float:
+        try:
+            return float(fields[k]) if fields[k] else np.nan
+        except ValueError:
+            raise DataError(
+                f"'{fields[k]}' is not a number",
+                file=file,
+                row=row,
+                quantity=f"{kind} {what}",
+                remedy="correct or delete that line",
+            ) from None
+
+    clock = number(0, "time")
+    time = 3600.0 * (clock // 1e4) + 60.0 * (clock // 1e2 % 1e2) + round(clock % 1e2, 6)
+    if not epochs or epochs[-1].time != time:
+        epochs.append(_Epoch(row, time))
+    epoch = epochs[-1]
+    if kind == "GGA":
+        epoch.row, epoch.quality = row, number(5, "quality")
+        if epoch.quality > 0:
+            epoch.place = (
+                _angle(number(1, "latitude"), fields[2], "S"),
+                _angle(number(3, "longitude"), fields[4], "W"),
+                number(8, "height") + number(10, "height of the geoid"),
+            )
+            if np.isnan(epoch.place[2]) and fields[8]:
+                raise DataError(
+                    "its height is over the sea, and that of the geoid is not in it",
+                    file=file,
+                    row=row,
+                    quantity="GGA height of the geoid",
+                    remedy="let the receiver write field 11, or give heights over the ellipsoid",
+                )
+    elif kind == "GST":
+        epoch.sd = (number(5, "latitude"), number(6, "longitude"), number(7, "height"))
+    elif kind == "RMC" and len(fields[8]) == 6:
+        date = int(number(8, "date"))
+        year = date % 100
+        epoch.day = _day(year + (2000 if year < 80 else 1900), date // 100 % 100, date // 10000)
+    elif kind == "ZDA" and fields[3]:
+        epoch.day = _day(*(int(number(k, "date")) for k in (3, 2, 1)))
+
+
+def _angle(value: float, letter: str, negative: str) -> float:
+    degrees = value // 100.0
+    angle = degrees + (value - 100.0 * degrees) / 60.0
+    return -angle if letter == negative else angle
+
+
+def _day(year: int, month: int, day: int) -> float | None:
+    try:
+        return datetime(year, month, day, tzinfo=UTC).timestamp()
+    except ValueError:
+        return None
+
+
+def _times(fixed: list[_Epoch]) -> tuple[np.ndarray, Clock]:
+    """Seconds since 1970 where a date stands somewhere; midnight is counted over."""
+    time = np.array([e.time for e in fixed])
+    days = np.cumsum(np.concatenate([[0.0], np.diff(time) < -0.5 * _DAY]))
+    dated = next((k for k, e in enumerate(fixed) if e.day is not None), None)
+    if dated is None:
+        return time + _DAY * days, Clock(RELATIVE)
+    first = fixed[dated].day or 0.0
+    return time + first + _DAY * (days - days[dated]), Clock(UNIX)

@@ -1,0 +1,92 @@
+"""Whether a record and what aids it can be navigated by: told, or refused, before anything runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import pandas as pd
+
+from strapdown.aiding.aid import TableAid
+from strapdown.aiding.gnss import Gnss
+from strapdown.aiding.gnss_readiness import gnss_readiness
+from strapdown.config.navigation import NavigationSpec, aids_of
+from strapdown.config.navigation_checks import make_aids
+from strapdown.exceptions import DataError, Finding
+from strapdown.tables.checks import index_of, source_of
+
+__all__ = ["look_through"]
+
+#: A height that nothing aids multiplies its error by e over so long, s: sqrt(R / 2 g).
+VERTICAL = 570.0
+#: From here on that is told, s.
+LONG = 1800.0
+#: Aids that hold the height.
+HOLDS_HEIGHT = ("gnss", "barometer", "no_slip", "body_velocity")
+
+
+def look_through(
+    spec: NavigationSpec, imu: pd.DataFrame, tables: Mapping[str, pd.DataFrame]
+) -> tuple[Finding, ...]:
+    """Look at what aids measured beside the record that they are to aid.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+    imu : DataFrame
+        Imu table of the span that is used.
+    tables : mapping of str to DataFrame
+        By name of the aid, on the clock of the samples.
+
+    Returns
+    -------
+    tuple of Finding
+
+    Raises
+    ------
+    DataError
+        An aid is of another time than the record, or has nothing that can be used; the message
+        names file, row and remedy.
+    """
+    found: list[Finding] = []
+    for aid in make_aids(spec):
+        table = tables.get(aid.name)
+        if table is None:
+            continue
+        if isinstance(aid, Gnss):
+            found += gnss_readiness(table, imu, aid)
+        elif isinstance(aid, TableAid):
+            _refuse_apart(table, imu)
+    return (*found, *_height(spec, imu))
+
+
+def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
+    time, stamps = index_of(table), index_of(imu)
+    if ((time >= stamps[0]) & (time <= stamps[-1])).any():
+        return
+    raise DataError(
+        f"it goes from {time[0]:.9g} to {time[-1]:.9g} s and the inertial record from "
+        f"{stamps[0]:.9g} to {stamps[-1]:.9g} s: nothing of it is within that",
+        file=source_of(table),
+        quantity="time",
+        remedy="give both on one clock, or another part of the record",
+    )
+
+
+def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
+    """What becomes of a height that nothing holds."""
+    length = float(imu.index[-1] - imu.index[0])
+    held = getattr(spec.mechanization, "height", "free") != "free"
+    aided = any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values())
+    if length <= LONG or held or aided:
+        return ()
+    times = math.exp(min(length / VERTICAL, 700.0))
+    return (
+        Finding(
+            f"nothing aids the height for {length / 60.0:.3g} minutes: its error grows by e every "
+            f"{VERTICAL:g} s, {times:.2g} times in all",
+            file=source_of(imu),
+            quantity="height",
+            remedy='write height = "held" in [mechanization], or add a barometer',
+        ),
+    )

@@ -1,0 +1,101 @@
+"""Sentences of NMEA 0183."""
+
+from __future__ import annotations
+
+from functools import reduce
+from operator import xor
+
+import pytest
+
+from strapdown.exceptions import DataError
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
+from strapdown.tables.columns import GEODETIC, POSITION_SD
+
+# 2024-01-15 23:59:59.5 UTC.
+LATE = 1705363199.5
+
+
+def sentence(body):
+    return f"${body}*{reduce(xor, body.encode(), 0):02X}"
+
+
+def gga(time, lat="4807.0380", ns="N", quality=4, height="545.4", geoid="46.9"):
+    return sentence(
+        f"GNGGA,{time},{lat},{ns},01131.0000,W,{quality},12,0.9,{height},M,{geoid},M,1.0,0"
+    )
+
+
+def rmc(time, date):
+    return sentence(f"GNRMC,{time},A,4807.0380,N,01131.0000,W,10.0,90.0,{date},,,A")
+
+
+def gst(time, lat="0.011"):
+    return sentence(f"GNGST,{time},1.0,,,,{lat},0.012,0.030")
+
+
+def written(folder, lines):
+    path = folder / "rover.nmea"
+    path.write_bytes(("\r\n".join(lines) + "\r\n").encode())
+    return path
+
+
+def test_checksum_of_the_standard():
+    # The example that manuals of receivers print.
+    body = "GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,"
+    assert sentence(body).endswith("*47")
+
+
+def test_places_deviations_dates_over_midnight(tmp_path):
+    lines = [gga("235959.50"), rmc("235959.50", "150124"), gst("235959.50")]
+    lines += [gga("000000.50", ns="S", quality=1), rmc("000000.50", "160124"), gst("000000.50")]
+    table = read_gnss(written(tmp_path, lines))
+    assert table.index.tolist() == [LATE, LATE + 1.0]
+    lat, lon = 48 + 7.038 / 60, -(11 + 31 / 60)
+    # A minute of so many digits is a sum of doubles: 1e-13 deg is 11 nm.
+    assert table[GEODETIC].iloc[0].to_numpy() == pytest.approx([lat, lon, 592.3], abs=1e-12)
+    assert table["lat"].iloc[1] == pytest.approx(-lat, abs=1e-13)
+    assert table[POSITION_SD].iloc[0].tolist() == [0.011, 0.012, 0.03]
+    assert table["quality"].tolist() == [4.0, 1.0]
+    assert table.attrs["clock"] == "unix"
+
+
+def test_without_a_date_and_without_deviations(tmp_path):
+    path = written(tmp_path, [gga("235959.50"), gga("000000.50")])
+    with pytest.raises(DataError, match="state position_sd"):
+        read_gnss(path)
+    table = read_gnss(path, GnssOptions(position_sd=2.0))
+    assert table.index.tolist() == [86399.5, 86400.5]
+    assert table.attrs["clock"] == "relative"
+
+
+def test_no_fix_and_a_line_that_is_spoiled(tmp_path):
+    empty = sentence("GNGGA,000001.00,,,,,0,00,,,M,,M,,")
+    spoiled = gga("000002.00").replace("4807", "4907")
+    table = read_gnss(
+        written(tmp_path, [empty, spoiled, gga("000003.00"), "# noise"]),
+        GnssOptions(position_sd=1.0),
+    )
+    assert table.index.tolist() == [3.0]
+    said = [(f.row, f.what) for f in table.attrs["findings"]]
+    assert said[0] == (2, "1 line left out: no sentence with a right checksum")
+    assert said[1] == (1, "1 row left out without a place")
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        ([rmc("000000.50", "160124")], "it holds no GGA sentence that is whole"),
+        (
+            [gga("000000.50", geoid="")],
+            "row 1, GGA height of the geoid: its height is over the sea",
+        ),
+        ([gga("000000.50", lat="x")], "row 1, GGA latitude: 'x' is not a number"),
+        ([sentence("GNGGA,000000.50,1,N")], "row 1, GGA: a GGA of 3 fields"),
+        ([gga("000001.00"), gga("000000.50")], "row 2, time: the stamp 0.5 s comes after 1 s"),
+    ],
+)
+def test_refused(tmp_path, lines, message):
+    with pytest.raises(DataError) as error:
+        read_gnss(written(tmp_path, lines), GnssOptions(position_sd=1.0))
+    assert message in str(error.value) and "rover.nmea" in str(error.value)
+    assert error.value.finding.remedy

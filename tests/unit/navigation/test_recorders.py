@@ -1,0 +1,136 @@
+"""Recorders: what is kept of a run, and how much memory it takes."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from strapdown.estimation.covariance import Innovations
+from strapdown.estimation.covariances import COVARIANCES
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.mechanization import MECHANIZATIONS
+from strapdown.nav_state import NavState
+from strapdown.navigation.navigator import Navigator
+from strapdown.navigation.piece import Mark, NavigationPiece, Seen
+from strapdown.navigation.record import Event, Span
+from strapdown.navigation.recorder import FullRecorder, IntervalRecorder
+
+MODEL = RotationVectorModel((1e-6,) * 3, (1e-4,) * 3, (gyro_bias(1e-7), accel_bias(2e-4)))
+NAVIGATOR = Navigator(ErrorFilter(MECHANIZATIONS["ned"](), MODEL, COVARIANCES["ud"]()))
+
+
+def run(rate=100.0, length=3.0, begin=7.003):
+    """A piece of a body at rest with a mark and an observation at every fifth of a second."""
+    used = NAVIGATOR.filter.mechanization
+    row = used.history_row(used.begin(NavState.from_degrees(10.0, 20.0, 30.0)))
+    time = begin + np.arange(round(length * rate)) / rate
+    history = np.tile(row, (len(time), 1))
+    history[:, 2] += np.arange(len(time))
+    at = time[::20]
+    marks = tuple(Mark(t, np.eye(9) * t, np.full(6, t), np.ones(6)) for t in at.tolist())
+    one = np.ones(1)
+    seen = tuple(
+        Seen(t, "baro.height", ("up, m",), Innovations(t * one, 2.0 * one, one)) for t in at
+    )
+    return NavigationPiece(time, history, seen, marks)
+
+
+def kept(recorder, pieces, **more):
+    tape = recorder.begin(NAVIGATOR)
+    for piece in pieces:
+        tape.take(piece)
+    return tape.record("run.csv", **more)
+
+
+def cut(piece, edges):
+    bounds = [-np.inf, *edges, np.inf]
+    out = []
+    for a, b in pairwise(bounds):
+        at = (piece.time >= a) & (piece.time < b)
+        out.append(
+            NavigationPiece(
+                piece.time[at],
+                piece.history[at],
+                tuple(s for s in piece.seen if a <= s.time < b),
+                tuple(m for m in piece.marks if a <= m.time < b),
+            )
+        )
+    return out
+
+
+def test_full_keeps_every_sample():
+    piece = run()
+    record = kept(FullRecorder(), [piece])
+    np.testing.assert_array_equal(record.trajectory.index, piece.time)
+    np.testing.assert_array_equal(record.trajectory["alt"], piece.history[:, 2])
+    assert len(record.sd) == len(piece.marks)
+    np.testing.assert_array_equal(record.covariance[3], piece.marks[3].covariance)
+    assert record.units["gyro_bias_x"] == "rad/s"
+    table = record.innovations["baro.height"]
+    assert list(table.columns) == ["nu up, m", "s up, m", "weight up, m"]
+    np.testing.assert_array_equal(table["nu up, m"], table.index)
+
+
+def test_an_interval_keeps_its_first_sample_and_all_innovations():
+    piece = run()
+    record = kept(IntervalRecorder(2.0), [piece])
+    # The grid is that of time zero: 7.0, 7.5, 8.0 ...; stamps are 3 ms off it.
+    np.testing.assert_allclose(
+        record.trajectory.index, [7.003, 7.503, 8.003, 8.503, 9.003, 9.503], atol=1e-9
+    )
+    assert len(record.innovations["baro.height"]) == len(piece.seen)
+    # Marks at the same rate, and the last one of all.
+    np.testing.assert_allclose(
+        record.sd.index, [7.003, 7.603, 8.003, 8.603, 9.003, 9.603, 9.803], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("recorder", [FullRecorder(), IntervalRecorder(3.0)])
+def test_cut_anywhere_as_the_whole(recorder):
+    piece = run()
+    whole = kept(recorder, [piece])
+    for edges in ([8.0], [7.2, 7.2001, 9.0], list(piece.time)):
+        parts = kept(recorder, cut(piece, edges))
+        for name in ("trajectory", "sd", "sensors", "sensors_sd"):
+            assert getattr(parts, name).equals(getattr(whole, name)), name
+        np.testing.assert_array_equal(parts.covariance, whole.covariance)
+
+
+def test_events_and_spans_are_handed_on():
+    events, modes = (Event(8.0, "gap", "none"),), (Span("navigation", 7.0, 10.0),)
+    record = kept(FullRecorder(), [run()], events=events, modes=modes, outages={"rtk": modes})
+    assert record.events == events and record.modes == modes and record.outages["rtk"] == modes
+
+
+def test_a_mark_that_is_told_again_is_the_later_one():
+    mark = Mark(7.1, np.eye(9), np.zeros(6), np.ones(6))
+    again = Mark(7.1, 2.0 * np.eye(9), np.ones(6), np.ones(6))
+    piece = run(length=0.2)
+    pieces = [
+        NavigationPiece(piece.time[:10], piece.history[:10], (), (mark,)),
+        NavigationPiece(piece.time[10:], piece.history[10:], (), (again,)),
+    ]
+    for recorder in (FullRecorder(), IntervalRecorder(1.0)):
+        record = kept(recorder, pieces)
+        assert len(record.sd) == 1
+        np.testing.assert_array_equal(record.covariance[0], 2.0 * np.eye(9))
+
+
+def test_memory_grows_with_the_rate_of_the_recorder():
+    tape = IntervalRecorder(10.0).begin(NAVIGATOR)
+    for k in range(200):
+        tape.take(run(rate=1000.0, length=1.0, begin=float(k)))
+    row = NAVIGATOR.filter.mechanization.row + 1
+    # Ten a second; what they grow into is at most half as much again, and once the first room.
+    assert tape._states.room.buffer.size <= 1.5 * 10 * 200 * row + 64 * row
+
+
+def test_no_step_and_no_rate_are_refused():
+    with pytest.raises(DataError, match=r"run.csv.*made no step"):
+        kept(FullRecorder(), [])
+    for rate in (0.0, np.inf, "fast"):
+        with pytest.raises(ConfigError, match="rate_hz"):
+            IntervalRecorder(rate)
