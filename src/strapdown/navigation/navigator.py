@@ -204,7 +204,9 @@ class Navigator:
             The state has left what the mechanization can do; the sample is named.
         """
         going = _Going(self, state)
-        going.over(np.asarray(time, dtype=np.float64), np.ascontiguousarray(rows))
+        # What is writeable is one type for compiled code, and what is not another.
+        stamps = np.require(time, np.float64, ["C", "W"])
+        going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
         return going.state(), going.piece()
 
     def engine(self, state: EngineState) -> Engine:
