@@ -304,7 +304,7 @@ def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]
 
 
 def _between_nodes(nodes: Array, values: Array, time: Array) -> Array:
-    """Interpolate rows linearly; one search for all columns, and what is beyond is not asked for."""
+    """Interpolate rows linearly, with one search for all columns."""
     at = np.clip(np.searchsorted(nodes, time, side="right") - 1, 0, len(nodes) - 2)
     share = (time - nodes[at]) / (nodes[at + 1] - nodes[at])
     before = values[at]
