@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 __all__ = [
     "chi_square_above",
@@ -17,7 +16,7 @@ __all__ = [
 ]
 
 
-def chi_square_quantile(share: ArrayLike, freedom: ArrayLike) -> Any:
+def chi_square_quantile(share: Any, freedom: Any) -> Any:
     """Return what a share of chi-square numbers is below.
 
     Parameters
@@ -37,35 +36,35 @@ def chi_square_quantile(share: ArrayLike, freedom: ArrayLike) -> Any:
     return _plain(2.0 * gammaincinv(0.5 * np.asarray(freedom, dtype=np.float64), share))
 
 
-def chi_square_exceeded(share: ArrayLike, freedom: ArrayLike) -> Any:
+def chi_square_exceeded(share: Any, freedom: Any) -> Any:
     """Return what a share of chi-square numbers is above, exact where it is small."""
     from scipy.special import chdtri
 
     return _plain(chdtri(freedom, share))
 
 
-def chi_square_below(value: ArrayLike, freedom: ArrayLike) -> Any:
+def chi_square_below(value: Any, freedom: Any) -> Any:
     """Return the probability of less than a value, 0 or more."""
     from scipy.special import chdtr
 
     return _plain(chdtr(freedom, value))
 
 
-def chi_square_above(value: ArrayLike, freedom: ArrayLike) -> Any:
+def chi_square_above(value: Any, freedom: Any) -> Any:
     """Return the probability of more than a value, 0 or more, exact where it is small."""
     from scipy.special import chdtrc
 
     return _plain(chdtrc(freedom, value))
 
 
-def normal_quantile(share: ArrayLike) -> Any:
+def normal_quantile(share: Any) -> Any:
     """Return what a share of normal numbers of mean 0 and variance 1 is below."""
     from scipy.special import ndtri
 
     return _plain(ndtri(share))
 
 
-def normal_above(value: ArrayLike) -> Any:
+def normal_above(value: Any) -> Any:
     """Return the probability of more than a value, exact where it is small."""
     from scipy.special import ndtr
 
