@@ -220,6 +220,8 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
             remedy="give another span of the log's own stamps (from_s, to_s, duration_s; --from, "
             "--duration)",
         )
+    if kept.all():
+        return imu
     out = imu[kept]
     out.attrs = dict(imu.attrs)
     return out
