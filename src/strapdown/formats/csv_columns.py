@@ -15,17 +15,21 @@ Columns = list[NDArray[Any]]
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 
 
-def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns | None:
+def columns_at_once(
+    data: bytes, count: int, separator: str | None, start: int = 0
+) -> Columns | None:
     """Columns of lines of one width.
 
     Parameters
     ----------
-    body : bytes
-        ASCII without quotes; the last line has its end.
+    data : bytes
+        ASCII, from `start` on without quotes; the last line has its end.
     count : int
         Columns.
     separator : str or None
         Between fields; None for any run of blanks.
+    start : int
+        Letters before the first of these lines.
 
     Returns
     -------
@@ -33,15 +37,18 @@ def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns |
         As `parsed`. None where a line has another width, is empty, or holds what may be no number.
     """
     # A comma may be a decimal sign, and an x that of a hexadecimal number.
-    if count < 2 or b"x" in body or b"X" in body or (separator != "," and b"," in body):
+    odd = (b"x", b"X", *(() if separator == "," else (b",",)))
+    if count < 2 or any(data.find(c, start) >= 0 for c in odd):
         return None
-    if b"\r" in body:
-        body = body.replace(b"\r\n", b"\n")
-        if b"\r" in body:
+    if data.find(b"\r", start) >= 0:
+        data, start = data[start:].replace(b"\r\n", b"\n"), 0
+        if b"\r" in data:
             return None
-    columns = _parsed_or_none(body, count, separator or " ")
+    # No copy: a text may be half of the memory there is.
+    columns = _parsed_or_none(memoryview(data)[start:], count, separator or " ")
     if columns is not None and all(_full(c) for c in columns):
         return columns
+    body = data[start:]
     # A value that is missing may be two blanks beside each other, or a line without any.
     if separator is None:
         body = single_blanks(body)
@@ -49,7 +56,7 @@ def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns |
     return None if b"\n\n" in body or body.startswith(b"\n") else columns
 
 
-def _parsed_or_none(body: bytes, count: int, delimiter: str) -> Columns | None:
+def _parsed_or_none(body: bytes | memoryview, count: int, delimiter: str) -> Columns | None:
     import pyarrow as pa
 
     try:
@@ -87,7 +94,7 @@ def single_blanks(text: bytes) -> bytes:
 
 
 def parsed(
-    body: bytes,
+    body: bytes | memoryview,
     count: int,
     delimiter: str,
     *,
@@ -99,7 +106,7 @@ def parsed(
 
     Parameters
     ----------
-    body : bytes
+    body : bytes or memoryview
         UTF-8, without a header.
     count : int
         Columns.
@@ -136,6 +143,8 @@ def parsed(
             strings_can_be_null=True,
             column_types={str(k): pa.string() for k in text},
         ),
+        # What is freed goes back to the system.
+        memory_pool=pa.system_memory_pool(),
     )
     return [_array(table.column(k)) for k in range(count)]
 

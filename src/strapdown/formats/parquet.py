@@ -55,6 +55,7 @@ def read(path: Path) -> RawLog:
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
         arrays = {n: _array(table.column(k)) for k, n in enumerate(table.column_names)}
+        pa.default_memory_pool().release_unused()
     except DataError:
         raise
     except Exception as error:  # a damaged file can break any of the decoders it goes through
