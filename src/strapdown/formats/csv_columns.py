@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +14,8 @@ __all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
 Columns = list[NDArray[Any]]
 #: What programs write for a value that is not there.
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
+#: From this many bytes on the first of them tell what is a number.
+LONG = 1 << 22
 
 
 def columns_at_once(
@@ -127,9 +130,42 @@ def parsed(
         A line has another number of fields.
     """
     import pyarrow as pa
+
+    def read(part: bytes | memoryview, types: dict[str, Any]) -> Any:
+        return _table(part, types, count, delimiter, decimal, quote)
+
+    asked = {str(k): pa.string() for k in text}
+    table = None
+    if len(body) > LONG:
+        # Where a type is not stated, all of the text is kept until it is known.
+        with suppress(pa.ArrowInvalid):
+            top = bytes(body[:LONG])
+            seen = read(top[: top.rfind(b"\n") + 1], asked).schema
+            numbers = {f.name: f.type for f in seen if str(f.type) in ("int64", "double")}
+            table = read(body, {**numbers, **asked})
+    if table is None:
+        table = read(body, asked)
+    columns = []
+    # One after the other, so that no more than one stands there twice.
+    for _ in range(count):
+        columns.append(_array(table.column(0)))
+        table = table.remove_column(0)
+    pa.default_memory_pool().release_unused()
+    return columns
+
+
+def _table(
+    body: bytes | memoryview,
+    types: dict[str, Any],
+    count: int,
+    delimiter: str,
+    decimal: str,
+    quote: str | Literal[False],
+) -> Any:
+    import pyarrow as pa
     import pyarrow.csv as pa_csv
 
-    table = pa_csv.read_csv(
+    return pa_csv.read_csv(
         pa.BufferReader(body),
         read_options=pa_csv.ReadOptions(
             column_names=[str(k) for k in range(count)], use_threads=False
@@ -141,12 +177,9 @@ def parsed(
             decimal_point=decimal,
             null_values=list(NULLS),
             strings_can_be_null=True,
-            column_types={str(k): pa.string() for k in text},
+            column_types=types,
         ),
-        # What is freed goes back to the system.
-        memory_pool=pa.system_memory_pool(),
     )
-    return [_array(table.column(k)) for k in range(count)]
 
 
 def _array(column: Any) -> NDArray[Any]:
