@@ -22,7 +22,7 @@ from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.stated_states import stated_states
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
@@ -84,6 +84,7 @@ class _Checks(SourceChecks):
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
             yield partial(self.aid, spec, name)
+        yield partial(self.withhold, spec)
         yield partial(self.output, spec)
         yield partial(self.chain, spec)
 
@@ -218,6 +219,35 @@ class _Checks(SourceChecks):
                 'it observes the height, and [mechanization] height = "held" keeps it where it is',
                 'write height = "free", or leave this aid out',
             )
+
+    def withhold(self, spec: NavigationSpec) -> None:
+        """Which fixes are kept back, and when."""
+        given = spec.withhold
+        if given is None:
+            return
+        if given.aid is None and not _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"), "no aid gives fixes to keep back", "leave [withhold] out"
+            )
+        if given.aid is not None and given.aid not in _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"),
+                "there is no aid of this name that gives fixes",
+                nearest(given.aid, _fixes(spec)),
+            )
+        if bool(given.spans_s) == bool(given.lengths_s):
+            raise self.refuse(
+                ("withhold", "spans_s"),
+                "nothing says when" if not given.spans_s else "lengths_s is given, too",
+                "write spans_s = [[begin, end]], or lengths_s = [10.0, 30.0, 60.0] and places = 5",
+            )
+        for begin, end in given.spans_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("withhold", "spans_s"),
+                    f"from {begin:g} to {end:g} s there is no time",
+                    "give the begin before the end",
+                )
 
     def output(self, spec: NavigationSpec) -> None:
         for form in spec.output.files:

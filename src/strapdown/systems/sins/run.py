@@ -23,6 +23,7 @@ from strapdown.systems.sins.drive import run_batch
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
+from strapdown.systems.sins.withholding import score_withholding
 
 __all__ = ["run_navigation"]
 
@@ -78,6 +79,13 @@ def run_navigation(
     run = run_batch(chain, source.imu, source.tables, recorder, told, CHUNK)
     progress("comparing", ENDED)
     differences, errors = _against_truth(run.record.trajectory, source, spec)
+    withheld = score_withholding(
+        spec,
+        chain,
+        source,
+        run.record,
+        lambda stage, share: progress(stage, ENDED + 0.02 * share),
+    )
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
@@ -98,6 +106,7 @@ def run_navigation(
         record=run.record,
         differences=differences,
         errors=errors,
+        withheld=withheld,
         inputs=(*files, *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
