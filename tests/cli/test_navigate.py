@@ -175,7 +175,8 @@ def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
         ("rtk", 45.0, 55.0),
         ("rtk", 30.0, 35.0),
     ]
-    assert all(w["inside"] for w in found)
+    # The largest of ten, each of which is within its bound with 95 %: the noise of the fixes.
+    assert all(w["largest_horizontal_error_m"] < 2.0 * w["bound_95_m"] for w in found)
     # The run itself has had all fixes.
     assert not any(e["kind"] == "outage" for e in json.loads(done.out)["events"])
 
