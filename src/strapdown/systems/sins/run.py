@@ -73,7 +73,7 @@ def run_navigation(
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
 
     def told(mode: str, share: float) -> None:
-        progress(f"{mode} {share:.0%}", BEGUN + (ENDED - BEGUN) * share)
+        progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     run = run_batch(chain, source.imu, source.tables, recorder, told, CHUNK)
