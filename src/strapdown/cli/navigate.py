@@ -100,6 +100,25 @@ def navigate(
             rich_help_panel=_RUN,
         ),
     ] = None,
+    live: Annotated[
+        str | None,
+        typer.Option(
+            metavar="-|udp://HOST:PORT",
+            help="Take samples as they come, as lines of standard input or of datagrams, by the "
+            "file of a run.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    every: Annotated[
+        float,
+        typer.Option(
+            metavar="S", help="With --live: a line of the state so often.", rich_help_panel=_RUN
+        ),
+    ] = 1.0,
+    lines: Annotated[
+        str,
+        typer.Option(metavar="json|csv", help="With --live: as what.", rich_help_panel=_RUN),
+    ] = "json",
     rate: Rate = None,
     sampling: Sampling = None,
     columns: Columns = None,
@@ -159,6 +178,21 @@ def navigate(
         "axes": axes,
         "repair": repair or None,
     }
+    if live is not None:
+        from strapdown.cli.navigate_live import navigate_live
+
+        refused = {f"--{name.replace('_', '-')}": value for name, value in given.items()}
+        navigate_live(
+            source,
+            live,
+            folder,
+            lines=lines,
+            every=every,
+            force=force,
+            quiet=quiet,
+            given={**refused, "--pace": pace, "--json": json or None},
+        )
+        return
     own = source.suffix.lower() == ".toml"
     with progress(quiet or json) as show:
         report = Stopwatch(show)

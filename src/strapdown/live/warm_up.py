@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +10,7 @@ import pandas as pd
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.exceptions import StrapdownError
 from strapdown.nav_state import NavState
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import run_by_sample
@@ -45,7 +47,9 @@ def warm_up(chain: Chain, sampling: str = "mean") -> None:
         commands=(),
         intake=replace(chain.intake, gaps=GapPolicy()),
     )
-    run_by_sample(own, imu, _fixes(chain))
+    # What cannot be done with this rest may well be done with the record.
+    with suppress(StrapdownError):
+        run_by_sample(own, imu, _fixes(chain))
 
 
 def _fixes(chain: Chain) -> dict[str, pd.DataFrame]:
