@@ -202,8 +202,8 @@ def navigate(
         else:
             report("looking through", 0.01)
             spec = navigation_of_flags(source, given)
-        more = {} if played is None else {"drive": played}
-        result = run_navigation(spec, source if own else None, report, **more)
+        drive: dict[str, Any] = {} if played is None else {"drive": played}
+        result = run_navigation(spec, source if own else None, report, **drive)
         seal = write_navigation(result, folder, force=force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)

@@ -17,7 +17,7 @@ from strapdown.cli.console import Stopwatch, print_seal, progress
 from strapdown.cli.latency_table import print_latency
 from strapdown.cli.navigate_tables import print_navigation
 from strapdown.config.navigation_file import read_navigation_spec
-from strapdown.exceptions import ConfigError, StrapdownError
+from strapdown.exceptions import ConfigError, DataError, StrapdownError
 from strapdown.live.clock import MachineClock
 from strapdown.live.received import live_spec
 from strapdown.live.run import LiveRun, receive, result_of
@@ -90,7 +90,7 @@ def navigate_live(
         every,
     )
     if not len(live.got.samples):
-        raise live.error or ConfigError(
+        raise DataError(
             "no sample came", quantity="--live", remedy="send lines imu,TIME,GX,GY,GZ,AX,AY,AZ"
         )
     with redirect_stdout(sys.stderr):

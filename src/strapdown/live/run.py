@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -107,17 +107,17 @@ def receive(
     ConfigError
         The chain cannot be made.
     """
-    chain = make_chain(spec, uncertainty_of(spec))
-    recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
-    reader = _Reader(write)
-    lines = StateLines(chain.navigator, reader.write, form, every)
-    recording = Recording(chain, recorder)
-    got = Reception(chain, spec, recording, clock, lines.take, warn)
-    with _until_a_signal() as wanted:
-        warm_up(chain, got.sampling)
-        warn(f"listening to {source.name}")
-        source.begin()
-        try:
+    with closing(source):
+        chain = make_chain(spec, uncertainty_of(spec))
+        recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+        reader = _Reader(write)
+        lines = StateLines(chain.navigator, reader.write, form, every)
+        recording = Recording(chain, recorder)
+        got = Reception(chain, spec, recording, clock, lines.take, warn)
+        with _until_a_signal() as wanted:
+            warm_up(chain, got.sampling)
+            warn(f"listening to {source.name}")
+            source.begin()
             while wanted() and reader.there:
                 try:
                     line = source.next()
@@ -125,8 +125,6 @@ def receive(
                     continue
                 if line is None or not got.take(line):
                     break
-        finally:
-            source.close()
     try:
         got.finish()
         return LiveRun(spec, got, recording.run("received.csv"), got.error)
@@ -202,12 +200,12 @@ def _until_a_signal() -> Iterator[Callable[[], bool]]:
         came.append(number)
         signal.signal(number, before[number])
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.getsignal(number)
+    for asked in (signal.SIGINT, signal.SIGTERM):
+        before[asked] = signal.getsignal(asked)
     try:
-        for number in before:
-            signal.signal(number, note)
+        for asked in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(asked, note)
         yield lambda: not came
     finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for asked in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(asked, before[asked])

@@ -163,16 +163,25 @@ def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
             quantity="--live",
             remedy="give - for standard input, or udp://127.0.0.1:5555 for datagrams",
         )
+    bound = _bound(host, port)
+    bound.settimeout(LOOK)
+    name = f"udp://{host}:{bound.getsockname()[1]}"
+    return LineSource(name, lambda: bound.recv(65_536) or b"\n", clock, bound.close)
+
+
+def _bound(host: str, port: int) -> socket.socket:
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        bound = socket.socket(family, socket.SOCK_DGRAM)
-        bound.bind(address)
+        made = socket.socket(family, socket.SOCK_DGRAM)
+        try:
+            made.bind(address)
+        except OSError:
+            made.close()
+            raise
     except OSError as error:
         raise ConfigError(
             f"it cannot be listened to: {error.strerror or error}",
             quantity="--live",
             remedy="give an address of this machine and a port that is free; 0 takes any",
         ) from None
-    bound.settimeout(LOOK)
-    name = f"udp://{host}:{bound.getsockname()[1]}"
-    return LineSource(name, lambda: bound.recv(65_536) or b"\n", clock, bound.close)
+    return made
