@@ -212,6 +212,11 @@ def drawn(plan, seed):
         for part in (slice(0, 3), slice(3, 6)):
             unit = direction[:, part] / np.linalg.norm(direction[:, part], axis=1)[:, None]
             noises[wild, part] += 50.0 * (POSITION_SD, VELOCITY_SD)[part.start // 3] * unit[wild]
+    # The antenna's: what the Earth's own rate adds at its arm is a tenth of a millimetre a second.
+    swung = np.cross(MOTION.rate(at - plan.late), arm)
+    velocities = np.array(
+        [state.v_n + rotation.rotate(state.q_nb, w) for state, w in zip(states, swung, strict=True)]
+    )
     shifted = np.empty((m, 3))
     for k, state in enumerate(states):
         apart = np.r_[-noises[k, :3] - rotation.rotate(state.q_nb, arm), np.zeros(6)]
@@ -220,7 +225,7 @@ def drawn(plan, seed):
     gnss = gnss_table(
         at,
         shifted,
-        np.array([state.v_n for state in states]) + noises[:, 3:],
+        velocities + noises[:, 3:],
         plan.stated * np.array([POSITION_SD, POSITION_SD, UNKNOWN if held else POSITION_SD]),
         (plan.stated * VELOCITY_SD,) * 3,
     )
@@ -261,8 +266,8 @@ def run(plan, seed):
 
 
 def error_of(navigator, state, piece, bias):
-    """Physical errors of a state at the last instant of its covariance."""
-    used, now = navigator.filter.mechanization, state.engine.filter
+    """Physical errors of a state at its newest step, at most one group after its covariance."""
+    used, now = navigator.filter.mechanization, state.engine
     if navigator.damping.feeds_back:
         computed = used.nav_state(now.mechanization, now.time)
     else:

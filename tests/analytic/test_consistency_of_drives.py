@@ -28,11 +28,9 @@ def told(plan, seed):
 
 
 def test_a_filter_that_is_right_is_left_in_peace():
-    # Twelve sets of tests, each with one false alarm in a hundred; three would come once in 5000.
-    wrong = sum(
-        bool(kinds) for seed in range(6) for kinds in told(Plan(epochs=LAST), seed).values()
-    )
-    assert wrong < 3
+    # Eight sets of tests, each with one false alarm in a hundred; two would come once in 370.
+    runs = [told(Plan(epochs=LAST), seed) for seed in range(4)]
+    assert sum(bool(kinds) for one in runs for kinds in one.values()) < 2
 
 
 @pytest.mark.parametrize(

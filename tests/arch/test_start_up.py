@@ -38,6 +38,8 @@ def test_dir_and_an_unknown_name_load_nothing_either():
         ["reproduce", "--help"],
         ["crash", "--help"],
         ["init", "align", "--help"],
+        ["init", "navigate", "--help"],
+        ["navigate", "--help"],
         ["init", "crash", "--help"],
         ["verify", "--help"],
         ["--version"],

@@ -21,6 +21,7 @@ from bad_crash_case import CRASH_CASES
 from bad_crash_records import RECORD_CALLS
 from bad_init import init_section
 from bad_inputs import CASES
+from bad_navigate import navigate_section
 from bad_navigation import CALLS
 
 from strapdown.exceptions import StrapdownError
@@ -101,6 +102,7 @@ def page(tmp_path_factory, run_cli, crash_said):
             + f"```text\n{said}```\n\nExit code {result.code}.\n\n"
         )
     sections.append(alignment_section(tmp_path_factory.mktemp, run_cli))
+    sections.append(navigate_section(tmp_path_factory.mktemp, run_cli))
     sections.append(init_section(tmp_path_factory.mktemp, run_cli))
     return HEAD + "".join(sections) + _crash_cases(crash_said) + _from_python()
 

@@ -37,8 +37,8 @@ BEYOND = 1.000001
 # A call hands over what belongs together:
 # - kinds: (mechanization, form, whether the height is held);
 # - model: (terms of gyros, terms of accelerometers, decay, drive, noise (2, 3), earth, options);
-# - states: (mechanization, covariance, sensors, times, newest increment without errors), which go
-#   on in place;
+# - states: (mechanization, the same at the covariance, covariance, sensors, times, newest increment
+#   without errors), which go on in place;
 # - group: (rows of the history, the first at its start; increments), of what is not closed yet;
 # - room: arrays to work in.
 
@@ -53,7 +53,7 @@ def close_group(kinds, model, states, group, count, room):
         return -1
     which, form, held = kinds
     gyro_terms, accel_terms, decay, drive, noise, earth, _ = model
-    _, covariance, sensors, times, _ = states
+    state, at_covariance, covariance, sensors, times, _ = states
     open_history, open_rows = group
     f, phi, tail, q, work, matrix, level, after, whole, added = room
     q_at, up = Q_NB, -1.0
@@ -91,7 +91,11 @@ def close_group(kinds, model, states, group, count, room):
             if i >= CORE:
                 whole[i, i] = tail[i - CORE]
         bad = udu_predict(covariance, whole, added, after)
-    covariance[:, :] = after
+    for i in range(covariance.shape[0]):
+        for j in range(covariance.shape[1]):
+            covariance[i, j] = after[i, j]
+    for j in range(state.shape[0]):
+        at_covariance[j] = state[j]
     for j in range(tail.shape[0]):
         sensors[j] *= tail[j]
     for j in range(open_history.shape[1]):
@@ -109,7 +113,7 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
     `room` is of errors of readings, (2, 7, 3).
     """
     gyro_terms, accel_terms, _, _, _, earth, options = model
-    state, _, sensors, times, newest = states
+    state, _, _, sensors, times, newest = states
     open_history, open_rows = group
     closing, errors, heights = room
     made = 0
@@ -142,9 +146,12 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
             went, why = ned_advance(state, new, heights, earth, options, into)
         if why != 0:
             return DIVERGED, made + went, count
-        history[made:end] = into
+        for i in range(made, end):
+            for j in range(history.shape[1]):
+                history[i, j] = open_history[count + 1 + i - made, j]
         count = last
         made = end
         times[AT_STEP] = time[end - 1]
-        newest[:] = open_rows[last - 1]
+        for j in range(newest.shape[0]):
+            newest[j] = open_rows[last - 1, j]
     return ALL, made, count

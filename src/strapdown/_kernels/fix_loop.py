@@ -49,7 +49,9 @@ BAD_FIX = 4
 @njit(cache=True, error_model="numpy")
 def level_place(which, state, turn):
     """Latitude, longitude and height; fills C_nl, level to north-east-down, (3, 3)."""
-    turn[:, :] = 0.0
+    for i in range(3):
+        for j in range(3):
+            turn[i, j] = 0.0
     if which == WANDER:
         lat, lon, angle = geodetic_from_wander(state[0], state[1], state[2], state[3])
         s, c = math.sin(angle), math.cos(angle)
@@ -110,8 +112,10 @@ def meet_fix(which, state, earth, gyro_terms, last, arm, of_place, fix, turn, z,
     x = c[0] * arm[0] + c[1] * arm[1] + c[2] * arm[2]
     y = c[3] * arm[0] + c[4] * arm[1] + c[5] * arm[2]
     w = c[6] * arm[0] + c[7] * arm[1] + c[8] * arm[2]
-    R[:] = fix[VARIANCE : VARIANCE + 3]
-    h[:, :] = 0.0
+    for i in range(3):
+        R[i] = fix[VARIANCE + i]
+        for j in range(h.shape[1]):
+            h[i, j] = 0.0
     told = np.empty(3)
     if of_place:
         told[0], told[1], told[2] = x, y, w
@@ -206,7 +210,7 @@ def over_fixes(
     An instant within `same` seconds of another is the same.
     """
     which, form, _ = kinds
-    state, covariance, sensors, times, last = states
+    state, at_covariance, covariance, sensors, times, last = states
     open_history, _ = group
     earth = model[5]
     n, size = 9 + sensors.shape[0], covariance.shape[0]
@@ -259,7 +263,8 @@ def over_fixes(
                     between,
                 )
                 if went == 1:
-                    rows[end] = cut[1]
+                    for j in range(rows.shape[1]):
+                        rows[end, j] = cut[1, j]
                 if why != ALL:
                     return why, made, count, done
             continue
@@ -269,15 +274,19 @@ def over_fixes(
             return BAD, made, count, done
         of_place = fixes[done, CODE] == place_code
         meet_fix(which, state, earth, model[0], last, arm, of_place, fixes[done], turn, z, h, H, R)
-        x[:] = 0.0
-        told[done, 2] = 1.0
+        for j in range(size):
+            x[j] = 0.0
+        for j in range(3):
+            told[done, 2, j] = 1.0
         if form == UD:
             wrong = ud_update(covariance, x, z, H, R, told[done])
         elif form == WD:
             wrong = wd_epoch(
                 covariance, covariance, covariance, False, x, z, H, R, told[done], after
             )
-            covariance[:, :] = after
+            for i in range(size):
+                for j in range(size):
+                    covariance[i, j] = after[i, j]
         else:
             wrong = dense_update(covariance, x, z, H, R, form != PLAIN, told[done])
         if wrong != -1:
@@ -297,6 +306,8 @@ def over_fixes(
         )
         for j in range(open_history.shape[1]):
             open_history[0, j] = state[j]
+        for j in range(state.shape[0]):
+            at_covariance[j] = state[j]
         if made > 0 and times[AT_STEP] <= time[made - 1] + same:
             for j in range(history.shape[1]):
                 history[made - 1, j] = state[j]

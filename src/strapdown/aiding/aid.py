@@ -56,6 +56,11 @@ class Aid(ABC):
     summary: ClassVar[str]
     source: ClassVar[str]
 
+    @property
+    def wants_steady(self) -> bool:
+        """Whether it looks at rate and force without the shaking: `View.steady`."""
+        return False
+
     def states(self) -> tuple[SensorStates, ...]:
         """States that it needs beside those of the inertial sensors, named ``name.block``."""
         return ()

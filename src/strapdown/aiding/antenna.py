@@ -94,7 +94,12 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
     place = Moving(r, d_arm + _at(DISPLACEMENT, view.columns))
     velocity = Moving(view.velocity + swept, d_swept + _at(VELOCITY, view.columns))
 
-    force = C @ view.force
+    rate, felt = _steady(view)
+    force = C @ felt
+    W = C @ rate - spin
+    turning = cross_matrix(W)
+    swept = turning @ r
+    d_swept = turning @ d_arm - across @ d_W
     here = view.here
     g = gravity(math.degrees(here.lat), here.alt, ellipsoid=view.ellipsoid)
     value = force + view.C_ln @ g - 2.0 * np.cross(spin, view.velocity) + turning @ swept
@@ -109,6 +114,18 @@ def _at(where: slice, columns: int) -> Array:
     out = np.zeros((3, columns))
     out[:, where] = np.eye(3)
     return out
+
+
+def _steady(view: View) -> tuple[Array, Array]:
+    """Rate and force without the shaking, where it is known, and without the estimated errors."""
+    if view.steady is None:
+        return view.rate, view.force
+    stacked = view.model.stacked
+    felt = np.concatenate([[1.0], view.steady])
+    return (
+        view.steady[:3] - np.tensordot(felt, stacked.gyro, 1) @ view.sensors,
+        view.steady[3:] - np.tensordot(felt, stacked.accel, 1) @ view.sensors,
+    )
 
 
 def _of_accel(view: View) -> Array:

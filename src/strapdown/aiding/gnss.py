@@ -49,10 +49,9 @@ class Gnss(TableAid):
     epoch: what is left out is a sixth of its jerk times the offset's third power. Where a state
     finds more than 0.1 s, begin again with what was found as `time_offset`.
 
-    Only places tell of the offset. Velocities would by the acceleration, but what an accelerometer
-    reads at an instant is mostly shaking that no receiver sees: taken for the acceleration, it
-    would seem to tell at every fix that nothing is off. What the offset does to a velocity is
-    noise: acceleration times its standard deviation.
+    The acceleration is that of `View.steady`. What an accelerometer reads at an instant is mostly
+    shaking that no receiver sees: taken for the acceleration, it would seem to tell at every
+    velocity that nothing is off.
 
     Attributes
     ----------
@@ -165,6 +164,11 @@ class Gnss(TableAid):
             out.append(random_walk(offset, self.time_offset_drift))
         return tuple(out)
 
+    @property
+    def wants_steady(self) -> bool:
+        """With a time offset that is estimated, by the acceleration."""
+        return self.time_offset_sd > 0.0
+
     def epochs(self, table: pd.DataFrame) -> Epochs:
         """Return an epoch for each place and for each velocity; see `TableAid.epochs`."""
         check_gnss(table)
@@ -220,12 +224,8 @@ class Gnss(TableAid):
             z += displacement_between(view.here, measured, view.ellipsoid)
         else:
             z -= values[1:4]
-        R = values[4:7]
-        if not of_place and view.has(self._offset):
-            k = view.place(self._offset).start
-            R = R + float(view.covariance[k, k]) * np.square(C_nl @ acceleration.value)
         name, labels = self.names(values)
-        return [Observation(name, z, H, R, labels)]
+        return [Observation(name, z, H, values[4:7], labels)]
 
     def names(self, values: Array) -> tuple[str, tuple[str, ...]]:
         """Return the name of the observation of an epoch, and the labels of its components."""
@@ -253,11 +253,11 @@ def _later(
 ) -> Moving:
     """Place or velocity so much after the epoch, by which the assumed offset is too large."""
     speed = velocity.after(acceleration, late)
-    if not of_place:
-        return speed
-    out = place.after(velocity, late).after(acceleration, 0.5 * late**2)
+    out, changes = speed, acceleration
+    if of_place:
+        out, changes = place.after(velocity, late).after(acceleration, 0.5 * late**2), speed
     H = out.H.copy()
-    H[:, view.place(name)] = -speed.value[:, None]
+    H[:, view.place(name)] = -changes.value[:, None]
     return Moving(out.value, H)
 
 

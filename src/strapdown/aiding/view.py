@@ -46,6 +46,9 @@ class View:
         Specific force, the same.
     covariance_of : callable, optional
         Makes the covariance of the physical errors at this instant; it costs something.
+    steady : ndarray, (6,), optional
+        Rate and force as fading means over some tenths of a second, as the sensors gave them, in
+        the axes of the body of now; for an aid that wants them (`Aid.wants_steady`).
     """
 
     mechanization: Mechanization
@@ -57,6 +60,7 @@ class View:
     rate: Array
     force: Array
     covariance_of: Callable[[], Array] | None = None
+    steady: Array | None = None
 
     @cached_property
     def covariance(self) -> Array:

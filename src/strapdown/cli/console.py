@@ -69,12 +69,20 @@ def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     if quiet or not out.is_terminal:
         yield lambda stage, share: None
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     with Progress(
         TextColumn("{task.description}", markup=False),
         BarColumn(),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
         console=out,
         transient=True,
     ) as bar:

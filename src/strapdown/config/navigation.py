@@ -46,6 +46,7 @@ __all__ = [
     "RecorderSpec",
     "StartTable",
     "TruthTable",
+    "WithholdTable",
     "aids_of",
     "receivers_of",
 ]
@@ -124,7 +125,8 @@ class NavigationSiteTable(TableSpec):
 class NavigationSensorsTable(SensorsTable):
     """What is not known of the sensors, and which of it the filter estimates."""
 
-    #: Names of blocks of states; biases and their drifts, if not given.
+    #: Names of blocks of states; biases, drifts, and scale factors and misalignments that are
+    #: stated, if not given.
     states: tuple[Word, ...] | None = None
 
 
@@ -212,6 +214,20 @@ class TruthTable(TableSpec):
     path: FileName
 
 
+class WithholdTable(TableSpec):
+    """Fixes that are kept from the navigator, stretch by stretch, to score it by."""
+
+    #: The aid whose fixes they are; the first of kind gnss, if not given.
+    aid: Word | None = None
+    #: Begin and end of each stretch, on the clock of the samples; each is tried by itself.
+    spans_s: tuple[Pair, ...] = ()
+    #: Or lengths, each at so many places, spread evenly.
+    lengths_s: tuple[Positive, ...] = ()
+    places: StrictInt = Field(default=5, ge=1, le=100)
+    #: Of the first one; half a minute after navigation begins, if not given.
+    from_s: Number | None = None
+
+
 class NavigationOutputTable(TableSpec):
     """What is written beside the report."""
 
@@ -245,6 +261,7 @@ class NavigationSpec(TableSpec):
     recorder: RecorderSpec = RecorderSpec()
     aiding: TableSpec = TableSpec()
     truth: TruthTable | None = None
+    withhold: WithholdTable | None = None
     output: NavigationOutputTable = NavigationOutputTable()
 
     @model_validator(mode="before")

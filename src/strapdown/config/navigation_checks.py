@@ -22,7 +22,7 @@ from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.stated_states import stated_states
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
@@ -79,10 +79,12 @@ class _Checks(SourceChecks):
         yield partial(self.begins, spec)
         for name in STAGES:
             yield partial(self.stage, spec, name)
+        yield partial(self.height, spec)
         yield partial(self.modes, spec)
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
             yield partial(self.aid, spec, name)
+        yield partial(self.withhold, spec)
         yield partial(self.output, spec)
         yield partial(self.chain, spec)
 
@@ -132,8 +134,19 @@ class _Checks(SourceChecks):
     def stage(self, spec: NavigationSpec, name: str) -> None:
         self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
 
+    def height(self, spec: NavigationSpec) -> None:
+        """A height that is damped has a loop of its own."""
+        if getattr(spec.mechanization, "height", "") == "damped":
+            raise self.refuse(
+                ("mechanization", "height"),
+                "the filter has no states for the loop that damps the height",
+                'write "free", and give heights by an aid (barometer, gnss); or "held"',
+            )
+
     def modes(self, spec: NavigationSpec) -> None:
         """What ends each alignment, and what is said of one that is not there."""
+        if spec.start is not None:
+            return
         for stage in ("coarse", "fine"):
             given = getattr(spec, stage)
             ends = [n for n in ENDS if getattr(given, n, None) is not None]
@@ -207,6 +220,35 @@ class _Checks(SourceChecks):
                 'it observes the height, and [mechanization] height = "held" keeps it where it is',
                 'write height = "free", or leave this aid out',
             )
+
+    def withhold(self, spec: NavigationSpec) -> None:
+        """Which fixes are kept back, and when."""
+        given = spec.withhold
+        if given is None:
+            return
+        if given.aid is None and not _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"), "no aid gives fixes to keep back", "leave [withhold] out"
+            )
+        if given.aid is not None and given.aid not in _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"),
+                "there is no aid of this name that gives fixes",
+                nearest(given.aid, _fixes(spec)),
+            )
+        if bool(given.spans_s) == bool(given.lengths_s):
+            raise self.refuse(
+                ("withhold", "spans_s"),
+                "nothing says when" if not given.spans_s else "lengths_s is given, too",
+                "write spans_s = [[begin, end]], or lengths_s = [10.0, 30.0, 60.0] and places = 5",
+            )
+        for begin, end in given.spans_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("withhold", "spans_s"),
+                    f"from {begin:g} to {end:g} s there is no time",
+                    "give the begin before the end",
+                )
 
     def output(self, spec: NavigationSpec) -> None:
         for form in spec.output.files:

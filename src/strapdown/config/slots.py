@@ -75,30 +75,17 @@ _PLAIN = (float, int, bool, str)
 #: Units of options whose names do not have them, as the endings of keys; another module's option
 #: is named with its unit, or has it in its field's metadata: ``metadata={"unit": "s"}``.
 UNITS = {
-    "Barometer.bias_sd": "m",
-    "Barometer.walk": "m_per_sqrt_h",
-    "NoSlip.lateral_sd": "m_per_s",
-    "NoSlip.vertical_sd": "m_per_s",
     "RobustWd.bandwidth": "hz",
-    "ZeroRate.sd_deg": "per_s",
-    "ZeroRate.window": "s",
-    "ZeroVelocity.sd": "m_per_s",
-    "ZeroVelocity.window": "s",
     "attenuation": "db",
     "correlation_time": "s",
-    "dive": "rad_per_m_per_s2",
-    "force_sd": "m_per_s2",
     "gravity": "m_per_s2",
     "height_limits": "m",
     "height_time_constant": "s",
     "interval": "s",
-    "largest_rate_deg": "per_s",
     "largest_speed": "m_per_s",
     "least_speed": "m_per_s",
     "lever_arm": "m",
     "rate": "hz",
-    "rate_sd_deg": "per_s",
-    "slip": "rad_per_m_per_s2",
 }
 
 

@@ -19,7 +19,9 @@ from strapdown.estimation.sensor_blocks import (
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.estimation.standard_states import standard_states
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
+from strapdown.sensors.triad_errors import Triad
+from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 __all__ = ["STATED_STATES", "stated_states"]
 
@@ -38,6 +40,10 @@ STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
 }
 
 
+#: Errors that go with rate and force: nothing at rest, and most of all on the move.
+MOVING = ("gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment")
+
+
 def stated_states(
     sensors: ImuUncertainty, names: Sequence[str] | None = None
 ) -> tuple[SensorStates, ...]:
@@ -48,8 +54,10 @@ def stated_states(
     sensors : ImuUncertainty
         How large each may be.
     names : sequence of str, optional
-        Of `STATED_STATES`; biases and drifts as `standard_states`, if not given. A bias that is
-        named without its drift is a random walk that bounds both.
+        Of `STATED_STATES`; if not given, biases and drifts as `standard_states`, and of scale
+        factors and misalignments those whose size is stated: without them the bounds of a body that
+        turns and accelerates are too narrow. A bias that is named without its drift is a random
+        walk that bounds both.
 
     Returns
     -------
@@ -61,7 +69,8 @@ def stated_states(
         There is no such block, one is named twice, or nothing states its size.
     """
     if names is None:
-        return standard_states(sensors)
+        known = [n for n in MOVING if any(_size(n, sensors))]
+        return (*standard_states(sensors), *(_block(n, sensors, {}, known) for n in known))
     bounds = {one.block.name: one for one in standard_states(sensors, separate=False)}
     out = []
     for name in names:
@@ -83,8 +92,7 @@ def _block(
     triad, attribute, make, keys = STATED_STATES[name]
     if attribute == "bias" and f"{triad}_drift" not in names:
         return bounds[name]
-    drift = getattr(sensors, f"{triad}_drift")
-    sd = drift.triad if attribute == "drift" else getattr(sensors, triad).axis(attribute)
+    drift, sd = getattr(sensors, f"{triad}_drift"), _size(name, sensors)
     if not any(sd):
         raise ConfigError(
             f"nothing states how large '{name}' may be",
@@ -101,3 +109,13 @@ def _block(
             "without end is a part of the bias",
         )
     return make(sd, drift.correlation_time)
+
+
+def _size(name: str, sensors: ImuUncertainty) -> Triad:
+    """Standard deviation of a block, axis by axis."""
+    triad, attribute, _, _ = STATED_STATES[name]
+    if attribute == "drift":
+        drift: BiasDrift = getattr(sensors, f"{triad}_drift")
+        return drift.triad
+    stated: TriadUncertainty = getattr(sensors, triad)
+    return stated.axis(attribute)

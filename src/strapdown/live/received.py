@@ -82,6 +82,9 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
             path = folder / f"{name}.csv"
             rows.write(path)
             whole["aiding"][name]["path"] = str(path)
+    if not all(rows.count for rows in got.rows.values()):
+        # Of an aid that sent nothing there is nothing to keep back.
+        whole.pop("withhold", None)
     commands = [one.model_dump(mode="json") for one in got.commands]
     whole["commands"] = [*whole.get("commands", []), *commands]
     return navigation_spec(whole)

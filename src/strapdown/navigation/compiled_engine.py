@@ -112,9 +112,11 @@ class CompiledEngine(Engine):
         self._sensors = state.filter.sensors.copy()
         self._times = np.array([state.filter.time, state.time])
         self.mechanization = state.mechanization.copy()
+        self._at_covariance = state.filter.mechanization.copy()
         self._newest = state.last.copy()
         self._states = (
             self.mechanization,
+            self._at_covariance,
             self._covariance,
             self._sensors,
             self._times,
@@ -239,6 +241,7 @@ class CompiledEngine(Engine):
         """Take what is observed now."""
         self.filter, seen = self.navigation.observe(self.filter, observations, rules)
         self.mechanization[:], self.row = self.filter.mechanization, self.filter.row
+        self._at_covariance[:] = self.mechanization
         self._sensors[:] = self.filter.sensors
         self._covariance[: self._n, : self._n] = self.filter.covariance
         self._group[0][0] = self.row
@@ -299,7 +302,7 @@ class CompiledEngine(Engine):
             self.filter = replace(
                 self.filter,
                 time=float(self._times[kernel.AT_COVARIANCE]),
-                mechanization=self.mechanization.copy(),
+                mechanization=self._at_covariance.copy(),
                 row=self._group[0][0].copy(),
                 sensors=self._sensors.copy(),
                 covariance=self._covariance[:n, :n].copy(),

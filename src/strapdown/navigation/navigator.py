@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels.split_increment import split_increment
+from strapdown._kernels.steady_motion import STEADY, steady_motion
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
@@ -26,6 +27,10 @@ from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
 from strapdown.navigation.damping import Damping, Feedback
 from strapdown.navigation.engine import SAME_INSTANT, Engine, EngineState, GeneralEngine, begun
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
+
+#: Over which shaking is taken out of rates and forces, s: beyond a tenth of a second it is not seen
+#: by receivers, and a vehicle does not change its acceleration by much in it.
+STEADY_TIME = 0.2
 
 __all__ = ["Navigator", "NavigatorState", "with_states"]
 
@@ -48,6 +53,8 @@ class NavigatorState:
         Time of the last mark.
     scales : mapping of str to tuple of ScaleState
         By name of an observation whose rule learns: what it has learnt of each component.
+    steady : ndarray, (7,)
+        Fading means of rate and force (`_kernels.steady_motion`), where an aid wants them.
     """
 
     engine: EngineState
@@ -55,6 +62,7 @@ class NavigatorState:
     memories: Mapping[str, Any]
     marked: float
     scales: Mapping[str, Scales] = field(default_factory=dict)
+    steady: Array = field(default_factory=lambda: np.zeros(STEADY))
 
     @property
     def time(self) -> float:
@@ -196,7 +204,9 @@ class Navigator:
             The state has left what the mechanization can do; the sample is named.
         """
         going = _Going(self, state)
-        going.over(np.asarray(time, dtype=np.float64), np.ascontiguousarray(rows))
+        # What is writeable is one type for compiled code, and what is not another.
+        stamps = np.require(time, np.float64, ["C", "W"])
+        going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
         return going.state(), going.piece()
 
     def engine(self, state: EngineState) -> Engine:
@@ -216,6 +226,9 @@ class _Going:
         self.memories = dict(state.memories)
         self.marked = state.marked
         self.scales = dict(state.scales)
+        self.steady = state.steady.copy()
+        self.begun_steady = state.steady
+        self.steadies: Array | None = None
         self.seen: list[Seen] = []
         self.marks: list[Mark] = []
         self.late: list[tuple[str, float]] = []
@@ -230,6 +243,9 @@ class _Going:
                     self.memories[aid.name], time, rows
                 )
         self._drop_late()
+        if any(aid.wants_steady for aid in self.navigator.aids):
+            self.steadies = np.empty((len(rows), 6))
+            steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
         rows = rows.copy()
         self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
         at = self._fixes(time, rows)
@@ -293,7 +309,12 @@ class _Going:
     def state(self) -> NavigatorState:
         """Where it is now."""
         return NavigatorState(
-            self.engine.state(), self.queues, self.memories, self.marked, self.scales
+            self.engine.state(),
+            self.queues,
+            self.memories,
+            self.marked,
+            self.scales,
+            self.steady,
         )
 
     def piece(self) -> NavigationPiece:
@@ -301,6 +322,15 @@ class _Going:
         return NavigationPiece(
             self.time, self.history, tuple(self.seen), tuple(self.marks), tuple(self.late)
         )
+
+    def _steady(self, at: float) -> Array | None:
+        """Rate and force without the shaking, at the last sample before an instant."""
+        if self.steadies is None:
+            return None
+        k = int(np.searchsorted(self.time, at + SAME_INSTANT, side="right"))
+        if k:
+            return np.asarray(self.steadies[k - 1])
+        return self.begun_steady[:6] if self.begun_steady[6] else None
 
     def _next_epoch(self) -> float:
         return min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
@@ -341,6 +371,7 @@ class _Going:
             rate=last[1:4] / last[0],
             force=last[4:7] / last[0],
             covariance_of=partial(filter_.physical_covariance, engine.filter),
+            steady=self._steady(at),
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:

@@ -66,8 +66,9 @@ class NavigationRecord:
     units : mapping of str to str
         Unit of each of these columns.
     innovations : mapping of str to DataFrame
-        By name of the observation, by time: for each component ``nu LABEL`` (observed less
-        expected), ``s LABEL`` (its expected variance), ``weight LABEL``.
+        By name of the observation, by time: for each component ``nu LABEL`` (computed less
+        observed, less what was expected of it), ``s LABEL`` (its expected variance),
+        ``weight LABEL``.
     events : tuple of Event
         In the order of time.
     modes : tuple of Span

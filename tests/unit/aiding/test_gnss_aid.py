@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import earth, rotation
+from strapdown._kernels.steady_motion import steady_motion
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
@@ -84,10 +85,6 @@ def test_every_column_is_the_central_difference_of_the_nonlinear_observation(nam
     for row in rows_of(AID, table_of([55.0001, 37.0001, 310.0], [29.0, -19.0, 0.0])):
         H = AID.observe(seen(used, model, state, base), row)[0].H
         for j in range(model.physical_size):
-            if row[0] and j == view.place("rtk.time_offset").start:
-                # To a velocity the offset is noise, and no column.
-                assert not H[:, j].any()
-                continue
             step = 1e-4 if j >= 6 else 1e-1
             error = np.zeros(model.physical_size)
             error[j] = step
@@ -144,20 +141,32 @@ def test_an_offset_of_time_is_met_to_the_second_order():
         assert 0.5 * np.linalg.norm(acceleration) * late**2 > 10.0 * jerk * late**3 / 6.0
 
 
-def test_shaking_tells_nothing_of_the_offset():
-    view = replace(view_of("ned"), covariance_of=lambda: np.eye(view_of("ned").columns) * 0.04)
-    row = rows_of(AID, table_of([55.0, 37.0, 300.0], [30.0, -20.0, 1.0], sd=0.1))[1]
-    still, shaken = (
-        AID.observe(replace(view, force=FORCE + more), row)[0]
-        for more in (np.zeros(3), np.array([3.0, 0.0, 0.0]))
-    )
-    assert (still.z == shaken.z).all()
-    # An acceleration of 3 m/s² times 0.2 s, in one direction, beside what there was.
-    assert still.R.min() >= 0.01
-    assert shaken.R.sum() > still.R.sum()
-    plain = replace(AID, time_offset_sd=0.0)
-    (told,) = plain.observe(view_of("ned", plain), row)
-    assert np.abs(told.R - 0.01).max() < 1e-15
+def test_the_acceleration_is_that_without_the_shaking():
+    view = view_of("ned")
+    row = rows_of(AID, table_of([55.0, 37.0, 300.0], [30.0, -20.0, 1.0]))[1]
+    felt = np.r_[RATE, FORCE]
+    shaken = replace(view, force=FORCE + np.array([3.0, -2.0, 1.0]), steady=felt)
+    assert (AID.observe(shaken, row)[0].H == AID.observe(view, row)[0].H).all()
+    assert AID.wants_steady
+    assert not replace(AID, time_offset_sd=0.0).wants_steady
+
+
+def test_a_force_that_stays_in_inertial_axes_is_steady_in_a_turn():
+    rows = np.zeros((400, 10))
+    turn = np.array([0.2, -0.3, 1.0])
+    gravity = np.array([0.1, 0.2, -9.8])
+    for k, row in enumerate(rows):
+        C = rotation.dcm_from_rotation_vector((k + 1) * 0.01 * turn)
+        row[:7] = [0.01, *(0.01 * turn), *(0.01 * (C.T @ gravity))]
+    out, memory = np.empty((400, 6)), np.zeros(7)
+    steady_motion(rows, 0.2, memory, out)
+    # Turns to second order: (1e-2)³/6 a step over the 20 steps of the memory, times 9.8.
+    assert np.abs(out[-1, 3:] - C.T @ gravity).max() < 20 * 0.0106**3 / 6.0 * 9.8 + 1e-12
+    assert np.abs(out[-1, :3] - turn).max() < 1e-12
+    pieces, again = np.empty((400, 6)), np.zeros(7)
+    for lo in range(0, 400, 37):
+        steady_motion(rows[lo : lo + 37], 0.2, again, pieces[lo : lo + 37])
+    assert (pieces == out).all()
 
 
 def test_epochs_are_where_the_fixes_were_made():

@@ -256,6 +256,10 @@ def test_the_table_turns_by_half_a_turn_and_stands_otherwise():
 
 def test_a_unit_is_the_same_every_time_and_gains_at_rest_alone():
     one, again = units.units(1), units.units(1)
+    assert one.forward_apart == again.forward_apart
+    # Errors of 1e-4 rad and 0.5 m/s to first order: their products with the turn of the place,
+    # and the covariance's steps of 0.1 s, are parts of 1e-3.
+    assert one.forward_apart < 1e-3 * one.still.undamped[0].speed.max()
     for kind in ("still", "turned"):
         a, b = getattr(one, kind), getattr(again, kind)
         np.testing.assert_array_equal(a.damped[0].velocity, b.damped[0].velocity)
@@ -304,9 +308,9 @@ def test_damping_turns():
         assert damping.damped_from(quantity, twice, twice, twice).verdict == HOLDS
         assert damping.damped_from(quantity, none, none, twice).verdict == DOES_NOT_HOLD
     judge = damping.comparison_from
-    assert judge(0.8, 1.1, 950.0, 3500.0, 2600.0).verdict == HOLDS_WHEN
-    assert judge(0.8, 1.1, 950.0, 1000.0, 2600.0).verdict == HOLDS
-    assert judge(0.3, 1.1, 950.0, 3500.0, 2600.0).verdict == DOES_NOT_HOLD
+    assert judge(0.8, 1.1, 950.0, 3500.0, 2600.0, 1e-4).verdict == HOLDS_WHEN
+    assert judge(0.8, 1.1, 950.0, 1000.0, 2600.0, 1e-4).verdict == HOLDS
+    assert judge(0.3, 1.1, 950.0, 3500.0, 2600.0, 1e-4).verdict == DOES_NOT_HOLD
 
 
 def test_equations_turn():

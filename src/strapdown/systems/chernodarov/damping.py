@@ -237,13 +237,22 @@ def comparison(many: Units) -> Statement:
         float(at_times(many.still, "damped", last)[-1]),
         float(at_times(many.turned, "damped", last)[-1]),
         float(predicted_at(many.still, "independent", last)[-1]),
+        many.forward_apart,
     )
 
 
 def comparison_from(
-    least: float, most: float, still: float, turned: float, independent: float
+    least: float,
+    most: float,
+    still: float,
+    turned: float,
+    independent: float,
+    forward: float,
 ) -> Statement:
-    """Judge from the extremes of measured over predicted, and from Delta S after an hour, m."""
+    """Judge from the extremes of measured over predicted, and from Delta S after an hour, m.
+
+    `forward` is by how much, in m/s, it matters whether estimates are fed back or forward.
+    """
     if not (least > 1.0 / AGREES and most < AGREES):
         verdict, condition = DOES_NOT_HOLD, ""
     elif turned > 2.0 * still:
@@ -263,13 +272,16 @@ def comparison_from(
         condition,
         "The covariance at the end of the alignment, taken over the hour, against the units. By "
         "the same standard deviations without their correlations a table that stands would be "
-        "expected to do as badly as one that is turned: the cancelling is in the correlations.",
+        "expected to do as badly as one that is turned: the cancelling is in the correlations. "
+        "Whether the estimates are fed back to the sensors, or (6) predicts what they do to a "
+        "mechanization that runs free, comes to the same.",
         (
             Evidence("measured over predicted, least", least),
             Evidence("measured over predicted, most", most),
             Evidence("ΔS after an hour, damped", still, "m"),
             Evidence("the same, table turned", turned, "m"),
             Evidence("predicted without correlations", independent, "m"),
+            Evidence("ΔV apart, fed back and fed forward", forward, "m/s"),
         ),
         "turned",
     )

@@ -22,6 +22,7 @@ from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.increments import motion_increments
+from strapdown.navigation.damping import Damping, Feedback
 from strapdown.navigation.navigator import Navigator
 from strapdown.simulation import Origin, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
@@ -194,6 +195,7 @@ class Drive:
         fixes: pd.DataFrame | None,
         model: type[ErrorModel] = QuaternionModel,
         damped: bool = True,
+        damping: Damping | None = None,
     ) -> Driven:
         """Drive.
 
@@ -205,6 +207,8 @@ class Drive:
         model : type of ErrorModel
         damped : bool
             Whether the estimates of the alignment are taken off the sensors.
+        damping : Damping, optional
+            Whether what is estimated is fed back; it is, if not given.
 
         Returns
         -------
@@ -215,7 +219,7 @@ class Drive:
         begun = fine.state
         if not damped:
             begun = replace(begun, sensors=np.zeros_like(begun.sensors))
-        navigator = Navigator(filter_, (Gnss(name="gnss"),))
+        navigator = Navigator(filter_, (Gnss(name="gnss"),), damping=damping or Feedback())
         state = navigator.begin_from(begun)
         if fixes is not None:
             state = navigator.tell(state, "gnss", fixes)

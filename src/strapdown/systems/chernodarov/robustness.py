@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.navigation.damping import Feedforward
 from strapdown.systems.chernodarov.drive import (
     ENDS,
     OUTAGE,
@@ -65,13 +66,14 @@ class Runs:
     ----------
     drive : Drive
     found : dict of Driven
-    by_rotation_vector : Driven
-        `ALSO` with the other error model.
+    by_rotation_vector, fed_forward : Driven
+        `ALSO` with the other error model, and with the mechanization left free.
     """
 
     drive: Drive
     found: dict[tuple[str, str, str], Driven]
     by_rotation_vector: Driven
+    fed_forward: Driven
 
     def of(self, receiver: str, fixes: str, rule: str) -> Driven:
         """Return one of `RUNS`."""
@@ -88,10 +90,10 @@ def runs(drive: Drive) -> Runs:
         for receiver, fixes, rule in RUNS
     }
     receiver, fixes, rule = ALSO
-    other = drive.navigate(
-        RULES[rule], drive.fixes(fixes, receivers[receiver]), RotationVectorModel
-    )
-    return Runs(drive, found, other)
+    told = drive.fixes(fixes, receivers[receiver])
+    other = drive.navigate(RULES[rule], told, RotationVectorModel)
+    forward = drive.navigate(RULES[rule], told, damping=Feedforward())
+    return Runs(drive, found, other, forward)
 
 
 def since_outage(run: Driven) -> tuple[float, float]:
@@ -104,6 +106,7 @@ def table(made: Runs) -> Table:
     receiver, fixes, rule = ALSO
     shown = [*made.found.items()]
     shown.append(((receiver, fixes, f"{rule}, rotation vector"), made.by_rotation_vector))
+    shown.append(((receiver, fixes, f"{rule}, fed forward"), made.fed_forward))
     return Table(
         "drive",
         "The drive in numbers",

@@ -5,13 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.alignment.fine_result import FineResult
 from strapdown.increments import motion_increments
+from strapdown.navigation.damping import Feedforward
+from strapdown.navigation.navigator import Navigator
 from strapdown.simulation import Origin, simulate_imu
 from strapdown.simulation.minimum_jerk import Track
 from strapdown.simulation.path_motion import PathMotion
-from strapdown.systems.chernodarov.autonomous import Course, go
+from strapdown.systems.chernodarov.autonomous import EVERY, Course, after, go
 from strapdown.systems.chernodarov.prediction import KINDS, Predicted, predict
 from strapdown.systems.chernodarov.setting import (
     ELLIPSOID,
@@ -63,10 +67,19 @@ class Kept:
 
 @dataclass(frozen=True, eq=False)
 class Units:
-    """Both kinds."""
+    """Both kinds.
+
+    Attributes
+    ----------
+    still, turned : Kept
+    forward_apart : float, m/s
+        Largest difference of the velocities of the first unit at rest, with its estimates fed
+        back, and with the mechanization free and the errors that (6) predicts taken off.
+    """
 
     still: Kept
     turned: Kept
+    forward_apart: float
 
 
 def table_motion(turned: bool) -> PathMotion:
@@ -109,6 +122,20 @@ def units(count: int = COUNT) -> Units:
             for state, into in zip((fine.state, off), courses[k], strict=True):
                 into.append(go(used, state, increments))
             if not predicted[k]:
+                if k == 0:
+                    forward = fed_forward(fine, increments)
+                    apart = forward - courses[0][0][0].velocity
                 predicted[k] = {kind: predict(fine, increments, kind) for kind in KINDS}
     kept = [Kept(tuple(c[0]), tuple(c[1]), p) for c, p in zip(courses, predicted, strict=True)]
-    return Units(*kept)
+    return Units(kept[0], kept[1], float(np.linalg.norm(apart, axis=1).max()))
+
+
+def fed_forward(fine: FineResult, increments: pd.DataFrame) -> Array:
+    """Return the velocity north and east with estimates taken off what is shown, (n, 2), m/s."""
+    used = autonomous_filter(fine)
+    navigator = Navigator(used, damping=Feedforward())
+    ends, rows = after(increments, fine.state.time)
+    _, piece = navigator.advance(navigator.begin_from(fine.state), ends, rows)
+    path = used.mechanization.trajectory(piece.time, piece.history)
+    every = round(RATE * EVERY)
+    return path[["VN", "VE"]].to_numpy()[every - 1 :: every]

@@ -187,7 +187,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         "and [sensors.accel]: bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
         "noise_density_ug_per_sqrt_hz, …",
         f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
-        "biases and drifts, if not given",
+        "biases, drifts, and what is stated of scale factors and misalignments, if not given",
     )
     for triad in ("gyro", "accel"):
         stated = made.table.get("sensors", {}).get(triad)

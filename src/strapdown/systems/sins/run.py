@@ -20,10 +20,12 @@ from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.channels import channel_findings
 from strapdown.systems.sins.drive import ChainRun, run_batch
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
+from strapdown.systems.sins.withholding import score_withholding
 
 __all__ = ["Drive", "run_navigation"]
 
@@ -74,23 +76,34 @@ def run_navigation(
     """
     progress("reading", 0.02)
     source = read_navigation_source(spec)
-    looked = look_through(spec, source.imu, source.tables)
+    progress("looking through", 0.1)
     sensors = uncertainty_of(spec)
+    looked = look_through(spec, source.imu, source.tables)
+    # What is simulated has the errors that it was told to have.
+    channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
     chain = make_chain(spec, sensors)
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
 
     def told(mode: str, share: float) -> None:
-        progress(f"{mode} {share:.0%}", BEGUN + (ENDED - BEGUN) * share)
+        progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     run = drive(chain, source.imu, source.tables, recorder, told)
     progress("comparing", ENDED)
     differences, errors = _against_truth(run.record.trajectory, source, spec)
+    withheld = score_withholding(
+        spec,
+        chain,
+        source,
+        run.record,
+        lambda stage, share: progress(stage, ENDED + 0.02 * share),
+    )
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [
         *source.findings,
+        *channels,
         *looked,
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
@@ -105,6 +118,7 @@ def run_navigation(
         record=run.record,
         differences=differences,
         errors=errors,
+        withheld=withheld,
         inputs=(*files, *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )

@@ -1,0 +1,133 @@
+"""Channels of a record that do not read what a body does: told, or refused, before it is used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown.config.navigation import StartTable
+from strapdown.exceptions import DataError, Finding
+from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
+from strapdown.sensors.imu_health import check_imu_channels
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["channel_findings"]
+
+#: Faults after which a channel tells nothing, and the share of a record that may be without it.
+SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
+#: So many times as noisy as the data sheet are gyros in deg/s that are taken for rad/s, roughly.
+DEGREES = (57.3 / 2.0, 57.3 * 2.0)
+#: The first second is held beside a start that is stated; it may be so far off, deg.
+FIRST, FAR = 1.0, 60.0
+
+
+def channel_findings(
+    imu: pd.DataFrame, sensors: ImuUncertainty, start: StartTable | None
+) -> tuple[Finding, ...]:
+    """Look at the channels of a record.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table as it was recorded, body axes.
+    sensors : ImuUncertainty
+    start : StartTable or None
+        A state that is known at its first sample.
+
+    Returns
+    -------
+    tuple of Finding
+        Of each channel and kind of fault the longest stretch.
+
+    Raises
+    ------
+    DataError
+        A channel reads nothing over half of the record, gyros are in degrees, or gravity is not
+        where the stated attitude has it.
+    """
+    _refuse_gravity(imu, start)
+    if len(imu) < LEAST_SAMPLES:
+        return ()
+    _refuse_degrees(imu, sensors)
+    faults = check_imu_channels(imu, sensors).faults
+    worst: dict[tuple[str, str], ChannelFault] = {}
+    lost: dict[tuple[str, str], int] = {}
+    for fault in faults:
+        key = (fault.channel, fault.kind)
+        lost[key] = lost.get(key, 0) + fault.last - fault.first + 1
+        if key not in worst or fault.last - fault.first > worst[key].last - worst[key].first:
+            worst[key] = fault
+    for (channel, kind), count in lost.items():
+        if kind in SILENT and count > MOST * len(imu):
+            said = worst[channel, kind].finding
+            raise DataError(
+                f"{said.what}: nothing can be navigated without it",
+                file=said.file,
+                row=said.row,
+                quantity=said.quantity,
+                remedy=said.remedy,
+            )
+    return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
+
+
+def _counted(finding: Finding, lost: int, samples: int) -> Finding:
+    share = f"{100.0 * lost / samples:.2g} % of the record in all"
+    return replace(finding, what=f"{finding.what} ({share})")
+
+
+def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
+    """Gyros whose every axis is noisy by as much as deg/s are by rad/s."""
+    step = float(np.median(np.diff(index_of(imu))))
+    density = np.asarray(sensors.gyro.axis("noise_density"))
+    if not density.all():
+        return
+    second = np.diff(values_of(imu, GYRO), n=2, axis=0)
+    times = np.sqrt(np.median(np.square(second), axis=0) / MEDIAN / 6.0 * step) / density
+    # A rate that turns a body around within a second is none of a vehicle.
+    wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
+    if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
+        raise DataError(
+            f"all gyros are {times.min():.2g} to {times.max():.2g} times as noisy as their data "
+            "sheet, and turn the body by more than it can: they seem to be in deg/s, and rad/s "
+            "are taken",
+            file=source_of(imu),
+            quantity="gyro",
+            remedy='write gyro_unit = "deg/s" in [log], or --gyro-unit deg/s',
+        )
+
+
+#: Median of the square of a standard normal number, and a rate in rad/s.
+MEDIAN, WILD = 0.4549364, 6.0
+
+
+def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:
+    """The specific force of the first second, beside what a stated attitude makes of gravity."""
+    if start is None:
+        return
+    time = index_of(imu)
+    force = values_of(imu, ACCEL)[time <= time[0] + FIRST].mean(axis=0)
+    q = rotation.quaternion_from_euler([start.roll_deg, start.pitch_deg, start.heading_deg])
+    wanted = rotation.rotate(rotation.conjugate(q), np.array([0.0, 0.0, -1.0]))
+    size = float(np.linalg.norm(force))
+    cosine = float(force @ wanted) / size if size > 0.0 else 0.0
+    apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    if apart < FAR:
+        return
+    shown = ", ".join(f"{x:.3g}" for x in force)
+    upside = apart > 180.0 - FAR
+    raise DataError(
+        f"the specific force of the first second, ({shown}) m/s² forward, right, down, is "
+        f"{apart:.0f}° away from where the attitude in [start] has it"
+        + (": gravity is upside down" if upside else ""),
+        file=source_of(imu),
+        quantity="accel",
+        remedy="at rest the accelerometer along down reads -9.8: give the sign as "
+        'accel_unit = "-m/s2" in [log], or the axes in [axes]'
+        if upside
+        else "look at roll_deg and pitch_deg, or say in [axes] how the sensor lies in the body",
+    )
