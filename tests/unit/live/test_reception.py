@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import socket
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.live.clock import MachineClock
 from strapdown.live.received import live_spec, write_received
 from strapdown.live.run import receive, result_of
-from strapdown.live.sources import LineSource
+from strapdown.live.sources import LineSource, open_source
 from strapdown.navigation.recorder import FullRecorder
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.drive import run_batch
@@ -261,3 +263,23 @@ def test_of_a_record_the_same_with_lines(tmp_path):
     assert spec.log is None
     assert spec.aiding.gnss.path is None
     assert spec.live.sampling == "mean"
+
+
+def test_datagrams_to_a_commanded_end_are_the_batch_run():
+    clock = MachineClock()
+    source = open_source("udp://127.0.0.1:0", clock, None)
+    texts = [*lines(), "command,end"]
+
+    def send(note):
+        if "listening" not in note:
+            return
+        address = urlsplit(note.split()[-1])
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            for first in range(0, len(texts), 10):
+                data = "\n".join(texts[first : first + 10]).encode()
+                sender.sendto(data, (address.hostname, address.port))
+
+    live = receive(navigation_spec(table()), source, clock, lambda text: None, send)
+    assert live.got.lines == len(texts)
+    assert_same(live.run, at_once(live.spec))
+    assert live.latency.samples <= len(drive())
