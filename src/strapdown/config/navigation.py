@@ -35,6 +35,7 @@ __all__ = [
     "FilterSpec",
     "FineModeSpec",
     "GapsTable",
+    "LiveTable",
     "MechanizationSpec",
     "NavigationOutputTable",
     "NavigationSensorsTable",
@@ -84,6 +85,14 @@ class NavigationSimulationTable(TableSpec):
     sensor: FileName | None = None
     #: By name of the aid, whose fixes they are.
     gnss: TableSpec = TableSpec()
+
+
+class LiveTable(TableSpec):
+    """Samples that come while it runs, and what aids send: `strapdown navigate --live`."""
+
+    sampling: Literal["instantaneous", "mean"] = "instantaneous"
+    #: A sample waits until one comes that is so much later: what aids send late is still in time.
+    hold_s: NotNegative = 0.2
 
 
 class StartTable(TableSpec):
@@ -236,6 +245,7 @@ class NavigationSpec(TableSpec):
     ellipsoid: Word = "wgs84"
     log: LogTable | None = None
     simulation: NavigationSimulationTable | None = None
+    live: LiveTable | None = None
     axes: AxesTable = AxesTable()
     sensors: NavigationSensorsTable = NavigationSensorsTable()
     prefilter: PrefilterSpec = PrefilterSpec()
@@ -261,7 +271,7 @@ class NavigationSpec(TableSpec):
             there = [n for n in ("log", "simulation") if data.get(n) is not None]
             if len(there) == 2:
                 raise refuse("simulation", "[log] is given, too", "keep one of the two")
-            if not there:
+            if not there and data.get("live") is None:
                 raise refuse(
                     "log",
                     "it is missing",

@@ -156,7 +156,7 @@ class _Checks(SourceChecks):
                 )
             commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
             if given.kind != "none" and not [n for n in ends if n != "window_s"]:
-                if commanded:
+                if commanded or spec.live is not None:
                     continue
                 raise self.refuse(
                     (stage, "duration_s"),
@@ -199,7 +199,8 @@ class _Checks(SourceChecks):
                 f"'{given.kind}' watches the inertial sensors, and takes no file",
                 "leave path out",
             )
-        if takes and given.path is None and name not in receivers_of(spec):
+        sent = name in receivers_of(spec) or spec.live is not None
+        if takes and given.path is None and not sent:
             raise self.refuse(
                 ("aiding", name, "path"),
                 f"it is missing: '{given.kind}' takes what it measured from a file",

@@ -252,8 +252,26 @@ class CompiledEngine(Engine):
         """Return the row of the newest step."""
         return self.row
 
+    @classmethod
+    def going_on(cls, filter_: ErrorFilter, state: EngineState) -> CompiledEngine:
+        """Return an engine at a state: the one that gave it, once, if nothing went on from there.
+
+        What a sample costs is then not the making of an engine. Who goes on from the same state
+        again gets a new one, with the same numbers.
+        """
+        gave = state.__dict__.pop("_gave", None)
+        if isinstance(gave, cls) and gave.navigation is filter_:
+            return gave
+        return cls(filter_, state)
+
     def state(self) -> EngineState:
-        """Return where it is now."""
+        """Return where it is now; the engine is not to be used any more but by `going_on`."""
+        state = self._copied()
+        # Beside the fields of the state: it is no part of what it remembers.
+        state.__dict__["_gave"] = self
+        return state
+
+    def _copied(self) -> EngineState:
         return EngineState(
             filter=self.filter,
             errors=self.errors,

@@ -212,7 +212,7 @@ class Navigator:
     def engine(self, state: EngineState) -> Engine:
         """Return what goes on from a state: compiled, where the modules have that."""
         if self.damping.feeds_back and compiled(self.filter):
-            return CompiledEngine(self.filter, state)
+            return CompiledEngine.going_on(self.filter, state)
         return GeneralEngine(self.filter, state, self.damping.feeds_back)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -19,23 +21,30 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.channels import channel_findings
-from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.drive import ChainRun, run_batch
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
 from strapdown.systems.sins.withholding import score_withholding
 
-__all__ = ["run_navigation"]
+__all__ = ["Drive", "run_navigation"]
+
+#: Runs a chain over samples and tables: with a recorder, and what is told of progress.
+Drive = Callable[..., ChainRun]
 
 #: Shares of a whole run at which its chain begins and ends.
 BEGUN, ENDED = 0.15, 0.8
 #: Of the record that is taken at a time, s: so often progress is told.
 CHUNK = 20.0
+_AT_ONCE = partial(run_batch, chunk=CHUNK)
 
 
 @one_thread()
 def run_navigation(
-    spec: NavigationSpec, file: Path | None = None, progress: Progress = silent
+    spec: NavigationSpec,
+    file: Path | None = None,
+    progress: Progress = silent,
+    drive: Drive = _AT_ONCE,
 ) -> NavigationResult:
     """Read a record and its aids, align, and navigate.
 
@@ -47,6 +56,9 @@ def run_navigation(
         Where it was read from: an input, too.
     progress : callable, optional
         Called with a stage and the share that is done.
+    drive : callable, optional
+        What runs the chain, called as `run_batch`: at a pace, or with what came already. The
+        numbers must be those of a run at once.
 
     Returns
     -------
@@ -76,7 +88,7 @@ def run_navigation(
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
-    run = run_batch(chain, source.imu, source.tables, recorder, told, CHUNK)
+    run = drive(chain, source.imu, source.tables, recorder, told)
     progress("comparing", ENDED)
     differences, errors = _against_truth(run.record.trajectory, source, spec)
     withheld = score_withholding(
