@@ -6,7 +6,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
@@ -37,6 +39,9 @@ BEGUN, ENDED = 0.15, 0.8
 #: Of the record that is taken at a time, s: so often progress is told.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
+#: Of a trajectory at least so much apart are the rows that are compared with the truth, s: errors
+#: change no faster than what the truth is worth.
+APART = 0.1
 
 
 @one_thread()
@@ -129,5 +134,15 @@ def _against_truth(
 ) -> tuple[pd.DataFrame | None, DifferenceSummary | None]:
     if source.truth is None:
         return None, None
-    differences = trajectory_differences(trajectory, source.truth, find_ellipsoid(spec.ellipsoid))
+    rows = _rows_compared(trajectory.index.to_numpy(dtype=np.float64))
+    kept = trajectory.iloc[rows]
+    kept.attrs = dict(trajectory.attrs)
+    differences = trajectory_differences(kept, source.truth, find_ellipsoid(spec.ellipsoid))
     return differences, summarise_differences(differences)
+
+
+def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows at a steady distance, from the last one back."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else APART
+    each = max(1, round(APART / step)) if step > 0.0 else 1
+    return np.arange(len(time) - 1, -1, -each)[::-1]
