@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 #: A root mean square of innovations beyond this many of the expected standard deviation, or below
 #: one over it, speaks against what was stated.
 FAR_OFF = 2.0
-#: Where half of the epochs are beyond so many times what was expected, the answer itself is refuted:
-#: outliers do not reach a median.
+#: Where half of the epochs are beyond so many times what was expected, the answer itself is
+#: refuted: outliers do not reach a median.
 REFUTES, LEAST_EPOCHS = 3.0, 5
 #: From so large a correlation on, errors of an aid that last matter for the bounds.
 REMEMBER = 0.3

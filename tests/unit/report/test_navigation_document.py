@@ -208,7 +208,9 @@ def test_events_beyond_what_can_be_read_are_in_the_json():
 
 
 def test_numbers_are_said_as_people_say_them():
-    assert [plain(length_words(x)) for x in (0.0213, 2.5, 13.42, 387.6, 2410.0, 28400.0, 2.5e5)] == [
+    assert [
+        plain(length_words(x)) for x in (0.0213, 2.5, 13.42, 387.6, 2410.0, 28400.0, 2.5e5)
+    ] == [
         "0.021 m",
         "2.50 m",
         "13.4 m",

@@ -135,7 +135,7 @@ def propose(
     guessed = sensor is None
     named = sensor or (None if noise is None else _nearest(noise))
     if named is not None:
-        # Gyros that find north feel the motion itself where a vehicle rocks, and no noise of theirs.
+        # Gyros that find north feel how a vehicle rocks: that is motion, and no noise of theirs.
         shaken = {} if _finds_north(named) else _louder(scatter, named)
         table["sensors"] = {"sensor": named, **shaken}
     place = site or _place(recording.start)

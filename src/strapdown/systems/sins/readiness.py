@@ -79,9 +79,7 @@ def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
     )
 
 
-def _refuse_far(
-    spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, aid: Gnss
-) -> None:
+def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, aid: Gnss) -> None:
     """A first fix that is nowhere near the place that is stated."""
     name, stated = ("start", spec.start) if spec.start is not None else ("site", spec.site)
     if stated is None or not aid.use_position:
