@@ -24,6 +24,7 @@ from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.channels import channel_findings
 from strapdown.systems.sins.drive import ChainRun, run_batch
+from strapdown.systems.sins.file_rows import in_file, said_of_file
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
@@ -83,9 +84,12 @@ def run_navigation(
     source = read_navigation_source(spec)
     progress("looking through", 0.1)
     sensors = uncertainty_of(spec)
-    looked = look_through(spec, source.imu, source.tables)
-    # What is simulated has the errors that it was told to have.
-    channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
+    tables = (source.imu, *source.tables.values())
+    with said_of_file(*tables):
+        looked = look_through(spec, source.imu, source.tables)
+        # What is simulated has the errors that it was told to have.
+        channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
+    looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     chain = make_chain(spec, sensors)
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
 
@@ -93,7 +97,8 @@ def run_navigation(
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
-    run = drive(chain, source.imu, source.tables, recorder, told)
+    with said_of_file(*tables):
+        run = drive(chain, source.imu, source.tables, recorder, told)
     progress("comparing", ENDED)
     differences, errors = _against_truth(run.record.trajectory, source, spec)
     withheld = score_withholding(
