@@ -110,7 +110,18 @@ class _Checks(SourceChecks):
             table = getattr(spec, name)
             if table is not None:
                 self.place(name, table.lat_deg, table.lon_deg, table.alt_m)
+                for key in ("position_sd_m", "velocity_sd_m_per_s"):
+                    if np.min(getattr(table, key)) < 0.0:
+                        raise self.refuse(
+                            (name, key),
+                            "no standard deviation is below zero",
+                            "give one or three, zero or more",
+                        )
         if spec.start is not None:
+            if abs(spec.start.heading_deg) > 360.0:
+                raise self.refuse(
+                    ("start", "heading_deg"), "more than a turn", "give degrees from 0 to 360"
+                )
             for stage in ("coarse", "fine"):
                 if getattr(spec, stage).kind != "none":
                     raise self.refuse(

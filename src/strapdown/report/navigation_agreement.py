@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 #: A root mean square of innovations beyond this many of the expected standard deviation, or below
 #: one over it, speaks against what was stated.
 FAR_OFF = 2.0
+#: Where half of the epochs are beyond so many times what was expected, the answer itself is
+#: refuted: outliers do not reach a median.
+REFUTES, LEAST_EPOCHS = 3.0, 5
 #: From so large a correlation on, errors of an aid that last matter for the bounds.
 REMEMBER = 0.3
 
@@ -106,6 +109,23 @@ class Agreement:
     def ratio(self) -> float:
         """Root mean square of the innovations in their expected standard deviations."""
         return math.sqrt(self.mean_nis / self.freedom) if self.freedom else math.nan
+
+    @property
+    def usual(self) -> float:
+        """Half of the epochs are beyond so many times what half of them should be within."""
+        from scipy.special import chdtri
+
+        if not self.used.any():
+            return math.nan
+        half = float(chdtri(self.freedom, 0.5))
+        return math.sqrt(float(np.median(self.nis[self.used])) / half)
+
+    @property
+    def refutes(self) -> bool:
+        """Whether most epochs contradict the answer, or were refused for that."""
+        if self.epochs < LEAST_EPOCHS:
+            return False
+        return self.usual > REFUTES or 2 * self.rejected > self.epochs
 
     @property
     def correlation(self) -> float:

@@ -237,6 +237,8 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
         )
     out = imu[kept]
     out.attrs = dict(imu.attrs)
+    if out.attrs.get("first_row") is not None:
+        out.attrs["first_row"] += int(np.argmax(kept))
     return out
 
 

@@ -36,7 +36,7 @@ class NavigationResult:
     fine : FineResult or None
     record : NavigationRecord
     differences : DataFrame or None
-        From the truth, where it is known (`trajectory_differences`).
+        From the truth, where it is known (`trajectory_differences`), ten times a second at most.
     errors : DifferenceSummary or None
         Of these.
     withheld : tuple of WithheldScore

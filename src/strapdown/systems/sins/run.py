@@ -6,7 +6,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
@@ -22,6 +24,7 @@ from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.channels import channel_findings
 from strapdown.systems.sins.drive import ChainRun, run_batch
+from strapdown.systems.sins.file_rows import in_file, said_of_file
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
@@ -37,6 +40,9 @@ BEGUN, ENDED = 0.15, 0.8
 #: Of the record that is taken at a time, s: so often progress is told.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
+#: Of a trajectory at least so much apart are the rows that are compared with the truth, s: errors
+#: change no faster than what the truth is worth.
+APART = 0.1
 
 
 @one_thread()
@@ -78,9 +84,12 @@ def run_navigation(
     source = read_navigation_source(spec)
     progress("looking through", 0.1)
     sensors = uncertainty_of(spec)
-    looked = look_through(spec, source.imu, source.tables)
-    # What is simulated has the errors that it was told to have.
-    channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
+    tables = (source.imu, *source.tables.values())
+    with said_of_file(*tables):
+        looked = look_through(spec, source.imu, source.tables)
+        # What is simulated has the errors that it was told to have.
+        channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
+    looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     chain = make_chain(spec, sensors)
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
 
@@ -88,7 +97,8 @@ def run_navigation(
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
-    run = drive(chain, source.imu, source.tables, recorder, told)
+    with said_of_file(*tables):
+        run = drive(chain, source.imu, source.tables, recorder, told)
     progress("comparing", ENDED)
     differences, errors = _against_truth(run.record.trajectory, source, spec)
     withheld = score_withholding(
@@ -129,5 +139,15 @@ def _against_truth(
 ) -> tuple[pd.DataFrame | None, DifferenceSummary | None]:
     if source.truth is None:
         return None, None
-    differences = trajectory_differences(trajectory, source.truth, find_ellipsoid(spec.ellipsoid))
+    rows = _rows_compared(trajectory.index.to_numpy(dtype=np.float64))
+    kept = trajectory.iloc[rows]
+    kept.attrs = dict(trajectory.attrs)
+    differences = trajectory_differences(kept, source.truth, find_ellipsoid(spec.ellipsoid))
     return differences, summarise_differences(differences)
+
+
+def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows at a steady distance, from the last one back."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else APART
+    each = max(1, round(APART / step)) if step > 0.0 else 1
+    return np.arange(len(time) - 1, -1, -each)[::-1]
