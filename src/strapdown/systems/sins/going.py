@@ -93,6 +93,7 @@ class Going:
                 quantity="time",
                 remedy="give more samples, or end the alignment earlier",
             )
+        self._navigation.append(self._chain.navigator.finish(state.navigator))
         self._modes.append(Span(mode, state.begun, state.time))
         events, outages = self._chain.deliveries.finish(state.deliveries, state.time)
         self._events += events
@@ -106,8 +107,8 @@ class Going:
                 f"{where}: what the body did then is not known",
                 file=self._state.intake.source,
                 quantity="time",
-                remedy="cut the log there; or bridge longer gaps (coast), or align anew after them "
-                "(beyond = 'align')",
+                remedy="cut the log there; or bridge longer gaps (coast_s in [gaps]), or align "
+                'anew after them (beyond = "align" in [gaps])',
             )
         anew = hole.length > policy.coast and policy.beyond == "align"
         done = "alignment begins anew" if anew else "bridged along a line, and not well known since"
@@ -170,6 +171,8 @@ class Going:
         if hole.length > policy.coast and policy.beyond == "align":
             mode = self._chain.modes[state.mode]
             self._modes.append(Span(mode.name, state.begun, hole.begin))
+            if state.navigator is not None:
+                self._navigation.append(self._chain.navigator.finish(state.navigator))
             self._state = replace(
                 state,
                 begun=np.nan,
