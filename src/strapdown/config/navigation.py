@@ -223,6 +223,7 @@ class NavigationSpec(TableSpec):
     simulation: NavigationSimulationTable | None = None
     axes: AxesTable = AxesTable()
     sensors: NavigationSensorsTable = NavigationSensorsTable()
+    states: TableSpec = TableSpec()
     prefilter: PrefilterSpec = PrefilterSpec()
     start: StartTable | None = None
     site: NavigationSiteTable | None = None
