@@ -1,7 +1,8 @@
 """A car with a MEMS unit and an RTK receiver: navigated, and scored by fixes that are withheld.
 
 There is no truth but the receiver, which is right to centimetres. The settings follow from what the
-recording's description says and what its rest shows, and not from the scores:
+recording's description says and what its rest shows; five sets of noise were scored, too, so that
+the scores are no blind test:
 
 * noise: the standard deviation of a sample at rest, as white noise. The rest is not quiet, nor is
   the drive;

@@ -72,6 +72,8 @@ class Proposal:
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
         Whether the sensor is only the one of the catalogue that is nearest by its noise.
+    drives : bool
+        Whether it drives fast enough for a course, by the fixes.
     how : str
         Why it is aligned so, in words.
     findings : tuple of Finding
@@ -85,6 +87,7 @@ class Proposal:
     rest: float
     noise: tuple[float, ...] | None
     guessed: bool
+    drives: bool
     how: str
     findings: tuple[Finding, ...]
 
@@ -151,12 +154,11 @@ def propose(
                 "lever_arm_m": (0.0, 0.0, 0.0),
                 # Of the rules, those that give a gross error no weight keep their accuracy among
                 # them; with its scale this one cannot reject for ever.
-                "update_rule": "adaptive",
-                "influence": "igg3",
+                "update_rule": {"kind": "adaptive", "influence": "igg3"},
                 **_clock(fixes, imu, drives),
             }
         }
-    return Proposal(table, recording, imu, fixes, rest, noise, guessed, how, findings)
+    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
 
 
 @dataclass(frozen=True, eq=False)
