@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapdown.estimation.adaptive_rule import AdaptiveRule
+from strapdown.estimation.adaptive_scale import AdaptiveScale
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.influence_igg3 import Igg3
@@ -198,8 +200,10 @@ def test_a_robust_rule_keeps_its_accuracy_among_gross_errors_and_the_plain_one_d
     seeds = range(40)
     clean = place_rms(Plan(), seeds)
     # The same noise, and in a tenth of the fixes 50 standard deviations in some direction.
-    for influence in (Igg3(), Tukey()):
-        rule = RobustUpdate(influence)
+    # What is proposed for a log, which cannot reject for ever, and does not call a receiver better
+    # than it says: 10 % worse over a hundred drives.
+    proposed = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
+    for rule in (RobustUpdate(Igg3()), RobustUpdate(Tukey()), proposed):
         assert place_rms(Plan(rule=rule, outliers=0.1), seeds) < 1.2 * clean
         assert place_rms(Plan(rule=rule), seeds) < 1.1 * clean
     assert place_rms(Plan(outliers=0.1), seeds) > 3.0 * clean

@@ -46,6 +46,10 @@ NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
 COARSE = 100.0
 #: An alignment by a course ends when angles are known so well, deg.
 WELL = 3.0
+#: Of the rules, those that give a gross error no weight keep their accuracy among them; with its
+#: scale this one cannot reject for ever. Errors that last make innovations small: they are no sign
+#: of a receiver that is better than it says.
+RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
 #: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
 OFFSET_SD = 0.2
 #: What the motion tells of clocks is taken where it is so many standard deviations, and a delay
@@ -152,9 +156,7 @@ def propose(
                 "kind": "gnss",
                 "path": str(gnss),
                 "lever_arm_m": (0.0, 0.0, 0.0),
-                # Of the rules, those that give a gross error no weight keep their accuracy among
-                # them; with its scale this one cannot reject for ever.
-                "update_rule": {"kind": "adaptive", "influence": "igg3"},
+                "update_rule": RULE,
                 **_clock(fixes, imu, drives),
             }
         }
