@@ -165,6 +165,11 @@ def degrees(time, values):
     return time, values
 
 
+def in_g(time, values):
+    values[:, 3:] /= 9.80665
+    return time, values
+
+
 def another_hour(time, values):
     return time + 3600.0, values
 
@@ -185,6 +190,22 @@ def negative_sd(time, values):
 
 def exchanged(time, values):
     values[:, :2] = values[:, [1, 0]]
+    return time, values
+
+
+def exchanged_at_rest(time, values):
+    """Two fixes, so that no way between them tells of it."""
+    values[:, :2] = values[:, [1, 0]]
+    return time[:2], values[:2]
+
+
+def elsewhere(time, values):
+    values[:, 0] += 1.0
+    return time, values
+
+
+def no_sd_of_places(time, values):
+    values[:, 6:9] = np.inf
     return time, values
 
 
@@ -231,6 +252,9 @@ NAVIGATE_CASES = (
     _fixes("Standard deviations of zero", zero_sd),
     _fixes("A negative standard deviation", negative_sd),
     _fixes("Latitude and longitude exchanged", exchanged),
+    _fixes("Two fixes, exchanged", exchanged_at_rest),
+    _fixes("Fixes a degree from the start", elsewhere),
+    _fixes("No standard deviation of any place", no_sd_of_places, code=0),
     _fixes("Places in radians", radians),
     NavigateCase("An empty file of fixes", _empty),
     _samples("A dead gyro", dead),
@@ -238,6 +262,7 @@ NAVIGATE_CASES = (
     _samples("Samples that are no numbers", burst_of_nan),
     _samples("Gravity upside down", upside_down),
     _samples("Gyros in degrees, named as radians", degrees),
+    _samples("Accelerometers in g, named as m/s²", in_g),
     _own("A lever arm without its unit", "lever_arm_m", "lever_arm"),
     _own("An unknown key of a run", "", "\n[coarze]\nblocks = 3\n"),
     _own("An unknown aid", 'kind = "gnss"', 'kind = "gps"'),
@@ -273,6 +298,13 @@ NAVIGATE_CASES = (
         code=4,
     ),
     _own("A start that is still open", "heading_deg = 30.0", 'heading_deg = "?"'),
+    _own(
+        "A standard deviation below zero",
+        "heading_sd_deg = 1.0",
+        "heading_sd_deg = 1.0\nposition_sd_m = -1.0",
+    ),
+    _own("A heading of more than a turn", "heading_deg = 30.0", "heading_deg = 400.0"),
+    _own("A pre-filter of another rate", "", '\n[prefilter]\nkind = "robust_fir"\n'),
     _own("Two aids of one name", "", '\n[aiding.rtk]\nkind = "no_slip"\n'),
     NavigateCase(
         "Several things at once",

@@ -70,6 +70,17 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
         )
     _refuse_units(table, time, placed, source)
     found = [*_certain(table, good, source), *_gaps(time, placed | fast, source)]
+    if not placed.any():
+        found.append(
+            Finding(
+                f"no place is used: in none of {len(time)} rows all of its standard deviations "
+                "are stated",
+                file=source,
+                quantity=", ".join(POSITION_SD),
+                remedy="state position_sd of this aid, or leave it so if its velocity is to be "
+                "used alone",
+            )
+        )
     found += _jumps(table, time, placed, fast, source)
     found += _repeats(table, placed, fast, source)
     return found

@@ -24,7 +24,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.state_process import with_processes
 from strapdown.estimation.stated_states import stated_states
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
@@ -86,6 +86,7 @@ class _Checks(SourceChecks):
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
             yield partial(self.aid, spec, name)
+        yield partial(self.withhold, spec)
         yield partial(self.output, spec)
         yield partial(self.chain, spec)
 
@@ -111,7 +112,18 @@ class _Checks(SourceChecks):
             table = getattr(spec, name)
             if table is not None:
                 self.place(name, table.lat_deg, table.lon_deg, table.alt_m)
+                for key in ("position_sd_m", "velocity_sd_m_per_s"):
+                    if np.min(getattr(table, key)) < 0.0:
+                        raise self.refuse(
+                            (name, key),
+                            "no standard deviation is below zero",
+                            "give one or three, zero or more",
+                        )
         if spec.start is not None:
+            if abs(spec.start.heading_deg) > 360.0:
+                raise self.refuse(
+                    ("start", "heading_deg"), "more than a turn", "give degrees from 0 to 360"
+                )
             for stage in ("coarse", "fine"):
                 if getattr(spec, stage).kind != "none":
                     raise self.refuse(
@@ -157,7 +169,7 @@ class _Checks(SourceChecks):
                 )
             commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
             if given.kind != "none" and not [n for n in ends if n != "window_s"]:
-                if commanded:
+                if commanded or spec.live is not None:
                     continue
                 raise self.refuse(
                     (stage, "duration_s"),
@@ -200,7 +212,8 @@ class _Checks(SourceChecks):
                 f"'{given.kind}' watches the inertial sensors, and takes no file",
                 "leave path out",
             )
-        if takes and given.path is None and name not in receivers_of(spec):
+        sent = name in receivers_of(spec) or spec.live is not None
+        if takes and given.path is None and not sent:
             raise self.refuse(
                 ("aiding", name, "path"),
                 f"it is missing: '{given.kind}' takes what it measured from a file",
@@ -220,6 +233,35 @@ class _Checks(SourceChecks):
                 'it observes the height, and [mechanization] height = "held" keeps it where it is',
                 'write height = "free", or leave this aid out',
             )
+
+    def withhold(self, spec: NavigationSpec) -> None:
+        """Which fixes are kept back, and when."""
+        given = spec.withhold
+        if given is None:
+            return
+        if given.aid is None and not _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"), "no aid gives fixes to keep back", "leave [withhold] out"
+            )
+        if given.aid is not None and given.aid not in _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"),
+                "there is no aid of this name that gives fixes",
+                nearest(given.aid, _fixes(spec)),
+            )
+        if bool(given.spans_s) == bool(given.lengths_s):
+            raise self.refuse(
+                ("withhold", "spans_s"),
+                "nothing says when" if not given.spans_s else "lengths_s is given, too",
+                "write spans_s = [[begin, end]], or lengths_s = [10.0, 30.0, 60.0] and places = 5",
+            )
+        for begin, end in given.spans_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("withhold", "spans_s"),
+                    f"from {begin:g} to {end:g} s there is no time",
+                    "give the begin before the end",
+                )
 
     def output(self, spec: NavigationSpec) -> None:
         for form in spec.output.files:

@@ -114,6 +114,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         time, body["gyro"], body.get("accel"), body.get("mag"), sampling=sampling, source=raw.name
     )
     with_clock(imu, _clock(raw, found, stamps, dated))
+    first, last = raw.row(int(kept[0])), raw.row(int(kept[-1]))
+    imu.attrs["first_row"] = first if last - first == len(kept) - 1 else None
     truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)
     return Recording(
         name=raw.name,

@@ -148,7 +148,13 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
         ) from None
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
+    table.attrs["first_row"] = first_of(fixes.rows[at])
     return table
+
+
+def first_of(rows: NDArray[np.int64]) -> int | None:
+    """The first of rows that follow one another; None where some between are left out."""
+    return int(rows[0]) if int(rows[-1]) - int(rows[0]) == len(rows) - 1 else None
 
 
 # --- time and place ---------------------------------------------------------------------

@@ -215,9 +215,9 @@ class Navigator:
             The state has left what the mechanization can do; the sample is named.
         """
         going = _Going(self, state)
-        # What is writeable is one type for compiled code, and what is not another.
-        stamps = np.require(time, np.float64, ["C", "W"])
-        going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
+        # Copies: rows are cut at epochs, and what is writeable is one type for compiled code, what
+        # is not another.
+        going.over(np.array(time, dtype=np.float64), np.array(rows, dtype=np.float64, order="C"))
         return going.state(), going.piece()
 
     def finish(self, state: NavigatorState) -> NavigationPiece:
@@ -240,7 +240,7 @@ class Navigator:
     def engine(self, state: EngineState) -> Engine:
         """Return what goes on from a state: compiled, where the modules have that."""
         if self.damping.feeds_back and compiled(self.filter):
-            return CompiledEngine(self.filter, state)
+            return CompiledEngine.going_on(self.filter, state)
         return GeneralEngine(self.filter, state, self.damping.feeds_back)
 
 
@@ -275,7 +275,6 @@ class _Going:
         if any(aid.wants_steady for aid in self.navigator.aids):
             self.steadies = np.empty((len(rows), 6))
             steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
-        rows = rows.copy()
         self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
         at = self._fixes(0, time, rows)
         while True:
@@ -346,11 +345,20 @@ class _Going:
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
         """Note what came of fixes."""
-        for i in range(len(fixed.told)):
-            at = float(fixed.time[i])
-            name, labels = aid.names(fixes.values[i])
-            self.seen.append(Seen(at, name, labels, Innovations(*fixed.told[i])))
-            self._add_mark(Mark(at, fixed.covariance[i], fixed.sensors[i], fixed.sensors_sd[i]))
+        names = {code: aid.names(code) for code in set(fixes.values[: len(fixed.told), 0].tolist())}
+        every = zip(
+            fixes.values[:, 0].tolist(),
+            fixed.time.tolist(),
+            fixed.told,
+            fixed.covariance,
+            fixed.sensors,
+            fixed.sensors_sd,
+            strict=False,
+        )
+        for code, at, told, covariance, sensors, sd in every:
+            name, labels = names[code]
+            self.seen.append(Seen(at, name, labels, Innovations(told[0], told[1], told[2])))
+            self._add_mark(Mark(at, covariance, sensors, sd))
             self.observed = at
 
     def state(self) -> NavigatorState:

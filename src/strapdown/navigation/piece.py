@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,7 @@ __all__ = ["Mark", "NavigationPiece", "Seen"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(NamedTuple):
     """One observation at an epoch.
 
     Attributes
@@ -35,8 +35,7 @@ class Seen:
     innovations: Innovations
 
 
-@dataclass(frozen=True, eq=False)
-class Mark:
+class Mark(NamedTuple):
     """Covariance and estimates at an instant, after what was observed then.
 
     Where nothing was observed for a while there is one before the observation, too, with a stamp

@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 #: A root mean square of innovations beyond this many of the expected standard deviation, or below
 #: one over it, speaks against what was stated.
 FAR_OFF = 2.0
+#: Where half of the epochs are beyond so many times what was expected, the answer itself is
+#: refuted: outliers do not reach a median.
+REFUTES, LEAST_EPOCHS = 3.0, 5
 #: From so large a correlation on, errors of an aid that last matter for the bounds.
 REMEMBER = 0.3
 
@@ -108,6 +111,23 @@ class Agreement:
         return math.sqrt(self.mean_nis / self.freedom) if self.freedom else math.nan
 
     @property
+    def usual(self) -> float:
+        """Half of the epochs are beyond so many times what half of them should be within."""
+        from scipy.special import chdtri
+
+        if not self.used.any():
+            return math.nan
+        half = float(chdtri(self.freedom, 0.5))
+        return math.sqrt(float(np.median(self.nis[self.used])) / half)
+
+    @property
+    def refutes(self) -> bool:
+        """Whether most epochs contradict the answer, or were refused for that."""
+        if self.epochs < LEAST_EPOCHS:
+            return False
+        return self.usual > REFUTES or 2 * self.rejected > self.epochs
+
+    @property
     def correlation(self) -> float:
         """Largest correlation of a component with itself an epoch later; NaN for too few."""
         found = [float(one.autocorrelation[0]) for one in self._long]
@@ -125,9 +145,23 @@ class Agreement:
 
     @property
     def remembers(self) -> bool:
-        """Whether they hang together from epoch to epoch far more than by chance."""
+        """Whether they hang together from epoch to epoch far more than by chance, to harm.
+
+        Errors that last do as much as independent ones of `lasting` their size: where that is no
+        more than was stated, as of a constraint whose deviation is stated for it, no bound is too
+        narrow.
+        """
         size = abs(self.correlation)
-        return bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+        far = bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+        return far and (self.correlation < 0.0 or self.lasting > 1.0)
+
+    @property
+    def lasting(self) -> float:
+        """`ratio`, by which independent errors would do as much: those of a first-order process."""
+        rho = min(self.correlation, 1.0 - 1.0 / max(int(self.used.sum()), 2))
+        if not rho > 0.0:
+            return self.ratio
+        return self.ratio * math.sqrt((1.0 + rho) / (1.0 - rho))
 
     @property
     def inside(self) -> bool:
@@ -136,8 +170,9 @@ class Agreement:
 
     @property
     def acceptable(self) -> bool:
-        """Whether they are within a factor of two of what was expected."""
-        return self.inside or 1.0 / FAR_OFF < self.ratio < FAR_OFF
+        """Whether they are within a factor of two of what was expected, and if they last."""
+        near = self.ratio < FAR_OFF and max(self.ratio, self.lasting) > 1.0 / FAR_OFF
+        return self.inside or near
 
 
 def agreements(record: NavigationRecord) -> tuple[Agreement, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from strapdown.report.alignment_trust import Trust
 from strapdown.report.crash_values import GAP, plain
-from strapdown.report.navigation_agreement import Agreement
+from strapdown.report.navigation_agreement import FAR_OFF, Agreement
 from strapdown.report.navigation_errors import Score
 from strapdown.report.navigation_found import NavigationFound
 from strapdown.report.navigation_values import length_words, share_words
@@ -33,14 +33,30 @@ def trust(found: NavigationFound) -> Trust:
     reasons += [_innovations(one) for one in found.agreements if one.used.any()]
     reasons += [_memory(one) for one in found.agreements if one.remembers]
     reasons += _rejected(found)
+    # What needs no remedy is told among the findings, and speaks against nothing.
     reasons += [
-        (False, f.what.partition(": ")[0]) for f in found.findings if not _of_truth(found, f)
+        (False, f.what.partition(": ")[0])
+        for f in found.findings
+        if f.remedy and not _of_truth(found, f)
     ]
+    reasons += _silence(found)
     against = [why for good, why in reasons if not good]
     known = found.errors is not None or bool(found.told.withheld)
     wrong = known and any(not good for good, _ in (*_errors(found), *_withheld(found)))
+    wrong |= any(one.refutes for one in found.agreements)
     verdict = "trusted" if not against else "distrusted" if wrong else "reserve"
     return Trust(verdict, tuple(reasons), _short(found))
+
+
+def _silence(found: NavigationFound) -> list[tuple[bool, str]]:
+    """Nothing that was measured can bear an answer out by sensors alone."""
+    if found.errors is not None or found.told.withheld:
+        return []
+    if any(one.used.any() for one in found.agreements):
+        return []
+    return [
+        (False, "nothing was observed beside it: its bounds rest on what is stated of the sensors")
+    ]
 
 
 def _of_truth(found: NavigationFound, finding: object) -> bool:
@@ -70,9 +86,7 @@ def _short(found: NavigationFound) -> str:
             f"({'' if len(used) == 1 else 'farthest off: '}{worst.name}, "
             f"{plain(worst.ratio, 2)} times as much)"
         )
-    if not parts:
-        return "nothing was observed that could speak for it or against it"
-    return ", and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
+    return ", and ".join([", ".join(parts[:-1]), *parts[-1:]]) if len(parts) > 1 else "".join(parts)
 
 
 def _errors(found: NavigationFound) -> list[tuple[bool, str]]:
@@ -123,6 +137,12 @@ def _innovations(one: Agreement) -> tuple[bool, str]:
     if one.inside:
         return True, f"{one.name} agrees with what was stated: {ratio} (root mean square)"
     if one.acceptable:
+        if one.ratio <= 1.0 / FAR_OFF:
+            return True, (
+                f"{one.name} scatters less than was stated, but lasts from epoch to epoch: {ratio} "
+                "(root mean square), and together as much as independent errors of "
+                f"{plain(one.lasting, 2)}"
+            )
         side = "more" if one.ratio > 1.0 else "less"
         return True, (
             f"{one.name} scatters a little {side} than was stated: {ratio} (root mean square)"

@@ -165,7 +165,7 @@ def distance_over_ground(trajectory: pd.DataFrame) -> float:
 
 
 def length_words(metres: float) -> str:
-    """A length: ``0.021 m``, ``13.4 m``, ``2.41 km``."""
+    """A length: ``0.021 m``, ``13.4 m``, ``388 m``, ``2.41 km``."""
     size = abs(metres)
     if not math.isfinite(size):
         return "–"
@@ -173,7 +173,7 @@ def length_words(metres: float) -> str:
         return f"{plain(1e-3 * metres, 0)}{GAP}km"
     if size >= 1000.0:
         return f"{plain(1e-3 * metres, 2 if size < 1e4 else 1)}{GAP}km"
-    places = 1 if size >= 10.0 else 2 if size >= 1.0 else 3
+    places = 0 if size >= 99.95 else 1 if size >= 10.0 else 2 if size >= 1.0 else 3
     return f"{plain(metres, places)}{GAP}m"
 
 

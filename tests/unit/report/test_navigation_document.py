@@ -49,7 +49,7 @@ def test_the_headline_is_the_end_of_the_record():
     last = made.trajectory.iloc[-1]
     said = plain(headline(found))
     assert f"{last['lat']:.6f}°, {last['lon']:.6f}°" in said
-    assert "after 120 s and 959.2 m" in said  # 8 m/s over 119.9 s
+    assert "after 120 s and 959 m" in said  # 8 m/s over 119.9 s
     assert "known to 7.34 m" in said  # 2.4477 * 3 m
     assert "heading to 0.98°" in said  # 1.96 * 0.5 deg
 
@@ -117,6 +117,52 @@ def test_what_lasts_speaks_against_it():
     assert any("no noise" in head for head, _ in cautions(found))
 
 
+def test_what_lasts_and_is_stated_wide_enough_for_it_does_not():
+    made = record(seconds=300.0, outage=None, reject=())
+    table = made.innovations["rtk.position"]
+    # A sine of 0.1 sd over 50 epochs: correlated by 0.98, as much as independent errors of 0.7 sd.
+    for label in ("north, m", "east, m", "down, m"):
+        table[f"nu {label}"] = 2.0 * 0.1 * np.sin(np.arange(len(table)) / 5.0) * np.sqrt(2.0)
+    one = examine(told(made)).agreements[0]
+    assert one.correlation > 0.9
+    assert 0.5 < one.lasting < 1.0
+    assert not one.remembers
+    assert one.acceptable
+    assert not any("no noise" in head for head, _ in cautions(examine(told(made))))
+
+
+def test_most_epochs_far_off_refute_it_and_outliers_do_not():
+    few, most = record(outage=None, reject=()), record(outage=None, reject=())
+    nu = few.innovations["rtk.position"].columns[:3]
+    for made, share in ((few, 4), (most, 1)):
+        table = made.innovations["rtk.position"]
+        table.loc[table.index[::share], nu] = 40.0 * np.sqrt(table["s north, m"].iloc[0])
+    assert trust(examine(told(few))).verdict == "reserve"
+    found = trust(examine(told(most)))
+    assert found.verdict == "distrusted"
+    assert found.sentence.startswith("It should not be trusted: rtk.position scatters more")
+
+
+def test_an_aid_that_is_mostly_refused_refutes_it():
+    made = record(outage=None, reject=())
+    table = made.innovations["rtk.position"]
+    table.loc[table.index[: len(table) // 2 + 1], "weight north, m"] = 0.0
+    assert trust(examine(told(made))).verdict == "distrusted"
+
+
+def test_what_needs_no_remedy_speaks_against_nothing():
+    made = record()
+    fact = Finding("gyro and accel: increments of each sample", file="log.imu")
+    found = trust(examine(told(made, findings=(fact,), truth=shifted(made.trajectory))))
+    assert found.verdict == "trusted", found.sentence
+
+
+def test_sensors_alone_are_borne_out_by_nothing():
+    found = trust(examine(told(without_aids(record()))))
+    assert found.verdict == "reserve"
+    assert "nothing was observed beside it" in found.sentence
+
+
 def test_many_rejections_speak_against_it():
     found = trust(examine(told(record(reject=range(20)))))
     assert any("were rejected" in why for good, why in found.reasons if not good)
@@ -176,10 +222,13 @@ def test_events_beyond_what_can_be_read_are_in_the_json():
 
 
 def test_numbers_are_said_as_people_say_them():
-    assert [plain(length_words(x)) for x in (0.0213, 2.5, 13.42, 2410.0, 28400.0, 2.5e5)] == [
+    assert [
+        plain(length_words(x)) for x in (0.0213, 2.5, 13.42, 387.6, 2410.0, 28400.0, 2.5e5)
+    ] == [
         "0.021 m",
         "2.50 m",
         "13.4 m",
+        "388 m",
         "2.41 km",
         "28.4 km",
         "250 km",

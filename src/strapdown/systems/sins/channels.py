@@ -9,6 +9,7 @@ import pandas as pd
 
 from strapdown import rotation
 from strapdown.config.navigation import StartTable
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
@@ -22,6 +23,8 @@ __all__ = ["channel_findings"]
 SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
 #: So many times as noisy as the data sheet are gyros in deg/s that are taken for rad/s, roughly.
 DEGREES = (57.3 / 2.0, 57.3 * 2.0)
+#: A usual reading so near to gravity in another unit is that.
+NEAR = 0.05
 #: The first second is held beside a start that is stated; it may be so far off, deg.
 FIRST, FAR = 1.0, 60.0
 
@@ -47,9 +50,10 @@ def channel_findings(
     Raises
     ------
     DataError
-        A channel reads nothing over half of the record, gyros are in degrees, or gravity is not
-        where the stated attitude has it.
+        A channel reads nothing over half of the record, gyros are in degrees, accelerometers in
+        another unit, or gravity is not where the stated attitude has it.
     """
+    _refuse_unit(imu)
     _refuse_gravity(imu, start)
     if len(imu) < LEAST_SAMPLES:
         return ()
@@ -103,6 +107,24 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
 
 #: Median of the square of a standard normal number, and a rate in rad/s.
 MEDIAN, WILD = 0.4549364, 6.0
+
+
+def _refuse_unit(imu: pd.DataFrame) -> None:
+    """Accelerometers whose usual reading is gravity in another unit."""
+    time, force = index_of(imu), values_of(imu, ACCEL)
+    starts = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], FIRST)))
+    count = np.diff(np.append(starts, len(time)))[:, None]
+    size = np.median(np.linalg.norm(np.add.reduceat(force, starts) / count, axis=1))
+    for unit, factor in (("g", 1.0 / STANDARD_GRAVITY), ("m/s2", STANDARD_GRAVITY)):
+        wanted = STANDARD_GRAVITY * factor
+        if abs(size / wanted - 1.0) < NEAR:
+            raise DataError(
+                f"half of the time the three together read {size:.4g} m/s² or more, and gravity "
+                f"is {STANDARD_GRAVITY:.4g} m/s²: they seem to be in {unit}",
+                file=source_of(imu),
+                quantity="accel",
+                remedy=f'write accel_unit = "{unit}" in [log], or --accel-unit {unit}',
+            )
 
 
 def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import DataError
+from strapdown.exceptions import ConfigError, DataError
 from strapdown.prefilter.prefilter import Grid, Prefilter
 
 __all__ = ["Filtered", "Filtering", "FilteringState"]
@@ -97,7 +97,15 @@ class Filtering:
                 quantity=f.quantity,
                 remedy=f"a pre-filter needs even stamps: leave it out, or {f.remedy}",
             ) from None
-        return FilteringState(grid, self.prefilter.begin(grid, 6))
+        try:
+            return FilteringState(grid, self.prefilter.begin(grid, 6))
+        except ConfigError as error:
+            f = error.finding
+            if f.quantity != "rate":
+                raise
+            raise ConfigError(
+                f.what, file=source, quantity="prefilter, rate_hz", remedy=f.remedy
+            ) from None
 
     def advance(
         self, state: FilteringState, time: Array, values: Array, last: bool, source: str | None

@@ -142,7 +142,9 @@ def propose(
     guessed = sensor is None
     named = sensor or (None if noise is None else _nearest(noise))
     if named is not None:
-        table["sensors"] = {"sensor": named, **_louder(scatter, named)}
+        # Gyros that find north feel how a vehicle rocks: that is motion, and no noise of theirs.
+        shaken = {} if _finds_north(named) else _louder(scatter, named)
+        table["sensors"] = {"sensor": named, **shaken}
     place = site or _place(recording.start)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))

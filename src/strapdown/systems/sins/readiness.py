@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+import numpy as np
 import pandas as pd
 
 from strapdown.aiding.aid import TableAid
@@ -13,7 +14,9 @@ from strapdown.aiding.gnss_readiness import gnss_readiness
 from strapdown.config.navigation import NavigationSpec, aids_of
 from strapdown.config.navigation_checks import make_aids
 from strapdown.exceptions import DataError, Finding
-from strapdown.tables.checks import index_of, source_of
+from strapdown.frames import ecef_from_geodetic
+from strapdown.tables import GEODETIC, POSITION_SD
+from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = ["look_through"]
 
@@ -21,6 +24,8 @@ __all__ = ["look_through"]
 VERTICAL = 570.0
 #: From here on that is told, s.
 LONG = 1800.0
+#: The first fix may be so far from a place that is stated: standard deviations, m, and m/s since.
+FAR_SD, FAR, FAST = 10.0, 1000.0, 340.0
 #: Aids that hold the height.
 HOLDS_HEIGHT = ("gnss", "barometer", "no_slip", "body_velocity")
 
@@ -55,6 +60,7 @@ def look_through(
             continue
         if isinstance(aid, Gnss):
             found += gnss_readiness(table, imu, aid)
+            _refuse_far(spec, table, imu, aid)
         elif isinstance(aid, TableAid):
             _refuse_apart(table, imu)
     return (*found, *_height(spec, imu))
@@ -71,6 +77,43 @@ def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
         quantity="time",
         remedy="give both on one clock, or another part of the record",
     )
+
+
+def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, aid: Gnss) -> None:
+    """A first fix that is nowhere near the place that is stated."""
+    name, stated = ("start", spec.start) if spec.start is not None else ("site", spec.site)
+    if stated is None or not aid.use_position:
+        return
+    sd = values_of(table, POSITION_SD)
+    placed = np.isfinite(sd).all(axis=1) & (values_of(table, ["quality"])[:, 0] > 0.0)
+    after = index_of(table) - aid.time_offset - float(imu.index[0])
+    rows = np.flatnonzero(placed & (after >= 0.0))
+    if not rows.size:
+        return
+    k = int(rows[0])
+    here = np.array([stated.lat_deg, stated.lon_deg, stated.alt_m])
+    fix = values_of(table, GEODETIC)[k]
+    scatter = math.hypot(float(np.linalg.norm(stated.position_sd_m)), float(sd[k].max()))
+    allowed = FAR_SD * scatter + FAR + FAST * float(after[k])
+    if (off := _apart(fix, here)) <= allowed:
+        return
+    swapped = abs(fix[0]) <= 180.0 and abs(fix[1]) <= 90.0
+    swapped = swapped and _apart(fix[[1, 0, 2]], here) <= allowed
+    raise DataError(
+        f"the first fix, {fix[0]:.6f}°, {fix[1]:.6f}°, is {off / 1000.0:.4g} km from the place in "
+        f"[{name}], {here[0]:.6f}°, {here[1]:.6f}°"
+        + (": latitude and longitude of the fixes seem to be swapped" if swapped else ""),
+        file=source_of(table),
+        row=k + 1,
+        quantity="lat, lon",
+        remedy="name its columns: columns = {lat = …, lon = …} of this aid"
+        if swapped
+        else f"look at lat_deg and lon_deg in [{name}], or state a position_sd_m that is so large",
+    )
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.linalg.norm(ecef_from_geodetic(one) - ecef_from_geodetic(other)))
 
 
 def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
