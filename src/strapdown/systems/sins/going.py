@@ -106,8 +106,8 @@ class Going:
                 f"{where}: what the body did then is not known",
                 file=self._state.intake.source,
                 quantity="time",
-                remedy="cut the log there; or bridge longer gaps (coast_s in [gaps]), or align anew "
-                'after them (beyond = "align" in [gaps])',
+                remedy="cut the log there; or bridge longer gaps (coast_s in [gaps]), or align "
+                'anew after them (beyond = "align" in [gaps])',
             )
         anew = hole.length > policy.coast and policy.beyond == "align"
         done = "alignment begins anew" if anew else "bridged along a line, and not well known since"
