@@ -81,6 +81,7 @@ class _Checks(SourceChecks):
             yield partial(self.stage, spec, name)
         yield partial(self.height, spec)
         yield partial(self.modes, spec)
+        yield partial(self.gaps, spec)
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
             yield partial(self.aid, spec, name)
@@ -230,6 +231,14 @@ class _Checks(SourceChecks):
                 ("aiding", name, "kind"),
                 'it observes the height, and [mechanization] height = "held" keeps it where it is',
                 'write height = "free", or leave this aid out',
+            )
+
+    def gaps(self, spec: NavigationSpec) -> None:
+        if spec.gaps.beyond == "align" and spec.start is not None:
+            raise self.refuse(
+                ("gaps", "beyond"),
+                "with [start] there is no alignment to begin anew with",
+                'write "refuse" or "coast", or [coarse] in place of [start]',
             )
 
     def receiver(self, name: str, receiver: ReceiverTable) -> None:

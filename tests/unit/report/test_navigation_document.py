@@ -129,6 +129,17 @@ def test_most_epochs_far_off_refute_it_and_outliers_do_not():
     assert found.sentence.startswith("It should not be trusted: rtk.position scatters more")
 
 
+def test_large_errors_that_last_refute_it():
+    made = record(seconds=300.0, outage=None, reject=())
+    table = made.innovations["rtk.position"]
+    # Less than half of the epochs, one after the other: the median does not see them.
+    wave = 14.0 * np.sin(np.arange(140) / 5.0) * np.sqrt(table["s north, m"].iloc[0])
+    table.iloc[:140, 0] = wave
+    (found,) = examine(told(made)).agreements
+    assert found.usual < 3.0 < found.ratio
+    assert found.refutes
+
+
 def test_an_aid_that_is_mostly_refused_refutes_it():
     made = record(outage=None, reject=())
     table = made.innovations["rtk.position"]
