@@ -50,6 +50,7 @@ if TYPE_CHECKING:
     from strapdown.report.alignment import align
     from strapdown.report.attitude import write_attitude
     from strapdown.report.crash_case import reconstruct_case
+    from strapdown.report.navigation import navigate
     from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
@@ -83,6 +84,7 @@ __all__ = [
     "bench_attitude",
     "check_imu_channels",
     "motion_increments",
+    "navigate",
     "read_crash_record",
     "read_log",
     "read_nhtsa",
@@ -121,6 +123,7 @@ _HOMES = {
     "TriadUncertainty": "strapdown.sensors.triad_uncertainty",
     "bench_attitude": "strapdown.systems.attitude_bench",
     "motion_increments": "strapdown.increments",
+    "navigate": "strapdown.report.navigation",
     "read_log": "strapdown.formats",
     "read_crash_record": "strapdown.formats.crash_records",
     "read_nhtsa": "strapdown.formats.nhtsa",

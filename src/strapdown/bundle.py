@@ -13,7 +13,7 @@ import json
 import os
 import platform
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -24,10 +24,20 @@ from typing import Any
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.results import InputFiles
 
-__all__ = ["Seal", "read_manifest", "sha256", "unsealed_changes", "write_bundle", "write_timing"]
+__all__ = [
+    "Seal",
+    "read_manifest",
+    "sha256",
+    "unsealed_changes",
+    "write_bundle",
+    "write_latency",
+    "write_timing",
+]
 
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
+#: Outside the seal: clocks differ.
+UNSEALED = (TIMING, "latency.json")
 SCHEMA = "strapdown bundle 1"
 KEPT = ("copy", "reference")
 # Inputs up to this size together are copied into the bundle, which then stands on its own.
@@ -211,7 +221,7 @@ def _manifest(
     outputs = [
         {"name": name, "sha256": sha256(staging / name), "bytes": (staging / name).stat().st_size}
         for name in _files(staging)
-        if name != TIMING
+        if name not in UNSEALED
     ]
     for item in inputs:
         for file, digest in zip(item.files, item.digests, strict=True):
@@ -335,6 +345,18 @@ def write_timing(
     (seal.path / TIMING).write_text(to_json(timing), encoding="utf-8", newline="\n")
 
 
+def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
+    """Put what each sample took beside its bundle's seal.
+
+    Parameters
+    ----------
+    seal : Seal
+    latency : mapping
+        As JSON.
+    """
+    (seal.path / "latency.json").write_text(to_json(latency), encoding="utf-8", newline="\n")
+
+
 def read_manifest(bundle: Path) -> dict[str, Any]:
     """Read the manifest of a bundle.
 
@@ -436,7 +458,7 @@ def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
         One sentence a file: changed, missing, or not in the manifest.
     """
     changes = []
-    expected: set[str] = {MANIFEST, TIMING}
+    expected: set[str] = {MANIFEST, *UNSEALED}
     for item in [*manifest["inputs"], *manifest["outputs"]]:
         path = bundle / item["name"]  # an absolute path stays what it is
         expected.add(item["name"])

@@ -165,6 +165,22 @@ def test_a_simulation_with_outage_outliers_and_full_rate(run_cli, tmp_path, undr
     assert run_cli("verify", tmp_path / "out").code == 0
 
 
+def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
+    withhold = "\n[withhold]\nspans_s = [[45.0, 55.0], [30.0, 35.0]]\n"
+    write_drive(tmp_path, file=lambda text: text + withhold)
+    done = run_cli("navigate", tmp_path / "navigate.toml", "--out", tmp_path / "out", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)["withheld"]
+    assert [(w["aid"], w["from_s"], w["to_s"]) for w in found] == [
+        ("rtk", 45.0, 55.0),
+        ("rtk", 30.0, 35.0),
+    ]
+    # The largest of ten, each of which is within its bound with 95 %: the noise of the fixes.
+    assert all(w["largest_horizontal_error_m"] < 2.0 * w["bound_95_m"] for w in found)
+    # The run itself has had all fixes.
+    assert not any(e["kind"] == "outage" for e in json.loads(done.out)["events"])
+
+
 def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, undrawn_here):
     write_drive(tmp_path)
     log, fixes = tmp_path / "drive.csv", tmp_path / "fixes.csv"

@@ -36,7 +36,8 @@ BEYOND = 1.000001
 
 # A call hands over what belongs together:
 # - kinds: (mechanization, form, whether the height is held);
-# - model: (terms of gyros, terms of accelerometers, decay, drive, noise (2, 3), earth, options);
+# - model: (terms of gyros, terms of accelerometers, decay, drive, noise of gyros
+#   and of accelerometers (3,), earth, options);
 # - states: (mechanization, the same at the covariance, covariance, sensors, times, newest increment
 #   without errors), which go on in place;
 # - group: (rows of the history, the first at its start; increments), of what is not closed yet;
@@ -52,7 +53,7 @@ def close_group(kinds, model, states, group, count, room):
     if count == 0:
         return -1
     which, form, held = kinds
-    gyro_terms, accel_terms, decay, drive, noise, earth, _ = model
+    gyro_terms, accel_terms, decay, drive, gyro_noise, accel_noise, earth, _ = model
     state, at_covariance, covariance, sensors, times, _ = states
     open_history, open_rows = group
     f, phi, tail, q, work, matrix, level, after, whole, added = room
@@ -79,7 +80,7 @@ def close_group(kinds, model, states, group, count, room):
         earth,
     )
     still = HELD_ROWS if held else 0
-    growth_of_step(f, decay, dt, matrix, noise[0], noise[1], drive, still, phi, tail, q, work)
+    growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, phi, tail, q, work)
     if form < UD:
         bad = grown_covariance(covariance, phi, tail, q, after, work)
     else:
@@ -87,7 +88,7 @@ def close_group(kinds, model, states, group, count, room):
         for i in range(n):
             for j in range(n):
                 whole[i, j] = phi[i, j] if i < CORE else 0.0
-                added[i, j] = q[i, j]
+                added[i, j] = q[i, j] if i <= j else q[j, i]
             if i >= CORE:
                 whole[i, i] = tail[i - CORE]
         bad = udu_predict(covariance, whole, added, after)
@@ -109,13 +110,13 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
     """Go over steps; return what became of it, the steps made, and those of the open group.
 
     `time` are the ends of the steps, `rows` their increments; `history` takes a row after each.
-    A call ends before its steps where a group was closed at `note_at` or later. The last array of
-    `room` is of errors of readings, (2, 7, 3).
+    A call ends before its steps where a group was closed at `note_at` or later. After the room of
+    `close_group` come arrays for errors of readings, (7, 3) each, and heights, which are none.
     """
-    gyro_terms, accel_terms, _, _, _, earth, options = model
+    gyro_terms, accel_terms, _, _, _, _, earth, options = model
     state, _, _, sensors, times, newest = states
     open_history, open_rows = group
-    closing, errors, heights = room
+    closing, of_gyros, of_accels, heights = room
     made = 0
     total = time.shape[0]
     while made < total:
@@ -135,11 +136,11 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
             if times[AT_COVARIANCE] >= note_at:
                 return NOTE, made, count
             continue
-        errors_of_states(gyro_terms, sensors, errors[0])
-        errors_of_states(accel_terms, sensors, errors[1])
+        errors_of_states(gyro_terms, sensors, of_gyros)
+        errors_of_states(accel_terms, sensors, of_accels)
         last = count + end - made
         new, into = open_rows[count:last], open_history[count + 1 : last + 1]
-        compensate(rows[made:end], errors[0], errors[1], new)
+        compensate(rows[made:end], of_gyros, of_accels, new)
         if kinds[0] == WANDER:
             went, why = wander_advance(state, new, heights, earth, options, into)
         else:

@@ -156,7 +156,7 @@ def take_off(which, state, sensors, earth, x):
 
 
 @njit(cache=True, error_model="numpy")
-def note(form, covariance, sensors, turn, P, noted, noted_sensors, noted_sd):
+def note(form, same_axes, covariance, sensors, turn, P, noted, noted_sensors, noted_sd):
     """Fill a mark: covariance of nine in north-east-down, estimates, and their deviations."""
     if form >= UD:
         udu_matrix(covariance, P)
@@ -166,6 +166,11 @@ def note(form, covariance, sensors, turn, P, noted, noted_sensors, noted_sd):
                 P[i, j] = covariance[i, j]
     for a in range(0, 9, 3):
         for b in range(0, 9, 3):
+            if same_axes:
+                for i in range(3):
+                    for j in range(3):
+                        noted[a + i, b + j] = P[a + i, b + j]
+                continue
             for i in range(3):
                 for j in range(3):
                     total = 0.0
@@ -212,7 +217,7 @@ def over_fixes(
     which, form, _ = kinds
     state, at_covariance, covariance, sensors, times, last = states
     open_history, _ = group
-    earth = model[5]
+    earth = model[6]
     n, size = 9 + sensors.shape[0], covariance.shape[0]
     x, z, R = np.empty(size), np.empty(3), np.empty(3)
     h, H = np.empty((3, size)), np.empty((3, size))
@@ -296,6 +301,7 @@ def over_fixes(
         noted_at[done] = times[AT_STEP]
         note(
             form,
+            which != WANDER,
             covariance,
             sensors,
             turn,

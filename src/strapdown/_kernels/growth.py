@@ -8,7 +8,9 @@ the first nine have dynamics F, (9, n); each of the others decays by itself.
 from __future__ import annotations
 
 import math
+from typing import Any
 
+import numpy as np
 from numba import njit
 
 CORE = 9
@@ -21,14 +23,40 @@ def padded(n):
     return rows, (rows + 3) // 4 * 4
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def add_three(out, i, a, b, c, rows, k):
-    """Add to row i of `out` a, b and c times the rows of `rows` from k on."""
-    for j in range(rows.shape[1]):
-        out[i, j] += a * rows[k, j] + b * rows[k + 1, j] + c * rows[k + 2, j]
+def growth_room(n: int) -> tuple[Any, ...]:
+    """Arrays to work in, for n states."""
+    rows, width = padded(n)
+    return tuple(np.empty((m, width)) for m in (9, 9, 9, 9, 9, 6, 6, 9, rows))
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
+def add_block(out, i, left, m, rows):
+    """Add to three rows of `out` from i on the block (i, m) of `left` times three rows from m on.
+
+    A block of zeros costs nothing.
+    """
+    a0, a1, a2 = left[i, m], left[i, m + 1], left[i, m + 2]
+    b0, b1, b2 = left[i + 1, m], left[i + 1, m + 1], left[i + 1, m + 2]
+    c0, c1, c2 = left[i + 2, m], left[i + 2, m + 1], left[i + 2, m + 2]
+    if (
+        a0 != 0.0
+        or a1 != 0.0
+        or a2 != 0.0
+        or b0 != 0.0
+        or b1 != 0.0
+        or b2 != 0.0
+        or c0 != 0.0
+        or c1 != 0.0
+        or c2 != 0.0
+    ):
+        for j in range(rows.shape[1]):
+            x, y, z = rows[m, j], rows[m + 1, j], rows[m + 2, j]
+            out[i, j] += a0 * x + a1 * y + a2 * z
+            out[i + 1, j] += b0 * x + b1 * y + b2 * z
+            out[i + 2, j] += c0 * x + c1 * y + c2 * z
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def powers(f, decay, dt, one, two, three):
     """Fill the core's rows of F dt and of its square and cube; `f` and they are (9, w)."""
     k = decay.shape[0]
@@ -37,21 +65,21 @@ def powers(f, decay, dt, one, two, three):
             one[i, j] = dt * f[i, j]
             two[i, j] = 0.0
             three[i, j] = 0.0
-    for i in range(CORE):
+    for i in range(0, CORE, 3):
         for m in range(0, CORE, 3):
-            add_three(two, i, one[i, m], one[i, m + 1], one[i, m + 2], one, m)
+            add_block(two, i, one, m, one)
     for j in range(k):
         fading = -decay[j] * dt
         if fading != 0.0:
             for i in range(CORE):
                 two[i, CORE + j] += fading * one[i, CORE + j]
                 three[i, CORE + j] += fading * fading * one[i, CORE + j]
-    for i in range(CORE):
+    for i in range(0, CORE, 3):
         for m in range(0, CORE, 3):
-            add_three(three, i, one[i, m], one[i, m + 1], one[i, m + 2], two, m)
+            add_block(three, i, one, m, two)
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def series(one, two, three, part, out):
     """Fill ``exp(F dt part)`` to third order from the powers of F dt."""
     b, c = part * part / 2.0, part * part * part / 6.0
@@ -61,9 +89,15 @@ def series(one, two, three, part, out):
         out[i, i] += 1.0
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
 def turned_noise(matrix, noise, dt, out, at):
     """Fill ``C diag(noise²) C' dt``, (3, 3), into rows `at` and after of `out`."""
+    if noise[0] == noise[1] and noise[1] == noise[2]:
+        # C C' is one.
+        for i in range(3):
+            for j in range(3):
+                out[at + i, j] = dt * noise[0] * noise[0] if i == j else 0.0
+        return
     for i in range(3):
         for j in range(3):
             total = 0.0
@@ -72,20 +106,19 @@ def turned_noise(matrix, noise, dt, out, at):
             out[at + i, j] = dt * total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, phi, tail, q, room):
     """Fill transition and noise of a step of dynamics f, (9, w).
 
     `phi` (9, w) takes the core's rows of ``exp(F dt)`` to third order, as drift reaches the place
     through tilt and velocity; `tail` (k,) the exact decay of the others. `q` (rows, w) takes the
-    covariance that white noise adds. It enters at the middle of the step, ``exp(F dt/2) G q G'
-    exp(F dt/2)' dt``, which holds its correlations to second order and is positive semidefinite.
-    `matrix` is C_lb; rows that are `still`, a bit each, take no noise. `room` (51, w) is to work
-    in.
+    covariance that white noise adds, of which only the upper half is filled: it
+    enters at the middle of the step, ``exp(F dt/2) G q G' exp(F dt/2)' dt``, which holds its
+    correlations to second order and is positive semidefinite. `matrix` is C_lb; rows that are
+    `still`, a bit each, take no noise. `room` is of `growth_room`.
     """
     k, w = decay.shape[0], f.shape[1]
-    one, two, three = room[0:9], room[9:18], room[18:27]
-    lift, weighted, across, turned = room[27:36], room[36:39], room[39:45], room[45:51]
+    one, two, three, lift, weighted, across, turned, _, _ = room
     powers(f, decay, dt, one, two, three)
     series(one, two, three, 1.0, phi)
     series(one, two, three, 0.5, lift)
@@ -106,14 +139,16 @@ def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, 
     for i in range(CORE):
         for at in range(0, 6, 3):
             for j in range(3):
-                weighted[0, j] = (
+                weighted[i, at + j] = (
                     lift[i, 3 + at] * turned[at, j]
                     + lift[i, 4 + at] * turned[at + 1, j]
                     + lift[i, 5 + at] * turned[at + 2, j]
                 )
-            add_three(q, i, weighted[0, 0], weighted[0, 1], weighted[0, 2], across, at)
+    for i in range(0, CORE, 3):
+        for at in range(0, 6, 3):
+            add_block(q, i, weighted, at, across)
     for j in range(k):
-        tail[j] = math.exp(-decay[j] * dt)
+        tail[j] = math.exp(-decay[j] * dt) if decay[j] != 0.0 else 1.0
         if drive[j] != 0.0:
             spread = dt * drive[j] * drive[j]
             own = math.exp(-0.5 * decay[j] * dt)
@@ -124,22 +159,17 @@ def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, 
                         q[i, m] += share * lift[m, CORE + j]
                     q[i, CORE + j] += share * own
             q[CORE + j, CORE + j] += spread * own * own
-    for i in range(CORE):
-        for j in range(i):
-            q[i, j] = q[j, i]
-        for j in range(CORE, CORE + k):
-            q[j, i] = q[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def grown_covariance(P, phi, tail, q, out, room):
-    """Fill ``Phi P Phi' + Q``, exactly symmetric; all are padded, `room` (9 + rows of P, w).
+    """Fill ``Phi P Phi' + Q``, exactly symmetric; all are padded, `room` is of `growth_room`.
 
     Return -1, or the first state whose variance is no number or negative.
     """
     k, rows, w = tail.shape[0], P.shape[0], P.shape[1]
     n = CORE + k
-    half, turned = room[0:9], room[9 : 9 + rows]
+    half, turned = room[7], room[8]
     for i in range(rows):
         for j in range(w):
             turned[i, j] = 0.0
@@ -148,15 +178,15 @@ def grown_covariance(P, phi, tail, q, out, room):
             turned[j, i] = phi[i, j]
         for j in range(w):
             half[i, j] = 0.0
+            out[i, j] = q[i, j]
+    for i in range(0, CORE, 3):
         for m in range(0, rows, 3):
-            add_three(half, i, phi[i, m], phi[i, m + 1], phi[i, m + 2], P, m)
+            add_block(half, i, phi, m, P)
     for j in range(k):
         turned[CORE + j, CORE + j] = tail[j]
-    for i in range(CORE):
-        for j in range(w):
-            out[i, j] = q[i, j]
+    for i in range(0, CORE, 3):
         for m in range(0, rows, 3):
-            add_three(out, i, half[i, m], half[i, m + 1], half[i, m + 2], turned, m)
+            add_block(out, i, half, m, turned)
     bad = -1
     for i in range(n):
         if i >= CORE:
@@ -169,7 +199,7 @@ def grown_covariance(P, phi, tail, q, out, room):
     return bad
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
 def compose_growth(step, tail, added, phi, q, work):
     """Let a step follow: ``phi <- step phi`` and ``q <- step q step' + added``.
 

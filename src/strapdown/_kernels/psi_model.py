@@ -198,7 +198,7 @@ def psi_transitions(
     `levels` are level rows at both sides of every step; steps are taken together up to `longest`
     seconds, with the means of attitude, force and rate over them. `gyro` and `accel` are terms of
     couplings (`couple`). The rest is room to work in: `f` and `step` (9, w), `tail` (k,), `added`
-    (rows, w), `room` (51, w), `work` (n, n), `matrix` (6, 3).
+    (rows, w), `room` of `growth.growth_room`, `work` (n, n), `matrix` (6, 3).
     """
     n = phi.shape[0]
     for i in range(n):

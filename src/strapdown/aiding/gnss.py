@@ -224,12 +224,12 @@ class Gnss(TableAid):
             z += displacement_between(view.here, measured, view.ellipsoid)
         else:
             z -= values[1:4]
-        name, labels = self.names(values)
+        name, labels = self.names(float(values[0]))
         return [Observation(name, z, H, values[4:7], labels)]
 
-    def names(self, values: Array) -> tuple[str, tuple[str, ...]]:
+    def names(self, code: float) -> tuple[str, tuple[str, ...]]:
         """Return the name of the observation of an epoch, and the labels of its components."""
-        if values[0] == POSITION_CODE:
+        if code == POSITION_CODE:
             return f"{self.name}.position", PLACE
         return f"{self.name}.velocity", SPEED
 

@@ -25,6 +25,8 @@ GPS_EPOCH, LEAP = 315_964_800.0, 18.0
 UNIX = (7.9e8, 2.21e9)
 #: Offsets that are looked at, s, and the step of the search.
 LARGEST, STEP = 20.0, 0.05
+#: How far apart integrals of the sensors are kept for it, s.
+NODES = 0.02
 #: Below this speed a course says nothing, m/s.
 LEAST_SPEED = 3.0
 #: How far an antenna may be from where the vehicle goes as it points, m.
@@ -257,18 +259,14 @@ def _best(
     used = used & (begin - most >= stamps[0]) & (end + most <= stamps[-1])
     if used.sum() < LEAST_STEPS:
         return None
-    begin, end, change = begin[used], end[used], change[used]
-    steps = np.diff(stamps)[:, None]
-    mean = values[1:] if imu.attrs["sampling"] == "mean" else 0.5 * (values[1:] + values[:-1])
-    sums = np.vstack([np.zeros(3), np.cumsum(steps * mean, axis=0)])
+    change, lasting = change[used], (end - begin)[used]
+    nodes, sums = _integrals(stamps, values, imu.attrs["sampling"] == "mean")
 
     def misfit(offset: float) -> float:
-        gone = [
-            np.interp(end - offset, stamps, c) - np.interp(begin - offset, stamps, c)
-            for c in sums.T
-        ]
-        X = np.column_stack([*gone, end - begin])
-        fit, *_ = np.linalg.lstsq(X, change, rcond=None)
+        gone = np.diff(_between_nodes(nodes, sums, at - offset), axis=0)[used]
+        X = np.column_stack([gone, lasting])
+        # Of the normal equations, which keep digits enough to judge by, and are few.
+        fit, *_ = np.linalg.lstsq(X.T @ X, X.T @ change, rcond=None)
         return float(np.square(change - X @ fit).sum())
 
     whole = float(np.square(change - change.mean()).sum())
@@ -292,6 +290,25 @@ def _best(
     # What is left is correlated from step to step: twice what independent steps would give.
     sd = 2.0 * math.sqrt(costs[k] / max(len(change) - 5, 1) / second)
     return TimeOffset(offset, sd, share, by)
+
+
+def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]:
+    """Integrals of three channels, (m, 3), at stamps that are no closer than the search needs."""
+    steps = np.diff(stamps)
+    mean = values[1:] if means else 0.5 * (values[1:] + values[:-1])
+    sums = np.vstack([np.zeros(3), np.cumsum(steps[:, None] * mean, axis=0)])
+    each = max(1, int(NODES / float(np.median(steps))))
+    last = len(stamps) - 1
+    kept = np.append(np.arange(0, last, each), last)
+    return stamps[kept], sums[kept]
+
+
+def _between_nodes(nodes: Array, values: Array, time: Array) -> Array:
+    """Interpolate rows linearly, with one search for all columns."""
+    at = np.clip(np.searchsorted(nodes, time, side="right") - 1, 0, len(nodes) - 2)
+    share = (time - nodes[at]) / (nodes[at + 1] - nodes[at])
+    before = values[at]
+    return np.asarray(before + share[:, None] * (values[at + 1] - before))
 
 
 def _difference(time: Array, stamps: Array) -> tuple[str, str]:

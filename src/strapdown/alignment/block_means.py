@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.sensors.imu_uncertainty import BiasDrift
 from strapdown.sensors.triad_errors import Triad
 from strapdown.tables import ACCEL, GYRO
@@ -99,8 +100,6 @@ def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -
     Within a record a Gauss-Markov process walks by ``q = 2 sd²/correlation_time`` a second, and
     the means of its parts scatter about that of the whole by ``q length/6`` (variance).
     """
-    from scipy.stats import chi2
-
     m = len(means)
     if m < 2:
         return 1.0
@@ -110,7 +109,7 @@ def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -
     # An ideal sensor at rest scatters by rounding.
     floor = 1e-24 * float(np.square(means).sum(axis=1).max())
     ratio = float(np.max(measured / np.maximum(expected, floor + 1e-300)))
-    limit = float(chi2.isf(CHANCE / 3.0, m - 1)) / (m - 1)
+    limit = chi_square_exceeded(CHANCE / 3.0, m - 1) / (m - 1)
     return math.sqrt(ratio) if ratio > limit else 1.0
 
 

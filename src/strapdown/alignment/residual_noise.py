@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.block_means import CHANCE
 from strapdown.alignment.inertial_fit import DEGREES, FIRST_FREE, InertialFit, functionals
 from strapdown.alignment.inertial_sums import InertialSums
+from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]
@@ -97,8 +98,6 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
     positive and never lose likelihood (Févotte and Idier 2011, doi:10.1162/NECO_a_00168, the
     Itakura-Saito divergence with exponent 1/2).
     """
-    from scipy.stats import chi2
-
     shapes = _energies(sums)[:, FIRST_FREE:]
     g = float(np.linalg.norm(sums.node_velocity.sum(axis=0))) / sums.length
     drift = sensors.accel_drift
@@ -111,7 +110,7 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
     known = known + (1e-14 * float(np.abs(sums.fallen[-1]).max())) ** 2
     axes = 2 * len(energy)
     statistic = float((energy / known).sum())
-    significant = statistic > float(chi2.isf(CHANCE, axes))
+    significant = statistic > chi_square_exceeded(CHANCE, axes)
     excess = np.zeros(len(KINDS))
     if significant:
         excess = _likeliest(energy, known, shapes)

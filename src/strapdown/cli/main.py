@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import io
 import os
 import signal
@@ -71,8 +72,14 @@ app.command("modules", epilog=modules.EPILOG)(modules.modules)
 app.command("demo", epilog=demo.EPILOG)(demo.demo)
 
 
+#: Before cycles of references are looked for.
+NEW_OBJECTS = 20_000
+
+
 def run() -> None:
     """Run the command line; errors that are foreseen become a message and an exit code."""
+    # Looked for cycles at each 700 new objects, as by default, drawing takes a third longer.
+    gc.set_threshold(NEW_OBJECTS)
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             # A terminal that cannot show a degree sign shows a question mark.

@@ -91,6 +91,34 @@ def navigate(
         float | None,
         typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
     ] = None,
+    pace: Annotated[
+        str | None,
+        typer.Option(
+            metavar="N|max",
+            help="Play the record sample by sample, N times as fast as it was taken, and tell how "
+            "long each sample takes.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    live: Annotated[
+        str | None,
+        typer.Option(
+            metavar="-|udp://HOST:PORT",
+            help="Take samples as they come, as lines of standard input or of datagrams, by the "
+            "file of a run.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    every: Annotated[
+        float,
+        typer.Option(
+            metavar="S", help="With --live: a line of the state so often.", rich_help_panel=_RUN
+        ),
+    ] = 1.0,
+    lines: Annotated[
+        str,
+        typer.Option(metavar="json|csv", help="With --live: as what.", rich_help_panel=_RUN),
+    ] = "json",
     rate: Rate = None,
     sampling: Sampling = None,
     columns: Columns = None,
@@ -115,18 +143,21 @@ def navigate(
     ] = False,
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle import check_destination, write_latency, write_timing
     from strapdown.cli.align_options import flag_words
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.latency_table import print_latency
     from strapdown.cli.navigate_options import navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.config.navigation_file import read_navigation_spec
     from strapdown.exceptions import Finding
+    from strapdown.live.replay import Replay, parse_pace
     from strapdown.report.navigation import write_navigation
     from strapdown.systems.sins.run import run_navigation
 
     folder = out or Path(f"{source.resolve().stem}-navigate")
     check_destination(folder, force)
+    played = None if pace is None else Replay(parse_pace(pace))
     given: dict[str, Any] = {
         "gnss": gnss,
         "lever_arm": lever_arm,
@@ -147,6 +178,21 @@ def navigate(
         "axes": axes,
         "repair": repair or None,
     }
+    if live is not None:
+        from strapdown.cli.navigate_live import navigate_live
+
+        refused = {f"--{name.replace('_', '-')}": value for name, value in given.items()}
+        navigate_live(
+            source,
+            live,
+            folder,
+            lines=lines,
+            every=every,
+            force=force,
+            quiet=quiet,
+            given={**refused, "--pace": pace, "--json": json or None},
+        )
+        return
     own = source.suffix.lower() == ".toml"
     with progress(quiet or json) as show:
         report = Stopwatch(show)
@@ -156,16 +202,22 @@ def navigate(
         else:
             report("looking through", 0.01)
             spec = navigation_of_flags(source, given)
-        result = run_navigation(spec, source if own else None, report)
+        drive: dict[str, Any] = {} if played is None else {"drive": played}
+        result = run_navigation(spec, source if own else None, report, **drive)
         seal = write_navigation(result, folder, force=force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
+        latency = None if played is None else played.tape.latency()
+        if latency is not None:
+            write_latency(seal, {"pace": pace, **latency.told()})
     if json:
         typer.echo((seal.path / "navigation.json").read_text(encoding="utf-8"), nl=False)
         return
     if quiet:
         return
     print_navigation(result)
+    if latency is not None:
+        print_latency(latency, f"played, pace {pace}")
     print_findings(result.findings[:MOST])
     if len(result.findings) > MOST:
         more = f"{len(result.findings) - MOST} more; all of them are in the report"

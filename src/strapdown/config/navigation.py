@@ -35,6 +35,7 @@ __all__ = [
     "FilterSpec",
     "FineModeSpec",
     "GapsTable",
+    "LiveTable",
     "MechanizationSpec",
     "NavigationOutputTable",
     "NavigationSensorsTable",
@@ -45,6 +46,7 @@ __all__ = [
     "RecorderSpec",
     "StartTable",
     "TruthTable",
+    "WithholdTable",
     "aids_of",
     "receivers_of",
 ]
@@ -83,6 +85,14 @@ class NavigationSimulationTable(TableSpec):
     sensor: FileName | None = None
     #: By name of the aid, whose fixes they are.
     gnss: TableSpec = TableSpec()
+
+
+class LiveTable(TableSpec):
+    """Samples that come while it runs, and what aids send: `strapdown navigate --live`."""
+
+    sampling: Literal["instantaneous", "mean"] = "instantaneous"
+    #: A sample waits until one comes that is so much later: what aids send late is still in time.
+    hold_s: NotNegative = 0.2
 
 
 class StartTable(TableSpec):
@@ -204,6 +214,20 @@ class TruthTable(TableSpec):
     path: FileName
 
 
+class WithholdTable(TableSpec):
+    """Fixes that are kept from the navigator, stretch by stretch, to score it by."""
+
+    #: The aid whose fixes they are; the first of kind gnss, if not given.
+    aid: Word | None = None
+    #: Begin and end of each stretch, on the clock of the samples; each is tried by itself.
+    spans_s: tuple[Pair, ...] = ()
+    #: Or lengths, each at so many places, spread evenly.
+    lengths_s: tuple[Positive, ...] = ()
+    places: StrictInt = Field(default=5, ge=1, le=100)
+    #: Of the first one; half a minute after navigation begins, if not given.
+    from_s: Number | None = None
+
+
 class NavigationOutputTable(TableSpec):
     """What is written beside the report."""
 
@@ -221,6 +245,7 @@ class NavigationSpec(TableSpec):
     ellipsoid: Word = "wgs84"
     log: LogTable | None = None
     simulation: NavigationSimulationTable | None = None
+    live: LiveTable | None = None
     axes: AxesTable = AxesTable()
     sensors: NavigationSensorsTable = NavigationSensorsTable()
     prefilter: PrefilterSpec = PrefilterSpec()
@@ -236,6 +261,7 @@ class NavigationSpec(TableSpec):
     recorder: RecorderSpec = RecorderSpec()
     aiding: TableSpec = TableSpec()
     truth: TruthTable | None = None
+    withhold: WithholdTable | None = None
     output: NavigationOutputTable = NavigationOutputTable()
 
     @model_validator(mode="before")
@@ -245,7 +271,7 @@ class NavigationSpec(TableSpec):
             there = [n for n in ("log", "simulation") if data.get(n) is not None]
             if len(there) == 2:
                 raise refuse("simulation", "[log] is given, too", "keep one of the two")
-            if not there:
+            if not there and data.get("live") is None:
                 raise refuse(
                     "log",
                     "it is missing",

@@ -22,7 +22,7 @@ from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.stated_states import stated_states
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
@@ -87,6 +87,7 @@ class _Checks(SourceChecks):
             yield partial(self.aid, spec, name)
         for name, receiver in receivers_of(spec).items():
             yield partial(self.receiver, name, receiver)
+        yield partial(self.withhold, spec)
         yield partial(self.output, spec)
         yield partial(self.chain, spec)
 
@@ -169,7 +170,7 @@ class _Checks(SourceChecks):
                 )
             commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
             if given.kind != "none" and not [n for n in ends if n != "window_s"]:
-                if commanded:
+                if commanded or spec.live is not None:
                     continue
                 raise self.refuse(
                     (stage, "duration_s"),
@@ -212,7 +213,8 @@ class _Checks(SourceChecks):
                 f"'{given.kind}' watches the inertial sensors, and takes no file",
                 "leave path out",
             )
-        if takes and given.path is None and name not in receivers_of(spec):
+        sent = name in receivers_of(spec) or spec.live is not None
+        if takes and given.path is None and not sent:
             raise self.refuse(
                 ("aiding", name, "path"),
                 f"it is missing: '{given.kind}' takes what it measured from a file",
@@ -256,6 +258,35 @@ class _Checks(SourceChecks):
                     ("simulation", "gnss", name, "outages_s"),
                     f"a span from {begin:g} to {end:g} s has no length",
                     "write begin and end of each: [[80.0, 110.0]]",
+                )
+
+    def withhold(self, spec: NavigationSpec) -> None:
+        """Which fixes are kept back, and when."""
+        given = spec.withhold
+        if given is None:
+            return
+        if given.aid is None and not _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"), "no aid gives fixes to keep back", "leave [withhold] out"
+            )
+        if given.aid is not None and given.aid not in _fixes(spec):
+            raise self.refuse(
+                ("withhold", "aid"),
+                "there is no aid of this name that gives fixes",
+                nearest(given.aid, _fixes(spec)),
+            )
+        if bool(given.spans_s) == bool(given.lengths_s):
+            raise self.refuse(
+                ("withhold", "spans_s"),
+                "nothing says when" if not given.spans_s else "lengths_s is given, too",
+                "write spans_s = [[begin, end]], or lengths_s = [10.0, 30.0, 60.0] and places = 5",
+            )
+        for begin, end in given.spans_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("withhold", "spans_s"),
+                    f"from {begin:g} to {end:g} s there is no time",
+                    "give the begin before the end",
                 )
 
     def output(self, spec: NavigationSpec) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown._kernels import wander_error_states as states
 from strapdown._kernels import wander_errors as kernel
-from strapdown._kernels.growth import padded
+from strapdown._kernels.growth import growth_room, padded
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import (
@@ -105,7 +105,7 @@ class QuaternionModel(ErrorModel):
             np.empty((PHYSICAL, width)),
             np.empty(k),
             np.empty((rows, width)),
-            np.empty((51, width)),
+            growth_room(n),
             np.empty((n, n)),
             np.empty((15, 3)),
             np.empty(LEVEL),

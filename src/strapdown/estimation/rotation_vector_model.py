@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels import psi_model as kernel
-from strapdown._kernels.growth import padded
+from strapdown._kernels.growth import growth_room, padded
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import (
     PHYSICAL,
@@ -83,7 +83,7 @@ class RotationVectorModel(ErrorModel):
             np.empty((PHYSICAL, width)),
             np.empty(k),
             np.empty((rows, width)),
-            np.empty((51, width)),
+            growth_room(n),
             np.empty((n, n)),
             np.empty((6, 3)),
         )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import chi_square_exceeded, chi_square_quantile
 from strapdown.exceptions import DataError
 
 __all__ = ["SHARE", "band_of_mean", "bounds", "normalised_squares"]
@@ -52,10 +53,8 @@ def normalised_squares(errors: Array, covariance: Array) -> Array:
 
 def bounds(freedom: int, share: float = SHARE) -> tuple[float, float]:
     """Return the two-sided bounds within which a share of chi-square numbers is."""
-    from scipy.stats import chi2
-
     outside = 0.5 - 0.5 * share
-    return float(chi2.ppf(outside, freedom)), float(chi2.isf(outside, freedom))
+    return chi_square_quantile(outside, freedom), chi_square_exceeded(outside, freedom)
 
 
 def band_of_mean(freedom: int, runs: int, share: float = SHARE) -> tuple[float, float]:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown._kernels import geodetic as kernel
+from strapdown.dsp.chi_square import normal_quantile
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.evaluation.nees import SHARE, bounds, normalised_squares
 from strapdown.evaluation.trajectory_at import SAME_BEAT, same_stamps, trajectory_at
@@ -319,9 +320,7 @@ def _comparison(
 def _table(
     errors: Array, sd: Array, told: NDArray[np.bool_], inside: dict[str, float]
 ) -> pd.DataFrame:
-    from scipy.stats import norm
-
-    wide = float(norm.ppf(0.5 + 0.5 * SHARE))
+    wide = float(normal_quantile(0.5 + 0.5 * SHARE))
     rows = {}
     for k, name in enumerate(COMPONENTS):
         factor = np.degrees(1.0) if UNITS[k] == "deg" else 1.0

@@ -19,12 +19,15 @@ from strapdown.aiding.aid import TableAid
 from strapdown.estimation.update_rule import Step
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import Span
 from strapdown.tables.checks import index_of, source_of
 
 __all__ = [
     "WithheldScore",
     "Withholding",
+    "blinded",
+    "score_of",
     "score_withheld",
     "scores_table",
     "spans_to_withhold",
@@ -221,19 +224,7 @@ def score_withheld(
     ConfigError
         There is no such aid, or a span has no fixes or is not within the record.
     """
-    aid = navigator.by_name.get(name)
-    if not isinstance(aid, TableAid):
-        raise ConfigError(
-            f"there is no aid '{name}' with a table",
-            quantity="withhold",
-            remedy=nearest(name, navigator.by_name),
-        )
-    blind = replace(
-        navigator,
-        aids=tuple(
-            replace(one, rule=Withholding()) if one.name == name else one for one in navigator.aids
-        ),
-    )
+    blind = blinded(navigator, name)
     state = navigator.tell(state, name, table)
     found: dict[int, WithheldScore] = {}
     at = 0
@@ -284,18 +275,66 @@ def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
     return pd.DataFrame(rows, index=begins)
 
 
+def blinded(navigator: Navigator, name: str) -> Navigator:
+    """Return a navigator that looks at what an aid observes, and does not use it.
+
+    Parameters
+    ----------
+    navigator : Navigator
+    name : str
+        Of the aid.
+
+    Raises
+    ------
+    ConfigError
+        There is no such aid with a table.
+    """
+    aid = navigator.by_name.get(name)
+    if not isinstance(aid, TableAid):
+        raise ConfigError(
+            f"there is no aid '{name}' with a table",
+            quantity="withhold",
+            remedy=nearest(name, navigator.by_name),
+        )
+    aids = navigator.aids
+    blind = tuple(replace(one, rule=Withholding()) if one.name == name else one for one in aids)
+    return replace(navigator, aids=blind)
+
+
 def _score(
     blind: Navigator, state: NavigatorState, time: Array, rows: Array, name: str, span: Span
 ) -> WithheldScore:
     _, piece = blind.advance(state, time, rows)
-    seen = [one for one in piece.seen if one.name == f"{name}.position"]
+    return score_of([piece], name, span)
+
+
+def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> WithheldScore:
+    """Score what a navigator gave over a span, in which an aid was looked at and not used.
+
+    Parameters
+    ----------
+    pieces : sequence of NavigationPiece
+    name : str
+        Of the aid; its observation ``NAME.position`` is scored.
+    span : Span
+
+    Returns
+    -------
+    WithheldScore
+
+    Raises
+    ------
+    ConfigError
+        The aid has no fixes there.
+    """
+    seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
         raise ConfigError(
             f"there are no fixes from {span.begin:.9g} to {span.end:.9g} s to score by",
             quantity="withhold",
             remedy="withhold where the receiver has fixes",
         )
-    marks = {mark.time: mark.covariance for mark in piece.marks}
+    marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
     P = np.array([marks[one.time][:2, :2] for one in seen])
     s = np.array([one.innovations.s for one in seen])
     # What is expected along north and east is P, what the arm adds, and the fix's own noise: the

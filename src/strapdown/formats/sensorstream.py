@@ -45,7 +45,7 @@ def detect(path: Path) -> bool:
     lines = lines[:-1] if len(lines) > 1 else lines
     ids = set()
     for line in lines:
-        parsed = _parse(line)
+        parsed = blocks_of(line)
         if parsed is None:
             return False
         ids |= set(parsed[1])
@@ -74,7 +74,7 @@ def read(path: Path) -> RawLog:
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
     seen: dict[int, list[tuple[int, float, tuple[float, ...]]]] = {}
     for k, (row, line) in enumerate(numbered):
-        parsed = _parse(line)
+        parsed = blocks_of(line)
         if parsed is None:
             if k == len(numbered) - 1 and k and not text.endswith(("\n", "\r")):
                 findings.append(
@@ -135,7 +135,7 @@ def _log(
     )
 
 
-def _parse(line: str) -> tuple[float, Blocks] | None:
+def blocks_of(line: str) -> tuple[float, Blocks] | None:
     """Stamp and blocks of a line; None where it has another form."""
     fields = [f.strip() for f in line.split(",")]
     if fields and not fields[-1]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import error_loop as kernel
 from strapdown._kernels import fix_loop as fix_kernel
-from strapdown._kernels.growth import padded
+from strapdown._kernels.growth import growth_room, padded
 from strapdown._kernels.level import LEVEL
 from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
@@ -104,7 +104,8 @@ class CompiledEngine(Engine):
             stacked.accel_terms,
             stacked.decay,
             stacked.drive,
-            np.array([filter_.model.gyro_noise, filter_.model.accel_noise]),
+            np.array(filter_.model.gyro_noise),
+            np.array(filter_.model.accel_noise),
             filter_.earth,
             used.kernel_options(),
         )
@@ -128,14 +129,14 @@ class CompiledEngine(Engine):
             np.empty((9, width)),
             np.empty(n - 9),
             np.empty((rows_of_q, width)),
-            np.empty((51 + rows_of_q, width)),
+            growth_room(n),
             np.empty((6, 3)),
             np.empty((1, LEVEL)),
             np.zeros(shape),
             np.empty((n, n)),
             np.empty((n, n)),
         )
-        self._room = (closing, np.empty((2, 7, 3)), np.empty(0))
+        self._room = (closing, np.empty((7, 3)), np.empty((7, 3)), np.empty(0))
         self._covariance[:n, :n] = state.filter.covariance
         self._count = len(state.open_rows)
         self._group[0][: self._count + 1] = state.open_history
@@ -251,8 +252,26 @@ class CompiledEngine(Engine):
         """Return the row of the newest step."""
         return self.row
 
+    @classmethod
+    def going_on(cls, filter_: ErrorFilter, state: EngineState) -> CompiledEngine:
+        """Return an engine at a state: the one that gave it, once, if nothing went on from there.
+
+        What a sample costs is then not the making of an engine. Who goes on from the same state
+        again gets a new one, with the same numbers.
+        """
+        gave = state.__dict__.pop("_gave", None)
+        if isinstance(gave, cls) and gave.navigation is filter_:
+            return gave
+        return cls(filter_, state)
+
     def state(self) -> EngineState:
-        """Return where it is now."""
+        """Return where it is now; the engine is not to be used any more but by `going_on`."""
+        state = self._copied()
+        # Beside the fields of the state: it is no part of what it remembers.
+        state.__dict__["_gave"] = self
+        return state
+
+    def _copied(self) -> EngineState:
         return EngineState(
             filter=self.filter,
             errors=self.errors,

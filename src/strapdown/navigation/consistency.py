@@ -10,6 +10,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import (
+    chi_square_above,
+    chi_square_below,
+    chi_square_quantile,
+    normal_above,
+    normal_quantile,
+)
 from strapdown.exceptions import ConfigError
 from strapdown.navigation.innovation_monitor import Alarm, InnovationMonitor
 from strapdown.navigation.innovation_verdicts import Verdict, judge
@@ -232,8 +239,6 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
         chi-square with `lags` degrees of freedom if it is white (Ljung and Box, Biometrika 65
         (1978) 297).
     """
-    from scipy.stats import chi2
-
     told = ~np.isnan(values)
     n = int(told.sum())
     x = np.where(told, values - np.nanmean(values), 0.0) if n else np.zeros(len(values))
@@ -243,7 +248,7 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
         rho = np.array([x[k:] @ x[: len(x) - k] for k in range(1, lags + 1)]) / power
     k = np.arange(1, lags + 1)
     q = n * (n + 2.0) * float(np.sum(rho**2 / np.maximum(n - k, 1)))
-    return rho, float(chi2.sf(q, lags))
+    return rho, float(chi_square_above(q, lags))
 
 
 def _gross(u: Array) -> NDArray[np.bool_]:
@@ -259,11 +264,9 @@ def _gross(u: Array) -> NDArray[np.bool_]:
 
 
 def _component(label: str, u: Array, nu: Array, gross: int) -> ComponentConsistency:
-    from scipy.stats import chi2, norm
-
     told = ~np.isnan(u)
     x, n = u[told], int(told.sum())
-    normal = float(norm.ppf(0.5 + 0.5 * SHARE))
+    normal = float(normal_quantile(0.5 + 0.5 * SHARE))
     if n < FEWEST:
         nothing = math.nan
         return ComponentConsistency(
@@ -286,7 +289,7 @@ def _component(label: str, u: Array, nu: Array, gross: int) -> ComponentConsiste
     square = float(x @ x)
     lags = max(1, min(LAGS, n // EPOCHS_A_LAG))
     rho, p = whiteness(u, lags)
-    low, high = float(chi2.ppf(0.5 - 0.5 * SHARE, n)) / n, float(chi2.ppf(0.5 + 0.5 * SHARE, n)) / n
+    low, high = (float(chi_square_quantile(0.5 + s * 0.5 * SHARE, n)) / n for s in (-1.0, 1.0))
     root = math.sqrt(n)
     return ComponentConsistency(
         label=label,
@@ -301,15 +304,13 @@ def _component(label: str, u: Array, nu: Array, gross: int) -> ComponentConsiste
         autocorrelation=rho,
         autocorrelation_bound=normal / root,
         whiteness_p=p,
-        lag_p=2.0 * float(norm.sf(abs(rho[0]) * root)),
-        scale_p=2.0 * min(float(chi2.sf(square, n)), float(chi2.cdf(square, n))),
-        bias_p=2.0 * float(norm.sf(abs(x.mean()) * root)),
+        lag_p=2.0 * float(normal_above(abs(rho[0]) * root)),
+        scale_p=2.0 * min(chi_square_above(square, n), chi_square_below(square, n)),
+        bias_p=2.0 * float(normal_above(abs(x.mean()) * root)),
     )
 
 
 def _nis(time: Array, u: Array) -> pd.DataFrame:
-    from scipy.stats import chi2
-
     told = ~np.isnan(u)
     count = told.sum(axis=1)
     of = np.maximum(count, 1)
@@ -317,16 +318,14 @@ def _nis(time: Array, u: Array) -> pd.DataFrame:
         {
             "nis": (np.where(told, u, 0.0) ** 2).sum(axis=1),
             "components": count,
-            "lower": chi2.ppf(0.5 - 0.5 * SHARE, of),
-            "upper": chi2.ppf(0.5 + 0.5 * SHARE, of),
+            "lower": chi_square_quantile(0.5 - 0.5 * SHARE, of),
+            "upper": chi_square_quantile(0.5 + 0.5 * SHARE, of),
         },
         index=pd.Index(time, name="time"),
     )
 
 
 def _windows(time: Array, u: Array, window: int) -> pd.DataFrame:
-    from scipy.stats import chi2
-
     cuts = np.arange(0, len(time), window)
     told = ~np.isnan(u)
     count = np.add.reduceat(told.sum(axis=1), cuts) if len(cuts) else np.empty(0)
@@ -339,8 +338,8 @@ def _windows(time: Array, u: Array, window: int) -> pd.DataFrame:
             "since": time[cuts],
             "epochs": ends - cuts + 1,
             "nis": np.where(count > 0, total / of, np.nan),
-            "lower": chi2.ppf(0.5 - 0.5 * SHARE, of) / of,
-            "upper": chi2.ppf(0.5 + 0.5 * SHARE, of) / of,
+            "lower": chi_square_quantile(0.5 - 0.5 * SHARE, of) / of,
+            "upper": chi_square_quantile(0.5 + 0.5 * SHARE, of) / of,
         },
         index=pd.Index(time[ends], name="time"),
     )

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import chi_square_above, chi_square_below, normal_above
 from strapdown.navigation.innovation_monitor import Alarm
 
 __all__ = ["Verdict", "judge"]
@@ -176,8 +177,6 @@ def _begun(time: Array, u: Array, known: float) -> tuple[float, float]:
 
 def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
     """What holds of the whole run."""
-    from scipy.stats import chi2, norm
-
     out = []
     n = one.count - one.gross
     correlated = min(one.lag_p, one.whiteness_p)
@@ -187,13 +186,13 @@ def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
     rho = float(one.autocorrelation[0])
     if correlated < level and rho > 0.0:
         spread *= math.sqrt((1.0 + rho) / max(1.0 - rho, 1.0 / n))
-    bias_p = 2.0 * float(norm.sf(abs(one.bias) * math.sqrt(n) / spread))
+    bias_p = 2.0 * float(normal_above(abs(one.bias) * math.sqrt(n) / spread))
     # The mean is no part of the scatter where it is no chance.
     scale, scale_p = one.scale, one.scale_p
     if bias_p < level:
         square = n * (scale**2 - one.bias**2)
         scale = math.sqrt(max(square, 0.0) / (n - 1))
-        scale_p = 2.0 * min(float(chi2.sf(square, n - 1)), float(chi2.cdf(square, n - 1)))
+        scale_p = 2.0 * min(chi_square_above(square, n - 1), chi_square_below(square, n - 1))
     if scale_p < level:
         larger = scale > 1.0
         out.append(

@@ -21,7 +21,7 @@ from strapdown.estimation.covariance import Innovations
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.exceptions import ConfigError, DivergenceError, nearest
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
 from strapdown.navigation.damping import Damping, Feedback
@@ -31,6 +31,13 @@ from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 #: Over which shaking is taken out of rates and forces, s: beyond a tenth of a second it is not seen
 #: by receivers, and a vehicle does not change its acceleration by much in it.
 STEADY_TIME = 0.2
+#: Where nothing was observed for so many intervals of marks, there is a mark before the next
+#: observation, too; its stamp is so much earlier, s.
+ALONE = 1.5
+JUST_BEFORE = 1e-6
+#: A variance is negative by rounding alone within this part of those of its kind.
+ROUNDING = 1e-12
+PHYSICAL_LABELS = ("place", "velocity", "attitude")
 
 __all__ = ["Navigator", "NavigatorState", "with_states"]
 
@@ -51,6 +58,8 @@ class NavigatorState:
         Of each aid that watches the sensors.
     marked : float, s
         Time of the last mark.
+    observed : float, s
+        When something was observed last; the start, before that.
     scales : mapping of str to tuple of ScaleState
         By name of an observation whose rule learns: what it has learnt of each component.
     steady : ndarray, (7,)
@@ -61,6 +70,7 @@ class NavigatorState:
     queues: Mapping[str, Epochs]
     memories: Mapping[str, Any]
     marked: float
+    observed: float
     scales: Mapping[str, Scales] = field(default_factory=dict)
     steady: Array = field(default_factory=lambda: np.zeros(STEADY))
 
@@ -148,6 +158,7 @@ class Navigator:
             queues={aid.name: nothing for aid in self.aids},
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
+            observed=state.time,
         )
 
     def tell(self, state: NavigatorState, name: str, table: pd.DataFrame) -> NavigatorState:
@@ -204,15 +215,32 @@ class Navigator:
             The state has left what the mechanization can do; the sample is named.
         """
         going = _Going(self, state)
-        # What is writeable is one type for compiled code, and what is not another.
-        stamps = np.require(time, np.float64, ["C", "W"])
-        going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
+        # Copies: rows are cut at epochs, and what is writeable is one type for compiled code, what
+        # is not another.
+        going.over(np.array(time, dtype=np.float64), np.array(rows, dtype=np.float64, order="C"))
         return going.state(), going.piece()
+
+    def finish(self, state: NavigatorState) -> NavigationPiece:
+        """Return the mark of the newest sample, which no epoch follows; the state stays.
+
+        Parameters
+        ----------
+        state : NavigatorState
+
+        Returns
+        -------
+        NavigationPiece
+            Without samples; without a mark where there is one already.
+        """
+        going = _Going(self, state)
+        if state.time > state.marked + SAME_INSTANT:
+            going.end()
+        return going.piece()
 
     def engine(self, state: EngineState) -> Engine:
         """Return what goes on from a state: compiled, where the modules have that."""
         if self.damping.feeds_back and compiled(self.filter):
-            return CompiledEngine(self.filter, state)
+            return CompiledEngine.going_on(self.filter, state)
         return GeneralEngine(self.filter, state, self.damping.feeds_back)
 
 
@@ -225,6 +253,7 @@ class _Going:
         self.queues = dict(state.queues)
         self.memories = dict(state.memories)
         self.marked = state.marked
+        self.observed = state.observed
         self.scales = dict(state.scales)
         self.steady = state.steady.copy()
         self.begun_steady = state.steady
@@ -246,15 +275,15 @@ class _Going:
         if any(aid.wants_steady for aid in self.navigator.aids):
             self.steadies = np.empty((len(rows), 6))
             steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
-        rows = rows.copy()
         self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
-        at = self._fixes(time, rows)
+        at = self._fixes(0, time, rows)
         while True:
             epoch = self._next_epoch()
             if epoch <= self.engine.time + SAME_INSTANT:
                 self._observe(self.engine.time)
                 if at and self.engine.time <= time[at - 1] + SAME_INSTANT:
                     self.history[at - 1] = self.engine.shown()
+                at = self._fixes(at, time, rows)
                 continue
             if at == len(time):
                 break
@@ -270,16 +299,23 @@ class _Going:
             else:
                 at = self._steps(at, min(told + 1, len(time)), time, rows)
 
-    def _fixes(self, time: Array, rows: Array) -> int:
-        """Go as far as the fixes of a lone receiver reach; return the steps made."""
+    def end(self) -> None:
+        """Mark the newest sample."""
+        self.engine.close()
+        self._mark()
+
+    def _fixes(self, made: int, time: Array, rows: Array) -> int:
+        """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
         aid, engine = self.navigator.lone_receiver, self.engine
         if aid is None or not isinstance(engine, CompiledEngine):
-            return 0
-        made = 0
+            return made
         arm = np.asarray(aid.lever_arm, dtype=np.float64)
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
-        while queue.time.size and made < len(time):
+        while made < len(time):
+            usual = self._until_outage(queue)
+            if not usual.time.size:
+                break
             went, fixed, stopped = engine.over_fixes(
                 time[made:],
                 rows[made:],
@@ -287,7 +323,7 @@ class _Going:
                 self.marked + interval,
                 interval,
                 arm,
-                queue,
+                usual,
             )
             made += went
             done = len(fixed.told)
@@ -298,13 +334,32 @@ class _Going:
         self.queues[aid.name] = queue
         return made
 
+    def _until_outage(self, queue: Epochs) -> Epochs:
+        """Epochs that follow each other, and the last observation, without an outage."""
+        if not queue.time.size:
+            return queue
+        longest = ALONE * self.navigator.mark_interval
+        apart = np.diff(queue.time, prepend=self.observed) > longest
+        count = int(np.argmax(apart)) if apart.any() else len(apart)
+        return Epochs(queue.time[:count], queue.values[:count])
+
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
         """Note what came of fixes."""
-        for i in range(len(fixed.told)):
-            at = float(fixed.time[i])
-            name, labels = aid.names(fixes.values[i])
-            self.seen.append(Seen(at, name, labels, Innovations(*fixed.told[i])))
-            self._add_mark(Mark(at, fixed.covariance[i], fixed.sensors[i], fixed.sensors_sd[i]))
+        names = {code: aid.names(code) for code in set(fixes.values[: len(fixed.told), 0].tolist())}
+        every = zip(
+            fixes.values[:, 0].tolist(),
+            fixed.time.tolist(),
+            fixed.told,
+            fixed.covariance,
+            fixed.sensors,
+            fixed.sensors_sd,
+            strict=False,
+        )
+        for code, at, told, covariance, sensors, sd in every:
+            name, labels = names[code]
+            self.seen.append(Seen(at, name, labels, Innovations(told[0], told[1], told[2])))
+            self._add_mark(Mark(at, covariance, sensors, sd))
+            self.observed = at
 
     def state(self) -> NavigatorState:
         """Where it is now."""
@@ -313,6 +368,7 @@ class _Going:
             self.queues,
             self.memories,
             self.marked,
+            self.observed,
             self.scales,
             self.steady,
         )
@@ -381,6 +437,9 @@ class _Going:
                 told += [(aid, one) for one in aid.observe(view, values)]
             self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
         if told:
+            if at > self.observed + ALONE * self.navigator.mark_interval:
+                self._mark(JUST_BEFORE)
+            self.observed = at
             observations = [one for _, one in told]
             innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
             self.seen += [
@@ -406,18 +465,38 @@ class _Going:
                 self.scales[one.name] = rule.after(before, nu, one.R)
         return innovations
 
-    def _mark(self) -> None:
-        """Note covariance and estimates."""
+    def _mark(self, before: float = 0.0) -> None:
+        """Note covariance and estimates, with a stamp that is so much earlier."""
         filter_, state = self.navigator.filter, self.engine.filter
         P = filter_.physical_covariance(state)
         turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
         mark = Mark(
-            state.time,
+            state.time - before,
             turn.T @ P[:9, :9] @ turn,
             self.engine.estimates(filter_),
-            np.sqrt(np.diagonal(P)[9:]),
+            self._sd(state.time, P),
         )
         self._add_mark(mark)
+
+    def _sd(self, time: float, P: Array) -> Array:
+        """Standard deviations of the sensors' errors; refuses what is no covariance."""
+        variances, model = np.diagonal(P), self.navigator.filter.model
+        kinds = np.concatenate(
+            [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]
+        )
+        good = variances >= -ROUNDING * kinds
+        if not good.all():
+            k = int(np.argmin(good))
+            label = PHYSICAL_LABELS[k // 3] if k < 9 else list(model.layout.labels())[k - len(P)]
+            raise DivergenceError(
+                f"the variance of {label} is {variances[k]:.3g} at {time:.9g} s, and so there is "
+                "no covariance any more",
+                quantity="covariance",
+                remedy="use update_rule 'robust' where it was 'paper', whose step takes more off "
+                "than there is with an influence that descends again; or covariance 'ud' or 'wd' "
+                "where it was 'plain' or 'joseph'",
+            )
+        return np.sqrt(np.maximum(variances[9:], 0.0))
 
     def _add_mark(self, mark: Mark) -> None:
         if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:

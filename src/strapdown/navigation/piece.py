@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,7 @@ __all__ = ["Mark", "NavigationPiece", "Seen"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
+class Seen(NamedTuple):
     """One observation at an epoch.
 
     Attributes
@@ -35,9 +35,11 @@ class Seen:
     innovations: Innovations
 
 
-@dataclass(frozen=True, eq=False)
-class Mark:
+class Mark(NamedTuple):
     """Covariance and estimates at an instant, after what was observed then.
+
+    Where nothing was observed for a while there is one before the observation, too, with a stamp
+    that is a microsecond earlier: there an outage ends, and what is known is least.
 
     Attributes
     ----------
@@ -69,7 +71,8 @@ class NavigationPiece:
     seen : tuple of Seen
         In the order in which they were taken.
     marks : tuple of Mark
-        At every epoch, and at least as often as the navigator's `mark_interval`.
+        At every epoch, and at least as often as the navigator's `mark_interval`; where an outage
+        ends, before it, too. The newest sample has one by `Navigator.finish`.
     late : tuple of (str, float)
         Epochs of aids that came when the navigator was beyond their time, and were not used.
     """

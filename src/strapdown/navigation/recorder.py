@@ -138,11 +138,12 @@ class Tape:
     def take(self, piece: NavigationPiece) -> None:
         """Take what came of a further piece."""
         cells = self._cells(piece.time)
-        first = np.diff(cells, prepend=self._state_cell) > 0.0
-        if len(cells):
+        if len(cells) and cells[-1] > self._state_cell:
+            first = np.empty(len(cells), dtype=bool)
+            first[0], first[1:] = cells[0] > self._state_cell, cells[1:] > cells[:-1]
             self._state_cell = float(cells[-1])
-        rows = np.column_stack([piece.time[first], piece.history[first]])
-        self._states = self._states.and_then(rows)
+            rows = np.column_stack([piece.time[first], piece.history[first]])
+            self._states = self._states.and_then(rows)
         for mark in piece.marks:
             self._mark(mark)
         for one in piece.seen:

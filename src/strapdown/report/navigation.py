@@ -14,11 +14,12 @@ from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_files import write_navigation_files
 from strapdown.report.navigation_found import examine
 from strapdown.report.navigation_json import navigation_json
-from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_result import told_of, withheld_of
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.sins.withholding import withheld_aid
 
 __all__ = ["navigate", "rerun_navigation", "write_navigation"]
 
@@ -113,7 +114,10 @@ def write_navigation(
         seals=seals,
     ) as folder:
         progress("writing the tables", 0.82)
-        found = examine(told_of(result))
+        kept = (
+            () if not result.withheld else withheld_of(withheld_aid(result.spec), result.withheld)
+        )
+        found = examine(told_of(result, kept))
         write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
         write_navigation_files(result, folder)
         progress("drawing the figures", 0.86)

@@ -146,9 +146,23 @@ class Agreement:
 
     @property
     def remembers(self) -> bool:
-        """Whether they hang together from epoch to epoch far more than by chance."""
+        """Whether they hang together from epoch to epoch far more than by chance, to harm.
+
+        Errors that last do as much as independent ones of `lasting` their size: where that is no
+        more than was stated, as of a constraint whose deviation is stated for it, no bound is too
+        narrow.
+        """
         size = abs(self.correlation)
-        return bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+        far = bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+        return far and (self.correlation < 0.0 or self.lasting > 1.0)
+
+    @property
+    def lasting(self) -> float:
+        """`ratio`, by which independent errors would do as much: those of a first-order process."""
+        rho = min(self.correlation, 1.0 - 1.0 / max(int(self.used.sum()), 2))
+        if not rho > 0.0:
+            return self.ratio
+        return self.ratio * math.sqrt((1.0 + rho) / (1.0 - rho))
 
     @property
     def inside(self) -> bool:
@@ -157,8 +171,9 @@ class Agreement:
 
     @property
     def acceptable(self) -> bool:
-        """Whether they are within a factor of two of what was expected."""
-        return self.inside or 1.0 / FAR_OFF < self.ratio < FAR_OFF
+        """Whether they are within a factor of two of what was expected, and if they last."""
+        near = self.ratio < FAR_OFF and max(self.ratio, self.lasting) > 1.0 / FAR_OFF
+        return self.inside or near
 
 
 def agreements(record: NavigationRecord) -> tuple[Agreement, ...]:

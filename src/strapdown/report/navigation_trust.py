@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from strapdown.report.alignment_trust import Trust
 from strapdown.report.crash_values import GAP, plain
-from strapdown.report.navigation_agreement import Agreement
+from strapdown.report.navigation_agreement import FAR_OFF, Agreement
 from strapdown.report.navigation_errors import Score
 from strapdown.report.navigation_found import NavigationFound
 from strapdown.report.navigation_values import length_words, share_words
@@ -137,6 +137,12 @@ def _innovations(one: Agreement) -> tuple[bool, str]:
     if one.inside:
         return True, f"{one.name} agrees with what was stated: {ratio} (root mean square)"
     if one.acceptable:
+        if one.ratio <= 1.0 / FAR_OFF:
+            return True, (
+                f"{one.name} scatters less than was stated, but lasts from epoch to epoch: {ratio} "
+                "(root mean square), and together as much as independent errors of "
+                f"{plain(one.lasting, 2)}"
+            )
         side = "more" if one.ratio > 1.0 else "less"
         return True, (
             f"{one.name} scatters a little {side} than was stated: {ratio} (root mean square)"

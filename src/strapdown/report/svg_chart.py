@@ -121,6 +121,14 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
                 self.savefig(stream, format="png", dpi=_DPI)
                 return stream.getvalue()
 
+        def draw(self, renderer: Any) -> None:
+            engine = self.get_layout_engine()
+            if isinstance(engine, RoundedLayout) and self.canvas.is_saving():
+                # Saving draws once before, only for the layout; it takes it away then.
+                engine.execute(self)
+                return
+            super().draw(renderer)
+
     width = _PAPER_WIDTH if paper else _WIDTH
     height = _paper_height(chart) if paper else _height(chart)
     figure = Picture(figsize=(width, height), layout=RoundedLayout())

@@ -31,7 +31,7 @@ from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = ["AlignmentSource", "body_record", "read_alignment_source"]
+__all__ = ["AlignmentSource", "axes_matrices", "body_record", "read_alignment_source"]
 
 Array = NDArray[np.float64]
 
@@ -130,7 +130,7 @@ def body_record(
     DataError, ConfigError
         It cannot be used; the message names file, row and remedy.
     """
-    gyro, accel = _matrices(axes)
+    gyro, accel = axes_matrices(axes)
     letters, turn = axes_letters(gyro) if gyro is not None else (axes.axes, None)
     recording = read_log(log.path, _options(log, letters))
     findings = list(recording.findings)
@@ -162,7 +162,22 @@ def _options(log: LogTable, axes: str | None) -> ReadOptions:
     )
 
 
-def _matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:
+def axes_matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:
+    """Sensor axes to body of gyros and accelerometers, where they are stated as matrices.
+
+    Parameters
+    ----------
+    axes : AxesTable
+
+    Returns
+    -------
+    gyro, accel : ndarray, (3, 3), or None
+
+    Raises
+    ------
+    ConfigError
+        One is no rotation.
+    """
     both = axes.matrix if axes.design is None else NAMED_AXES[axes.design]
     if both is not None:
         matrix = check_axes_matrix(both)

@@ -13,6 +13,9 @@ from strapdown.exceptions import DataError
 
 Array = NDArray[np.float64]
 
+#: Rows of a short table.
+FEW = 8
+
 
 def as_array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
     """Numbers of shape (n,), or (n, columns)."""
@@ -152,8 +155,14 @@ def is_number(value: object) -> bool:
 
 def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
     """Columns as one contiguous array of floats."""
+    own, wanted = list(table.columns), list(columns)
+    if own != wanted and len(table) <= FEW and set(wanted) <= set(own):
+        # Of a row that just came, choosing among names would cost more than all that follows.
+        whole = table.to_numpy()
+        if whole.dtype == np.float64:
+            return np.ascontiguousarray(whole[:, [own.index(name) for name in wanted]])
     # A selection copies; a table made by the functions here needs none.
-    there = table if list(table.columns) == list(columns) else table[list(columns)]
+    there = table if own == wanted else table[wanted]
     return np.ascontiguousarray(there.to_numpy(dtype=np.float64))
 
 

@@ -85,6 +85,21 @@ def test_all_that_does_not_fit_is_told_at_once(tmp_path):
     assert [int(n) for n in re.findall(r"line (\d+)", said)] == [4, 11, 14]
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "nothing says when"),
+        ("spans_s = [[1.0, 2.0]]\nlengths_s = [3.0]\n", "lengths_s is given, too"),
+        ("spans_s = [[2.0, 1.0]]\n", "there is no time"),
+        ('aid = "rtc"\nlengths_s = [3.0]\n', "did you mean 'rtk'"),
+    ],
+)
+def test_fixes_that_cannot_be_kept_back(tmp_path, text, said):
+    aid = '\n[aiding.rtk]\nkind = "gnss"\npath = "fixes.csv"\n'
+    with pytest.raises(ConfigError, match=re.escape(said)):
+        read(tmp_path, FILE + aid + "\n[withhold]\n" + text)
+
+
 def test_every_slot_is_a_table_or_a_key(tmp_path):
     """Of those that a chain has, none is left out."""
     spec = read(tmp_path, FILE)

@@ -1,5 +1,7 @@
 """Increments of pieces are those of the whole, to the last bit."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -24,7 +26,7 @@ def streamed(stream, imu, cuts):
     state = stream.begin(imu.attrs["sampling"])
     ends, rows = [], []
     edges = [0, *cuts, len(time)]
-    for first, end in zip(edges[:-1], edges[1:], strict=True):
+    for first, end in pairwise(edges):
         last = end == len(time)
         state, at, made = stream.advance(state, time[first:end], values[first:end], last)
         ends.append(at)

@@ -12,6 +12,8 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_models import ERROR_MODELS
+from strapdown.estimation.influence_tukey import Tukey
+from strapdown.estimation.paper_update import PaperUpdate
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
 from strapdown.exceptions import ConfigError, DivergenceError
 from strapdown.increments import motion_increments
@@ -208,6 +210,56 @@ def test_marks_come_without_epochs_too(log):
     # Groups of 0.1 s: an interval is met to one of them.
     assert gaps.max() < 0.6 + 1e-9
     assert gaps.min() > 0.5 - 1e-6
+
+
+@pytest.mark.parametrize("aids", [LONE, OTHERS], ids=["lone", "others"])
+def test_an_outage_is_marked_where_it_ends_and_so_is_the_end(log, aids):
+    time, rows, fixes = log
+    ends = float(fixes.index[fixes.index > 9.0][0])
+    outage = fixes[(fixes.index < 4.0) | (fixes.index >= ends)]
+    navigator, state = started(aids=aids)
+    log = (time[:700], rows[:700], outage)
+    whole = run(log, navigator, state)
+    marks = whole[1]
+    stamps = np.array([mark.time for mark in marks])
+    assert (np.diff(stamps) > 0.0).all()
+    at = int(np.argmin(np.abs(stamps - (ends - 1e-6))))
+    assert stamps[at] == pytest.approx(ends - 1e-6, abs=2e-7)
+    assert stamps[at + 1] == pytest.approx(ends, abs=2e-7)
+    # It is known least just before, and known again just after.
+    place = np.array([np.trace(mark.covariance[:2, :2]) for mark in marks])
+    within = (stamps > 4.0) & (stamps < ends)
+    assert place[at] == place[within].max() > 1.02 * place[at - 1]
+    assert place[at + 1] < place[at]
+    # What the fix was expected to be off by is what was marked before it.
+    first = next(one for one in whole[2] if one.time > 8.0 and one.name == "rtk.position")
+    R = 0.3**2
+    if aids == LONE:
+        arm = place[at] / 2.0 + R
+        assert np.mean(first.innovations.s[:2]) == pytest.approx(arm, rel=0.01)
+    # Fixes at less than the interval have no marks before them.
+    assert np.sum(np.abs(stamps[:, None] - (fixes.index.to_numpy() - 1e-6)) < 2e-7) == 1
+    for cuts in ((31, 222, 449, 450, 451, 455), range(1, 700)):
+        cut = run(log, navigator, state, cuts, late=True)
+        assert [mark.time for mark in cut[1]] == stamps.tolist()
+        for a, b in zip(cut[1], marks, strict=True):
+            np.testing.assert_array_equal(a.covariance, b.covariance)
+        np.testing.assert_array_equal(cut[0], whole[0])
+    end = navigator.finish(whole[3])
+    assert [mark.time for mark in end.marks] == [time[699]]
+    assert len(end.history) == len(end.time) == len(end.seen) == 0
+    again = navigator.finish(whole[3])
+    np.testing.assert_array_equal(again.marks[0].covariance, end.marks[0].covariance)
+
+
+def test_a_rule_that_takes_more_than_there_is_ends_with_a_message(log):
+    time, rows, fixes = log
+    aid = Gnss(name="rtk", lever_arm=ARM, rule=PaperUpdate(Tukey()))
+    navigator, state = started(form="joseph", aids=(aid,))
+    wrong = fixes.copy()
+    wrong[["VN", "VE", "VD"]] += 0.25
+    with pytest.raises(DivergenceError, match=r"(?s)variance of .* at .* s.*'robust'"):
+        run((time, rows, wrong), navigator, state)
 
 
 def test_scale_factors_and_held_height_go_the_same_way_in_both_engines(log, monkeypatch):

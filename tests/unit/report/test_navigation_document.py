@@ -117,6 +117,20 @@ def test_what_lasts_speaks_against_it():
     assert any("no noise" in head for head, _ in cautions(found))
 
 
+def test_what_lasts_and_is_stated_wide_enough_for_it_does_not():
+    made = record(seconds=300.0, outage=None, reject=())
+    table = made.innovations["rtk.position"]
+    # A sine of 0.1 sd over 50 epochs: correlated by 0.98, as much as independent errors of 0.7 sd.
+    for label in ("north, m", "east, m", "down, m"):
+        table[f"nu {label}"] = 2.0 * 0.1 * np.sin(np.arange(len(table)) / 5.0) * np.sqrt(2.0)
+    one = examine(told(made)).agreements[0]
+    assert one.correlation > 0.9
+    assert 0.5 < one.lasting < 1.0
+    assert not one.remembers
+    assert one.acceptable
+    assert not any("no noise" in head for head, _ in cautions(examine(told(made))))
+
+
 def test_most_epochs_far_off_refute_it_and_outliers_do_not():
     few, most = record(outage=None, reject=()), record(outage=None, reject=())
     nu = few.innovations["rtk.position"].columns[:3]

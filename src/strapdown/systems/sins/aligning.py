@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.aiding.aid import Aid
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.site import Site
 from strapdown.ellipsoids import find_ellipsoid
@@ -16,6 +17,7 @@ from strapdown.frames import geodetic_from_ned
 from strapdown.nav_state import NavState
 from strapdown.prefilter.prefilter import CHANNELS
 from strapdown.rotation import rotate
+from strapdown.systems.sins.by_antenna import errors_by_antenna
 from strapdown.systems.sins.fixes import fixes_until, here_by_fix, site_of_fixes
 from strapdown.systems.sins.handover import from_alignment, from_fine
 from strapdown.systems.sins.modes import CoarseMode, FineMode
@@ -31,6 +33,8 @@ Array = NDArray[np.float64]
 
 # An instant is come to within this, s.
 INSTANT = 1e-7
+# Over so much before and after it the rate at an instant is a mean, s.
+STEADY = 0.1
 
 
 def align(chain: Chain, state: ChainState) -> Aligned:
@@ -87,19 +91,61 @@ def handed_over(chain: Chain, state: ChainState, found: Aligned) -> FilterState:
     filter_ = chain.navigator.filter
     rest = _window(chain, state)[:, 1:7].mean(axis=0)
     q_nb = found.alignment.q_nb
+    still = np.zeros(3)
     if found.fine is not None:
         assert state.aligned is not None
-        _, sd = _site(chain, state, state.aligned.alignment.q_nb)
-        return from_fine(filter_, found.fine, rest, sd)
+        before = state.aligned.alignment.q_nb
+        _, sd = _site(chain, state, before)
+        shift, by_others = still, None
+        if chain.site is None:
+            arm = _lever_arm(chain)
+            shift = rotate(before, arm) - rotate(q_nb, arm)
+            by_others = _by_antenna(chain, q_nb, still, still)
+        return from_fine(filter_, found.fine, rest, sd, shift, by_others)
     mode = chain.modes[state.mode]
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
         ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
-        place = here_by_fix(_fixes(chain, state), state.time, q_nb, _lever_arm(chain), ellipsoid)
-        return from_alignment(filter_, found.alignment, place.state, place.covariance, rest)
+        aid = _receiver(chain)
+        place = here_by_fix(
+            _fixes(chain, state),
+            state.time,
+            q_nb,
+            _lever_arm(chain),
+            ellipsoid,
+            velocity_delay=float(getattr(aid, "velocity_delay", 0.0)),
+            time_offset_sd=float(getattr(aid, "time_offset_sd", 0.0)),
+            turn_at=lambda at: _turn(_window(chain, state), at),
+        )
+        turn = _turn(_window(chain, state), state.time)
+        return from_alignment(
+            filter_,
+            found.alignment,
+            place.state,
+            place.covariance,
+            rest,
+            _by_antenna(chain, q_nb, place.state.v_n, turn),
+        )
     site, sd = _site(chain, state, q_nb)
     start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
     P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
-    return from_alignment(filter_, found.alignment, start, P, rest)
+    by_others = None if chain.site is not None else _by_antenna(chain, q_nb, still, still)
+    return from_alignment(filter_, found.alignment, start, P, rest, by_others)
+
+
+def _by_antenna(chain: Chain, q_nb: Array, velocity: Array, turn: Array) -> Array | None:
+    """What other errors add to a place and velocity by the fixes of the alignment."""
+    if chain.fixes_from is None:
+        return None
+    arm, filter_ = _lever_arm(chain), chain.navigator.filter
+    return errors_by_antenna(filter_, chain.fixes_from, q_nb, arm, velocity, turn)
+
+
+def _turn(kept: Array, at: float) -> Array:
+    """Rate of the body about an instant, without its shaking; body axes."""
+    near = np.abs(kept[:, 0] - at) <= STEADY
+    if not near.any():
+        near = np.arange(len(kept)) == np.argmin(np.abs(kept[:, 0] - at))
+    return np.asarray(kept[near, 1:4].mean(axis=0))
 
 
 def _window(chain: Chain, state: ChainState) -> Array:
@@ -139,7 +185,12 @@ def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Ar
     return Site(lat_deg, lon_deg, alt, ellipsoid), sd
 
 
+def _receiver(chain: Chain) -> Aid | None:
+    """That which has the fixes."""
+    return chain.navigator.by_name.get(chain.fixes_from or "")
+
+
 def _lever_arm(chain: Chain) -> Array:
-    """Of the antenna that has the fixes."""
-    aid = chain.navigator.by_name.get(chain.fixes_from or "")
-    return np.asarray(getattr(aid, "lever_arm", (0.0, 0.0, 0.0)), dtype=np.float64)
+    """Of its antenna."""
+    arm = getattr(_receiver(chain), "lever_arm", (0.0, 0.0, 0.0))
+    return np.asarray(arm, dtype=np.float64)

@@ -222,17 +222,20 @@ class Chain:
         aid.epochs(table)
         return self._remembering(state, name, table)
 
-    def command(self, state: ChainState, word: str) -> ChainState:
-        """Take a command that holds from the next sample on.
+    def command(self, state: ChainState, word: str, time: float = -np.inf) -> ChainState:
+        """Take a command.
 
         Parameters
         ----------
         state : ChainState
         word : str
             As `Command.word`.
+        time : float, s
+            It holds from the first sample at or after it: the next one, if not given.
         """
         self._check_word(word)
-        return replace(state, commands=(Command(-np.inf, word), *state.commands))
+        commands = sorted((*state.commands, Command(time, word)), key=lambda one: one.time)
+        return replace(state, commands=tuple(commands))
 
     def advance(
         self, state: ChainState, time: Array, values: Array, last: bool = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from statistics import median
 
 import numpy as np
 
@@ -177,7 +178,7 @@ class Deliveries:
     def _longest(self, aid: Delivery) -> float:
         if not aid.intervals:
             return math.inf
-        return self.outage * float(np.median(aid.intervals))
+        return self.outage * median(aid.intervals)
 
     def _delivered(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -109,6 +109,9 @@ def here_by_fix(
     q_nb: Array,
     lever_arm: Array,
     ellipsoid: Ellipsoid,
+    velocity_delay: float = 0.0,
+    time_offset_sd: float = 0.0,
+    turn_at: Callable[[float], Array] | None = None,
 ) -> Place:
     """Return where a vehicle is, by its newest fix.
 
@@ -121,6 +124,14 @@ def here_by_fix(
     lever_arm : ndarray, (3,), m
         Of the antenna, body axes.
     ellipsoid : Ellipsoid
+    velocity_delay : float, s
+        By which a stated velocity is older than the place of its row.
+    time_offset_sd : float, s
+        By which the instants of the fixes may be wrong. What this does to the place, velocity
+        times it, is left to `by_antenna.errors_by_antenna`.
+    turn_at : callable, optional
+        Gives the rate of the body at an instant, (3,), rad/s, body axes: what an antenna on an arm
+        moves by it is taken off.
 
     Returns
     -------
@@ -140,12 +151,14 @@ def here_by_fix(
     if told.any():
         k = int(np.flatnonzero(told)[-1])
         v, v_sd = values_of(fixes, VELOCITY)[k], values_of(fixes, VELOCITY_SD)[k]
-        since = time - float(index_of(fixes)[k])
+        since = time - float(index_of(fixes)[k]) + velocity_delay
     elif len(stamps) > 1 and stamps[-1] > stamps[-2]:
         step = float(stamps[-1] - stamps[-2])
         v = ned_from_geodetic(place[-1], place[-2], ellipsoid=ellipsoid) / step
         v_sd = np.sqrt(2.0) * sd[-1] / step + 0.5 * MANOEUVRE * step
         since = time - float(stamps[-1])
+    if turn_at is not None and not np.isinf(since):
+        v = v - rotation.rotate(q_nb, np.cross(turn_at(time - since), lever_arm))
     after = time - float(stamps[-1])
     off = v * after - rotation.rotate(q_nb, lever_arm)
     lat, lon, alt = geodetic_from_ned(off, place[-1], ellipsoid=ellipsoid).tolist()
@@ -153,7 +166,8 @@ def here_by_fix(
     P = np.zeros((6, 6))
     carried = np.square(v_sd * after) + (0.5 * MANOEUVRE * after**2) ** 2
     P[:3, :3] = np.diag(np.square(sd[-1]) + carried)
-    P[3:, 3:] = np.diag(np.square(v_sd) + (0.0 if np.isinf(since) else (MANOEUVRE * since) ** 2))
+    unknown = 0.0 if np.isinf(since) else since**2 + time_offset_sd**2
+    P[3:, 3:] = np.diag(np.square(v_sd) + MANOEUVRE**2 * unknown)
     return Place(state, P)
 
 

@@ -93,6 +93,7 @@ class Going:
                 quantity="time",
                 remedy="give more samples, or end the alignment earlier",
             )
+        self._navigation.append(self._chain.navigator.finish(state.navigator))
         self._modes.append(Span(mode, state.begun, state.time))
         events, outages = self._chain.deliveries.finish(state.deliveries, state.time)
         self._events += events
@@ -170,6 +171,8 @@ class Going:
         if hole.length > policy.coast and policy.beyond == "align":
             mode = self._chain.modes[state.mode]
             self._modes.append(Span(mode.name, state.begun, hole.begin))
+            if state.navigator is not None:
+                self._navigation.append(self._chain.navigator.finish(state.navigator))
             self._state = replace(
                 state,
                 begun=np.nan,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine_result import FineResult
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
 from strapdown.estimation.error_model import PHYSICAL
+from strapdown.frames import geodetic_from_ned
 from strapdown.nav_state import NavState
 
 __all__ = ["from_alignment", "from_fine", "from_state"]
@@ -36,7 +39,12 @@ def from_state(filter_: ErrorFilter, start: NavState, P: Array) -> FilterState:
 
 
 def from_alignment(
-    filter_: ErrorFilter, found: Alignment, start: NavState, P: Array, rest: Array
+    filter_: ErrorFilter,
+    found: Alignment,
+    start: NavState,
+    P: Array,
+    rest: Array,
+    by_others: Array | None = None,
 ) -> FilterState:
     """Begin a filter with a coarse alignment.
 
@@ -51,6 +59,9 @@ def from_alignment(
         Of displacement and velocity, north-east-down.
     rest : ndarray, (6,)
         Mean rate and force of the record, which say what scale factors do.
+    by_others : ndarray, (6, p), optional
+        What every physical error adds to those of place and velocity, north-east-down
+        (`by_antenna.errors_by_antenna`); they are correlated with them from the start.
 
     Returns
     -------
@@ -63,18 +74,23 @@ def from_alignment(
     whole[6:9, 6:9] = found.covariance
     start = replace(start, time=found.time, q_nb=found.q_nb)
     if found.gyro_bias is None or found.accel_bias is None:
-        return from_state(filter_, start, whole)
+        return filter_.begin(start, _added(_with_sensors(filter_, whole), by_others))
     assert found.gyro_bias_sd is not None and found.accel_bias_sd is not None
     joint = np.zeros((PHYSICAL + 6, PHYSICAL + 6))
     joint[:PHYSICAL, :PHYSICAL] = whole
     sd = np.concatenate([found.gyro_bias_sd, found.accel_bias_sd])
     joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
     told = np.concatenate([found.gyro_bias, found.accel_bias])
-    return _with_biases(filter_, start, joint, told, rest)
+    return _with_biases(filter_, start, joint, told, rest, by_others)
 
 
 def from_fine(
-    filter_: ErrorFilter, fine: FineResult, rest: Array, site_sd: ArrayLike = (0.0, 0.0, 0.0)
+    filter_: ErrorFilter,
+    fine: FineResult,
+    rest: Array,
+    site_sd: ArrayLike = (0.0, 0.0, 0.0),
+    shift: ArrayLike = (0.0, 0.0, 0.0),
+    by_others: Array | None = None,
 ) -> FilterState:
     """Begin a filter where a fine alignment ended, with everything that it learned.
 
@@ -94,6 +110,11 @@ def from_fine(
         Mean rate in rad/s and force in m/s² of the rest, body axes.
     site_sd : array_like, (3,), m
         How well the place of alignment itself is known, north, east, down.
+    shift : array_like, (3,), m
+        By which the place is to be moved, north, east, down: what a better attitude does to the
+        arm of the antenna by which it was found.
+    by_others : ndarray, (6, p), optional
+        As of `from_alignment`.
 
     Returns
     -------
@@ -108,7 +129,22 @@ def from_fine(
     P = turn @ P @ turn.T
     P[0:3, 0:3] += np.diag(np.square(np.asarray(site_sd, dtype=np.float64)))
     start = old.mechanization.nav_state(state.mechanization, state.time)
-    return _with_biases(filter_, start, P, state.sensors, np.asarray(rest))
+    moved = np.asarray(shift, dtype=np.float64)
+    if moved.any():
+        here = np.array([math.degrees(start.lat), math.degrees(start.lon), start.alt])
+        ellipsoid = find_ellipsoid(old.mechanization.ellipsoid)
+        lat, lon, alt = geodetic_from_ned(moved, here, ellipsoid=ellipsoid).tolist()
+        start = replace(start, lat=math.radians(lat), lon=math.radians(lon), alt=alt)
+    return _with_biases(filter_, start, P, state.sensors, np.asarray(rest), by_others)
+
+
+def _added(P: Array, by_others: Array | None) -> Array:
+    """Covariance with what every error adds to those of place and velocity."""
+    if by_others is None:
+        return P
+    T = np.eye(len(P))
+    T[:6] += by_others
+    return symmetric(T @ P @ T.T)
 
 
 def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
@@ -119,7 +155,12 @@ def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
 
 
 def _with_biases(
-    filter_: ErrorFilter, start: NavState, joint: Array, told: Array, rest: Array
+    filter_: ErrorFilter,
+    start: NavState,
+    joint: Array,
+    told: Array,
+    rest: Array,
+    by_others: Array | None = None,
 ) -> FilterState:
     """Begin with a state whose errors are correlated with biases that were found."""
     P0 = np.diag(np.square(filter_.model.stacked.sd))
@@ -133,7 +174,7 @@ def _with_biases(
     P[PHYSICAL:, PHYSICAL:] = symmetric(K @ joint[np.ix_(at, at)] @ K.T) + left
     P[PHYSICAL:, :PHYSICAL] = K @ joint[at, :PHYSICAL]
     P[:PHYSICAL, PHYSICAL:] = P[PHYSICAL:, :PHYSICAL].T
-    state = filter_.begin(start, symmetric(P))
+    state = filter_.begin(start, _added(symmetric(P), by_others))
     return replace(state, sensors=K @ told[at - PHYSICAL])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
 from strapdown.increments.stream import IncrementStream, IncrementStreamState
+from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.prefilter.prefilter import CHANNELS, Prefilter
 from strapdown.systems.sins.filtering import Filtering, FilteringState
 from strapdown.systems.sins.gaps import GapPolicy, Hole, hole_between
@@ -71,8 +73,11 @@ class IntakeState:
         Samples so far.
     usual : float, s
         Longest usual step; nought until it is known.
-    tail_time, tail : ndarray
-        Samples that wait for that; then those of the last second, in body axes.
+    newest : float, s
+        Stamp of the newest sample.
+    tail : GrowingRows
+        Stamp and values, in body axes, of the samples that wait for that; then of at least the
+        last second.
     filtering : FilteringState or None
     stream : IncrementStreamState or None
         None where the pre-filter makes the increments, and until it is known whether it does.
@@ -88,8 +93,8 @@ class IntakeState:
     source: str | None
     count: int = 0
     usual: float = 0.0
-    tail_time: Array = field(default_factory=_no_time)
-    tail: Array = field(default_factory=_no_values)
+    newest: float = -np.inf
+    tail: GrowingRows = field(default_factory=lambda: GrowingRows.of(7))
     filtering: FilteringState | None = None
     stream: IncrementStreamState | None = None
     own: bool = False
@@ -169,15 +174,20 @@ class Intake:
             pre-filter needs them so.
         """
         _check(state, time, values)
-        state = replace(state, count=state.count + len(time))
         values = self._turned(values)
+        known, tail = state.tail.count, state.tail
+        if len(time):
+            tail = tail.and_then(np.column_stack([time, values]))
+            state = replace(state, count=state.count + len(time), newest=float(time[-1]), tail=tail)
         if not state.usual:
-            time = np.concatenate([state.tail_time, time])
-            values = np.concatenate([state.tail, values])
-            if len(time) < FIRST and not last:
-                return replace(state, tail_time=time, tail=values), _NOTHING
+            if tail.count < FIRST and not last:
+                return state, _NOTHING
+            known = 0
+            time, values = tail.rows[:, 0].copy(), tail.rows[:, 1:].copy()
             state = self._judged(state, time[:FIRST])
-        state, holes = self._holes(state, time, values)
+        holes: tuple[Hole, ...] = ()
+        if len(time):
+            state, holes = self._holes(state, known)
         return self._stepped(state, time, values, holes, last)
 
     def _turned(self, values: Array) -> Array:
@@ -201,33 +211,28 @@ class Intake:
         state = replace(
             state,
             usual=float(np.quantile(np.diff(time), 0.95, method="lower")),
-            tail_time=_no_time(),
-            tail=_no_values(),
         )
         if self.prefilter is None:
             return replace(state, stream=self.increments.begin(state.sampling))
         means = state.sampling == "mean"
         return replace(state, filtering=Filtering(self.prefilter).begin(time, means, state.source))
 
-    def _holes(
-        self, state: IntakeState, time: Array, values: Array
-    ) -> tuple[IntakeState, tuple[Hole, ...]]:
-        """Find gaps, and keep the last second."""
-        known = max(len(state.tail_time) - 1, 0)
-        time = np.concatenate([state.tail_time, time])
-        values = np.concatenate([state.tail, values])
+    def _holes(self, state: IntakeState, known: int) -> tuple[IntakeState, tuple[Hole, ...]]:
+        """Find gaps after the `known` rows of the tail, and drop what is long past."""
+        rows = state.tail.rows
+        time, begin = rows[:, 0], max(known - 1, 0)
         found = []
-        wide = (
-            np.flatnonzero(np.diff(time[known:]) > self.gaps.usual * ROUNDED * state.usual) + known
-        )
+        longest = self.gaps.usual * ROUNDED * state.usual
+        wide = np.flatnonzero(time[begin + 1 :] - time[begin:-1] > longest) + begin
         for k in wide.tolist():
             first = int(np.searchsorted(time, time[k] - BEFORE))
             sides = (float(time[k]), float(time[k + 1]))
-            found.append(hole_between(values[first : k + 1], sides, values[k + 1]))
-        if time.size:
-            first = int(np.searchsorted(time, time[-1] - BEFORE))
-            time, values = time[first:].copy(), values[first:].copy()
-        return replace(state, tail_time=time, tail=values), tuple(found)
+            found.append(hole_between(rows[first : k + 1, 1:], sides, rows[k + 1, 1:]))
+        # Half of it at least is given back at a time: what is kept is seldom copied.
+        past = int(np.searchsorted(time, time[-1] - BEFORE))
+        if 2 * past > state.tail.count and state.tail.count > FIRST:
+            state = replace(state, tail=state.tail.without_first(past))
+        return state, tuple(found)
 
     def _stepped(
         self,
@@ -279,6 +284,10 @@ _NOTHING = Steps(_no_time(), _no_values(), np.empty((0, 10)), None, ())
 
 def _check(state: IntakeState, time: Array, values: Array) -> None:
     """Refuse samples that cannot be used; rows count from 1 over the whole record."""
+    # The sum of an infinity and its opposite is none, either.
+    alone = len(time) == 1 and math.isfinite(sum(values[0].tolist()))
+    if alone and state.newest < time[0] < math.inf:
+        return
     if not np.isfinite(time).all():
         row = int(np.argmin(np.isfinite(time)))
         raise DataError(
@@ -288,7 +297,8 @@ def _check(state: IntakeState, time: Array, values: Array) -> None:
             quantity="time",
             remedy="leave the sample out",
         )
-    stamps = np.concatenate([state.tail_time[-1:], time])
+    before = [state.newest] if state.count else []
+    stamps = np.concatenate([before, time])
     steps = np.diff(stamps)
     if steps.size and not steps.min() > 0.0:
         k = int(np.argmax(~(steps > 0.0)))

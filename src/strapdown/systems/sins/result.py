@@ -11,6 +11,7 @@ from strapdown.alignment.fine_result import FineResult
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import Ellipsoid
 from strapdown.evaluation.trajectory_summary import DifferenceSummary
+from strapdown.evaluation.withheld import WithheldScore
 from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 from strapdown.results import InputFiles
@@ -35,9 +36,11 @@ class NavigationResult:
     fine : FineResult or None
     record : NavigationRecord
     differences : DataFrame or None
-        From the truth, where it is known (`trajectory_differences`).
+        From the truth, where it is known (`trajectory_differences`), ten times a second at most.
     errors : DifferenceSummary or None
         Of these.
+    withheld : tuple of WithheldScore
+        Stretches over which fixes were kept back, and how far it then was from them.
     inputs : tuple of InputFiles
     findings : tuple of Finding
     """
@@ -51,5 +54,6 @@ class NavigationResult:
     record: NavigationRecord
     differences: pd.DataFrame | None
     errors: DifferenceSummary | None
+    withheld: tuple[WithheldScore, ...]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]

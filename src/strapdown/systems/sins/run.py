@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
@@ -19,23 +23,34 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.channels import channel_findings
-from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.drive import ChainRun, run_batch
 from strapdown.systems.sins.file_rows import in_file, said_of_file
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
+from strapdown.systems.sins.withholding import score_withholding
 
-__all__ = ["run_navigation"]
+__all__ = ["Drive", "run_navigation"]
+
+#: Runs a chain over samples and tables: with a recorder, and what is told of progress.
+Drive = Callable[..., ChainRun]
 
 #: Shares of a whole run at which its chain begins and ends.
 BEGUN, ENDED = 0.15, 0.8
 #: Of the record that is taken at a time, s: so often progress is told.
 CHUNK = 20.0
+_AT_ONCE = partial(run_batch, chunk=CHUNK)
+#: Of a trajectory at least so much apart are the rows that are compared with the truth, s: errors
+#: change no faster than what the truth is worth.
+APART = 0.1
 
 
 @one_thread()
 def run_navigation(
-    spec: NavigationSpec, file: Path | None = None, progress: Progress = silent
+    spec: NavigationSpec,
+    file: Path | None = None,
+    progress: Progress = silent,
+    drive: Drive = _AT_ONCE,
 ) -> NavigationResult:
     """Read a record and its aids, align, and navigate.
 
@@ -47,6 +62,9 @@ def run_navigation(
         Where it was read from: an input, too.
     progress : callable, optional
         Called with a stage and the share that is done.
+    drive : callable, optional
+        What runs the chain, called as `run_batch`: at a pace, or with what came already. The
+        numbers must be those of a run at once.
 
     Returns
     -------
@@ -76,13 +94,20 @@ def run_navigation(
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
 
     def told(mode: str, share: float) -> None:
-        progress(f"{mode} {share:.0%}", BEGUN + (ENDED - BEGUN) * share)
+        progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
-        run = run_batch(chain, source.imu, source.tables, recorder, told, CHUNK)
+        run = drive(chain, source.imu, source.tables, recorder, told)
     progress("comparing", ENDED)
     differences, errors = _against_truth(run.record.trajectory, source, spec)
+    withheld = score_withholding(
+        spec,
+        chain,
+        source,
+        run.record,
+        lambda stage, share: progress(stage, ENDED + 0.02 * share),
+    )
     files = () if file is None else (input_files("configuration", str(file), (file,)),)
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
@@ -103,6 +128,7 @@ def run_navigation(
         record=run.record,
         differences=differences,
         errors=errors,
+        withheld=withheld,
         inputs=(*files, *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
@@ -113,5 +139,15 @@ def _against_truth(
 ) -> tuple[pd.DataFrame | None, DifferenceSummary | None]:
     if source.truth is None:
         return None, None
-    differences = trajectory_differences(trajectory, source.truth, find_ellipsoid(spec.ellipsoid))
+    rows = _rows_compared(trajectory.index.to_numpy(dtype=np.float64))
+    kept = trajectory.iloc[rows]
+    kept.attrs = dict(trajectory.attrs)
+    differences = trajectory_differences(kept, source.truth, find_ellipsoid(spec.ellipsoid))
     return differences, summarise_differences(differences)
+
+
+def _rows_compared(time: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Rows at a steady distance, from the last one back."""
+    step = float(np.median(np.diff(time))) if len(time) > 1 else APART
+    each = max(1, round(APART / step)) if step > 0.0 else 1
+    return np.arange(len(time) - 1, -1, -each)[::-1]

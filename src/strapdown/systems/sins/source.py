@@ -12,7 +12,7 @@ import pandas as pd
 
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import Finding
+from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
@@ -97,6 +97,12 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         findings += truth.attrs["findings"]
         inputs.append(input_files("truth", spec.truth.path, (Path(spec.truth.path),)))
     inputs += sensor_file(spec.sensors.sensor)
+    if spec.log is None and spec.simulation is None:
+        raise ConfigError(
+            "its samples come while it runs, and there is no record of them",
+            quantity="live",
+            remedy="run it with --live, or give a record: [log] and path = …",
+        )
     if spec.log is None:
         return _simulated(spec, tables, truth, inputs, findings)
     recording, imu, of_log = body_record(spec.log, spec.axes)

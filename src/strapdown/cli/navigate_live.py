@@ -1,0 +1,148 @@
+"""``strapdown navigate --live``: lines in, states out, and the bundle at the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from collections.abc import Mapping
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from strapdown.bundle import Seal, read_manifest, write_latency, write_timing
+from strapdown.cli.console import Stopwatch, print_seal, progress
+from strapdown.cli.latency_table import print_latency
+from strapdown.cli.navigate_tables import print_navigation
+from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.exceptions import ConfigError, DataError, StrapdownError
+from strapdown.live.clock import MachineClock
+from strapdown.live.received import live_spec
+from strapdown.live.run import LiveRun, receive, result_of
+from strapdown.live.sources import open_source
+from strapdown.report.navigation import write_navigation
+
+__all__ = ["navigate_live"]
+
+
+def navigate_live(
+    file: Path,
+    where: str,
+    folder: Path,
+    *,
+    lines: str,
+    every: float,
+    force: bool,
+    quiet: bool,
+    given: Mapping[str, Any],
+) -> None:
+    """Navigate by lines, and write the bundle when they end.
+
+    Standard output has the states and nothing else; everything else is told on standard error.
+
+    Parameters
+    ----------
+    file : Path
+        The configuration.
+    where : str
+        As `open_source`.
+    folder : Path
+        The bundle.
+    lines, every
+        As `StateLines`.
+    force, quiet : bool
+    given : mapping
+        Flags that have no meaning here, by name; None where one is not given.
+
+    Raises
+    ------
+    ConfigError
+        There is no configuration, or a flag is given that has no meaning here.
+    StrapdownError
+        The run ended by it; what came before is in the bundle, if navigation had begun.
+    """
+    flag = next((name for name, value in given.items() if value is not None), None)
+    if flag is not None or file.suffix.lower() != ".toml":
+        raise ConfigError(
+            f"--live takes the file of a run, and no {'log' if flag is None else flag}",
+            quantity="--live",
+            remedy="write a file (strapdown init navigate) with [live] in place of [log]",
+        )
+    received = folder.parent / f"{folder.name}-received"
+    if received.exists():
+        raise ConfigError(
+            "it is what a run before received, and could not be made a result",
+            file=str(received),
+            quantity="--out",
+            remedy="move it away, or name another folder",
+        )
+    clock = MachineClock()
+    spec = live_spec(read_navigation_spec(file))
+    live = receive(
+        spec,
+        open_source(where, clock, sys.stdin.buffer),
+        clock,
+        _write,
+        _warner(quiet),
+        lines,
+        every,
+    )
+    if not len(live.got.samples):
+        raise DataError(
+            "no sample came", quantity="--live", remedy="send lines imu,TIME,GX,GY,GZ,AX,AY,AZ"
+        )
+    with redirect_stdout(sys.stderr):
+        seal = _sealed(live, file, folder, received, force=force, quiet=quiet)
+        if not quiet and live.latency is not None:
+            print_latency(live.latency, where)
+        if not quiet:
+            print_seal(seal, "report.html")
+    if live.error is not None:
+        raise live.error
+
+
+def _sealed(
+    live: LiveRun, file: Path, folder: Path, received: Path, *, force: bool, quiet: bool
+) -> Seal:
+    """Write the bundle; what was received stays beside it where the bundle has no copy."""
+    try:
+        received.mkdir(parents=True)
+        with progress(quiet) as show:
+            report = Stopwatch(show)
+            result = result_of(live, received, file, report)
+            if live.run is None and live.error is not None:
+                raise live.error
+            seal = write_navigation(result, folder, force=force, progress=report)
+            report.stop()
+            write_timing(seal, report.seconds)
+            write_latency(seal, live.told())
+    except StrapdownError:
+        typer.echo(f"what was received is in {received}", err=True)
+        raise
+    except BaseException:
+        shutil.rmtree(received, ignore_errors=True)
+        raise
+    if all(item["kept"] == "copy" for item in read_manifest(seal.path)["inputs"]):
+        shutil.rmtree(received)
+    if not quiet:
+        print_navigation(result)
+    return seal
+
+
+def _write(text: str) -> None:
+    try:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        raise
+
+
+def _warner(quiet: bool) -> Any:
+    def warn(text: str) -> None:
+        if not quiet:
+            typer.echo(f"note: {text}", err=True)
+
+    return warn

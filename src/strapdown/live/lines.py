@@ -1,0 +1,156 @@
+"""Lines of a live run: samples, what aids measured, and commands, by commas.
+
+::
+
+    imu,TIME,GX,GY,GZ,AX,AY,AZ        rad/s and m/s², axes of the sensors
+    NAME,TIME,COLUMN=VALUE,…          what the aid NAME measured
+    command,WORD                      next, fine, navigation; end
+    TIME,4,GX,GY,GZ,3,AX,AY,AZ,…      as Sensorstream sends them
+
+Blanks around commas, empty lines and those that begin with ``#`` mean nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from strapdown.exceptions import nearest
+from strapdown.formats.sensorstream import blocks_of
+
+__all__ = ["END", "BadLineError", "Measured", "Sample", "Word", "parse_line"]
+
+#: The word that ends a run.
+END = "end"
+IMU, COMMAND = "imu", "command"
+#: Blocks of Sensorstream.
+_ACCEL, _GYRO = 3, 4
+_FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ"
+
+
+class BadLineError(Exception):
+    """A line that cannot be used; it is left out.
+
+    Parameters
+    ----------
+    kind : str
+        What all lines of its kind have in common, by which they are counted.
+    what, remedy : str
+    """
+
+    def __init__(self, kind: str, what: str, remedy: str) -> None:
+        super().__init__(what)
+        self.kind, self.what, self.remedy = kind, what, remedy
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Rates in rad/s and specific forces in m/s², axes of the sensors."""
+
+    time: float
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What an aid measured."""
+
+    name: str
+    time: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Word:
+    """A command."""
+
+    word: str
+
+
+def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | None:
+    """Read a line.
+
+    Parameters
+    ----------
+    text : str
+    aids : sequence of str
+        Names of those that take what they measured.
+
+    Returns
+    -------
+    Sample, Measured, Word or None
+        None of a line that says nothing.
+
+    Raises
+    ------
+    BadLineError
+        It has another form, or a number in it is none.
+    """
+    text = text.strip()
+    if not text or text.startswith("#"):
+        return None
+    head, *fields = (part.strip() for part in text.split(","))
+    if head == IMU:
+        if len(fields) != 7:
+            raise BadLineError(
+                "imu", f"{len(fields)} numbers follow imu, and not 7", f"write {_FORM}, SI units"
+            )
+        time, *values = (_number(field, IMU) for field in fields)
+        return Sample(time, tuple(values))
+    if head == COMMAND:
+        if len(fields) != 1 or not fields[0]:
+            raise BadLineError("command", "a command is one word", f"write command,{END}")
+        return Word(fields[0])
+    if head in aids:
+        return _measured(head, fields)
+    if head[:1].isdigit() or head[:1] in ("-", "+", "."):
+        return _streamed(text)
+    known = [IMU, COMMAND, *aids]
+    raise BadLineError("word", f"'{_shown(head)}' begins no line", nearest(head, known))
+
+
+def _measured(name: str, fields: Sequence[str]) -> Measured:
+    form = f"write {name},TIME,COLUMN=VALUE,…"
+    if len(fields) < 2:
+        raise BadLineError(name, f"a time and what was measured follow {name}", form)
+    values: dict[str, float] = {}
+    for field in fields[1:]:
+        column, equals, value = field.partition("=")
+        if not equals or column.strip() in values:
+            raise BadLineError(name, f"'{_shown(field)}' is no column=value, or there twice", form)
+        values[column.strip()] = _number(value.strip(), name)
+    return Measured(name, _number(fields[0], name), values)
+
+
+def _streamed(text: str) -> Sample:
+    found = blocks_of(text)
+    if found is None:
+        raise BadLineError(
+            "sensorstream", "it is not a stamp and blocks of an id and values", _FORM
+        )
+    time, blocks = found
+    if _GYRO not in blocks or _ACCEL not in blocks:
+        raise BadLineError(
+            "sensorstream without a sensor",
+            "a line without gyroscope (4) or accelerometer (3) is no sample",
+            "switch both on in the app, at one rate",
+        )
+    values = (*blocks[_GYRO], *blocks[_ACCEL])
+    if not all(map(math.isfinite, (time, *values))):
+        raise BadLineError("sensorstream", "a value is not finite", "send finite numbers")
+    return Sample(time, values)
+
+
+def _number(text: str, kind: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise BadLineError(kind, f"'{_shown(text)}' is no finite number", "leave such lines out")
+    return value
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= 40 else f"{text[:40]}…"

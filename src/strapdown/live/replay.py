@@ -1,0 +1,124 @@
+"""A record played to the chain sample by sample, each when it is due."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+
+from strapdown.aiding.aid import Aid
+from strapdown.exceptions import ConfigError
+from strapdown.live.clock import Clock, MachineClock
+from strapdown.live.latency import LatencyTape
+from strapdown.live.warm_up import warm_up
+from strapdown.navigation.recorder import Recorder
+from strapdown.systems.progress import Progress, silent
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.drive import ChainRun, Recording, pieces_by_sample
+from strapdown.tables.checks import source_of
+
+__all__ = ["Replay", "before_stamp", "parse_pace"]
+
+#: How often progress is told, s of the record.
+TOLD = 1.0
+
+
+def parse_pace(text: str) -> float:
+    """Read a pace.
+
+    Parameters
+    ----------
+    text : str
+        How many seconds of the record pass in one; ``max`` for as many as can.
+
+    Returns
+    -------
+    float
+        Infinite for ``max``.
+
+    Raises
+    ------
+    ConfigError
+        It is no pace.
+    """
+    if text.strip().lower() == "max":
+        return math.inf
+    try:
+        pace = float(text)
+    except ValueError:
+        pace = math.nan
+    if not 0.0 < pace < math.inf:
+        raise ConfigError(
+            f"'{text}' is no pace",
+            quantity="--pace",
+            remedy="give 1 for the pace of the record, 10 for ten times that, or max",
+        )
+    return pace
+
+
+class Replay:
+    """Drives a chain by a clock: what `run_navigation` takes in place of a run at once.
+
+    A sample is delivered when its stamp is due, or as soon as the one before it is done; rows of
+    the tables of aids with the first sample that is not before them. The numbers are those of a
+    run at once to the last bit.
+
+    Parameters
+    ----------
+    pace : float
+        Seconds of the record a second; infinite for as fast as it goes.
+    clock : Clock, optional
+        That of the machine, if not given.
+    """
+
+    def __init__(self, pace: float, clock: Clock | None = None) -> None:
+        self.pace = pace
+        self.tape = LatencyTape()
+        self._clock = clock or MachineClock()
+
+    def __call__(
+        self,
+        chain: Chain,
+        imu: pd.DataFrame,
+        tables: Mapping[str, pd.DataFrame] | None = None,
+        recorder: Recorder | None = None,
+        progress: Progress = silent,
+    ) -> ChainRun:
+        """Run a chain, as `systems.sins.drive.run_batch`."""
+        warm_up(chain, imu.attrs["sampling"])
+        recording, clock = Recording(chain, recorder), self._clock
+        stamps = imu.index.to_numpy(dtype=np.float64)
+        pieces = pieces_by_sample(chain, imu, tables, _ahead(chain, tables or {}))
+        begin, told = clock.now(), -math.inf
+        due = begin + (stamps - stamps[0]) / self.pace
+        length = max(float(stamps[-1] - stamps[0]), 1e-9)
+        for k, stamp in enumerate(stamps.tolist()):
+            clock.wait_until(float(due[k]))
+            delivered = clock.now()
+            piece = next(pieces)
+            recording.take(piece)
+            done = clock.now()
+            follows = self.pace < math.inf and k + 1 < len(stamps)
+            self.tape.take(delivered, done, float(due[k + 1]) if follows else math.nan)
+            if stamp >= told + TOLD:
+                told = stamp
+                progress(piece.mode, (stamp - float(stamps[0])) / length)
+        return recording.run(source_of(imu))
+
+
+def _ahead(chain: Chain, tables: Mapping[str, pd.DataFrame]) -> float:
+    """By how much rows must be told before their stamps: what they tell may be of before."""
+    return max((before_stamp(chain.navigator.by_name[name]) for name in tables), default=0.0)
+
+
+def before_stamp(aid: Aid) -> float:
+    """By how much what a row tells is of before its stamp, s: known offsets and delays.
+
+    Parameters
+    ----------
+    aid : Aid
+    """
+    offset, delay = (float(getattr(aid, n, 0.0)) for n in ("time_offset", "velocity_delay"))
+    return max(offset + delay, 0.0)

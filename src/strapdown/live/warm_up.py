@@ -1,0 +1,69 @@
+"""Everything that is compiled, or loaded late, before the first sample comes."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from strapdown.aiding.gnss import Gnss
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.exceptions import StrapdownError
+from strapdown.nav_state import NavState
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.drive import run_by_sample
+from strapdown.systems.sins.gaps import GapPolicy
+from strapdown.systems.sins.known_start import KnownStart
+from strapdown.systems.sins.modes import Navigation
+from strapdown.tables import gnss_table, imu_table
+
+__all__ = ["warm_up"]
+
+#: Rows of a rest: as many as an intake looks at before the first step, and some more.
+ROWS, STEP = 80, 0.01
+
+
+def warm_up(chain: Chain, sampling: str = "mean") -> None:
+    """Navigate a rest of less than a second by a copy of a chain; nothing of it is kept.
+
+    Parameters
+    ----------
+    chain : Chain
+    sampling : {'instantaneous', 'mean'}
+    """
+    time = STEP * np.arange(ROWS)
+    force = np.tile([0.0, 0.0, -STANDARD_GRAVITY], (ROWS, 1))
+    # A sensor that repeats itself would be no rest to some who watch.
+    force[1::2, 0] += 1e-3
+    imu = imu_table(time, 1e-5 * force[:, [0, 0, 0]], force, sampling=sampling)
+    here = NavState.from_degrees(45.0, 20.0, 0.0)
+    start = KnownStart(here, (10.0,) * 3, (1.0,) * 3, (1.0,) * 3, at_first_sample=True)
+    own = replace(
+        chain,
+        modes=(Navigation(),),
+        start=start,
+        commands=(),
+        intake=replace(chain.intake, gaps=GapPolicy()),
+    )
+    # What cannot be done with this rest may well be done with the record.
+    with suppress(StrapdownError):
+        run_by_sample(own, imu, _fixes(chain))
+
+
+def _fixes(chain: Chain) -> dict[str, pd.DataFrame]:
+    """Two fixes of each receiver that tells the first of them in time."""
+    at = 0.5 * ROWS * STEP
+    return {
+        aid.name: gnss_table(
+            np.array([at, at + 2.0 * STEP]) + aid.time_offset,
+            np.tile([45.0, 20.0, 0.0], (2, 1)),
+            np.zeros((2, 3)),
+            (1.0,) * 3,
+            (0.1,) * 3,
+            np.full(2, float(aid.qualities[0])),
+        )
+        for aid in chain.navigator.aids
+        if isinstance(aid, Gnss)
+    }
