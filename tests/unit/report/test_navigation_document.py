@@ -194,6 +194,27 @@ def test_a_run_beyond_its_bounds_cannot():
     assert rows(error_table(found))["horizontal, m"][0] == "30.0"
 
 
+def test_errors_are_of_the_time_and_not_of_the_instants():
+    """Off by 30 m in the second half, where instants are five times as wide apart."""
+    made = record(outage=None)
+    near = np.flatnonzero((made.sd.index <= 60.0) | (np.arange(120) % 5 == 4))
+    thin = replace(
+        made,
+        sd=made.sd.iloc[near],
+        covariance=made.covariance[near],
+        sensors=made.sensors.iloc[near],
+        sensors_sd=made.sensors_sd.iloc[near],
+    )
+    truth = shifted(made.trajectory, north=30.0)
+    early = made.trajectory.index.to_numpy() <= 60.0
+    for name in ("lat", "lon", "alt"):
+        truth.loc[truth.index[early], name] = made.trajectory[name].to_numpy()[early]
+    (north,) = (s for s in examine(told(thin, truth=truth)).errors.scores if s.quantity == "north")
+    # Steps of 5 s count as 3: an instant stands for three times one before, of 60 and 12.
+    assert north.share == pytest.approx(60.0 / (60.0 + 3.0 * 12.0), abs=0.02)
+    assert north.rms == pytest.approx(30.0 * np.sqrt(1.0 - north.share), rel=1e-6)
+
+
 def test_a_truth_of_another_time_is_refused():
     made = record()
     truth = made.trajectory.set_index(made.trajectory.index + 1e4)
