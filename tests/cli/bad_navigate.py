@@ -188,6 +188,11 @@ def negative_sd(time, values):
     return time, values
 
 
+def wild(time, values):
+    values[2000, 3] = 1e6
+    return time, values
+
+
 def exchanged(time, values):
     values[:, :2] = values[:, [1, 0]]
     return time, values
@@ -261,6 +266,7 @@ NAVIGATE_CASES = (
     _samples("Four seconds without samples", gap),
     _samples("Samples that are no numbers", burst_of_nan),
     _samples("Gravity upside down", upside_down),
+    _samples("One wild sample", wild, code=5),
     _samples("Gyros in degrees, named as radians", degrees),
     _samples("Accelerometers in g, named as m/s²", in_g),
     _own("A lever arm without its unit", "lever_arm_m", "lever_arm"),
@@ -305,6 +311,7 @@ NAVIGATE_CASES = (
     ),
     _own("A heading of more than a turn", "heading_deg = 30.0", "heading_deg = 400.0"),
     _own("A pre-filter of another rate", "", '\n[prefilter]\nkind = "robust_fir"\n'),
+    _own("A new alignment after a gap, and none before", "", '\n[gaps]\nbeyond = "align"\n'),
     _own("Two aids of one name", "", '\n[aiding.rtk]\nkind = "no_slip"\n'),
     NavigateCase(
         "Several things at once",

@@ -60,6 +60,14 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     good = np.asarray(values_of(table, ["quality"])[:, 0] > 0.0)
     placed = good & np.isfinite(values_of(table, POSITION_SD)).all(axis=1)
     fast = good & np.isfinite(values_of(table, VELOCITY_SD)).all(axis=1)
+    if not len(time):
+        raise DataError(
+            "there is no fix at all",
+            file=source,
+            quantity="time",
+            remedy="give fixes of the time of the record; of a receiver that is simulated, leave "
+            "time between its outages",
+        )
     if not (placed | fast).any():
         raise DataError(
             f"none of {len(time)} rows is a fix: the quality is 0, or no standard deviation is "

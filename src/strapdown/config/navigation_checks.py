@@ -15,7 +15,7 @@ from strapdown.aiding.aid import Aid, TableAid
 from strapdown.config.alignment_checks import NEEDS_GNSS, NOT_BEFORE_FINE
 from strapdown.config.choice import make_choice
 from strapdown.config.crash_checks import Written
-from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
+from strapdown.config.navigation import NavigationSpec, ReceiverTable, aids_of, receivers_of
 from strapdown.config.slots import SLOTS
 from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
 from strapdown.config.state_tables import processes_of
@@ -83,9 +83,12 @@ class _Checks(SourceChecks):
             yield partial(self.stage, spec, name)
         yield partial(self.height, spec)
         yield partial(self.modes, spec)
+        yield partial(self.gaps, spec)
         yield partial(self.alignment, spec)
         for name in aids_of(spec):
             yield partial(self.aid, spec, name)
+        for name, receiver in receivers_of(spec).items():
+            yield partial(self.receiver, name, receiver)
         yield partial(self.withhold, spec)
         yield partial(self.output, spec)
         yield partial(self.chain, spec)
@@ -233,6 +236,31 @@ class _Checks(SourceChecks):
                 'it observes the height, and [mechanization] height = "held" keeps it where it is',
                 'write height = "free", or leave this aid out',
             )
+
+    def gaps(self, spec: NavigationSpec) -> None:
+        if spec.gaps.beyond == "align" and spec.start is not None:
+            raise self.refuse(
+                ("gaps", "beyond"),
+                "with [start] there is no alignment to begin anew with",
+                'write "refuse" or "coast", or [coarse] in place of [start]',
+            )
+
+    def receiver(self, name: str, receiver: ReceiverTable) -> None:
+        """A receiver that is simulated."""
+        for key in ("position_noise_m", "position_drift_m", "velocity_noise_m_per_s"):
+            if np.min(getattr(receiver, key)) < 0.0:
+                raise self.refuse(
+                    ("simulation", "gnss", name, key),
+                    "no standard deviation is below zero",
+                    "give one or three, above zero",
+                )
+        for begin, end in receiver.outages_s:
+            if not begin < end:
+                raise self.refuse(
+                    ("simulation", "gnss", name, "outages_s"),
+                    f"a span from {begin:g} to {end:g} s has no length",
+                    "write begin and end of each: [[80.0, 110.0]]",
+                )
 
     def withhold(self, spec: NavigationSpec) -> None:
         """Which fixes are kept back, and when."""

@@ -121,7 +121,10 @@ def read_aid_table(
         {name: block[keep] for name, block in values.items()},
         index=pd.Index(time[keep], name="time"),
     )
+    rows = np.flatnonzero(keep)
+    first, last = raw.row(int(rows[0])), raw.row(int(rows[-1]))
     table.attrs |= {"source": raw.name, "findings": tuple(findings)}
+    table.attrs["first_row"] = first if last - first == len(rows) - 1 else None
     return with_clock(table, clock)
 
 

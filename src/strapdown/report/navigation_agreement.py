@@ -122,10 +122,11 @@ class Agreement:
 
     @property
     def refutes(self) -> bool:
-        """Whether most epochs contradict the answer, or were refused for that."""
+        """Whether most epochs contradict the answer, or were refused for that, or errors last."""
         if self.epochs < LEAST_EPOCHS:
             return False
-        return self.usual > REFUTES or 2 * self.rejected > self.epochs
+        lasts = self.ratio > REFUTES and self.remembers
+        return self.usual > REFUTES or lasts or 2 * self.rejected > self.epochs
 
     @property
     def correlation(self) -> float:

@@ -45,6 +45,8 @@ Array = NDArray[np.float64]
 TIME = "time, s"
 BOUND = "95 % bound"
 SHADED = "Shaded: times without an aid."
+#: Bounds that change by more have a logarithmic axis: within less it would have no label or one.
+WIDE = 3.0
 
 
 def over_time(
@@ -88,7 +90,9 @@ def bound_chart(told: NavigationTold) -> Chart:
             shown = np.where(value > 0.0, value, np.nan)
             dash = ("solid", "dash", "dot")[k]
             lines.append(curve(name, time, shown, colour, dash, 1.6, buckets=BUCKETS))
-        panels.append(Panel(f"{title.lower()}, {unit}", tuple(lines), log=True))
+        every = np.concatenate([value[value > 0.0] for _, value, _ in curves])
+        log = bool(every.size and every.max() > WIDE * every.min())
+        panels.append(Panel(f"{title.lower()}, {unit}", tuple(lines), log=log))
     return over_time(
         "bounds",
         "How well it was known",

@@ -20,6 +20,10 @@ __all__ = ["NavigationErrors", "Score", "navigation_errors"]
 Array = NDArray[np.float64]
 
 
+#: An instant stands for no more than so long, s, or than three of the usual steps.
+LONGEST = 1.5
+
+
 @dataclass(frozen=True)
 class Score:
     """Errors of one quantity over a run.
@@ -27,12 +31,14 @@ class Score:
     Attributes
     ----------
     quantity, unit : str
-    rms, largest : float
+    rms : float
+        Over time: instants stand close where much is observed and wide apart in an outage.
+    largest : float
     largest_at : float, s
     bound : float
         Root mean square of the bounds of 95 %.
     share : float
-        Of the instants at which the error is within its bound.
+        Of the time in which the error is within its bound.
     """
 
     quantity: str
@@ -112,16 +118,27 @@ class NavigationErrors:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.where(length > 0.0, PLANE_95 * size / length, reach))
 
+    @cached_property
+    def _weight(self) -> Array:
+        """Share of the time that each instant stands for, (n,)."""
+        steps = np.diff(self.time)
+        if not steps.size:
+            return np.ones(len(self.time)) / len(self.time)
+        # Where the truth is missing for long, nothing stands for that.
+        steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
+        about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+        return np.asarray(about / about.sum())
+
     def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
         worst = int(np.argmax(np.abs(error)))
         return Score(
             name,
             unit,
-            float(np.sqrt(np.mean(np.square(error)))),
+            float(np.sqrt(self._weight @ np.square(error))),
             float(abs(error[worst])),
             float(self.time[worst]),
-            float(np.sqrt(np.mean(np.square(bound)))),
-            float(np.mean(np.abs(error) <= bound)),
+            float(np.sqrt(self._weight @ np.square(bound))),
+            float(min(1.0, self._weight[np.abs(error) <= bound].sum())),
         )
 
 

@@ -80,7 +80,7 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     plane = _Plane(origin, told, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = kept.index.to_numpy(dtype=np.float64)
-    view = _with_margin(View.of([path], most=_TALL))
+    view = _with_margin(View.of([path, *_around(plane)], most=_TALL))
     fixes, beyond = _fixes(plane, view)
     lines = [*fixes, *_truth(plane), *_path(record, time, path)]
     round_, said, obstacles = _ellipses(plane, view)
@@ -132,6 +132,17 @@ def _course(table: pd.DataFrame, told: NavigationTold) -> NDArray[np.intp]:
 def _with_margin(view: View) -> View:
     room = 0.04 * (view.high - view.low)
     return View(view.low - room, view.high + room)
+
+
+def _around(plane: _Plane) -> list[tuple[Array, Array]]:
+    """Corners about the ellipses, which may be larger than the path is long."""
+    along, ends = ellipse_rows(plane.told.record)
+    rows = [*along, *(k for k, _ in ends)]
+    if not rows:
+        return []
+    bounds = plane_bound(plane.told.record)[rows] * plane.scale
+    east, north = _centres(plane, rows).T
+    return [(east + side * bounds, north + side * bounds) for side in (-1.0, 1.0)]
 
 
 def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> list[Line]:

@@ -114,6 +114,15 @@ def test_the_plan_shows_where_it_went_and_what_was_missing():
     assert len(named(panel, "rejected")[0].x) == 1
 
 
+def test_a_path_far_shorter_than_its_ellipses_is_seen_within_them():
+    panel = plan_chart(told(record(speed=0.01, outage=None))).panels[0]
+    marks = [line for line in panel.lines if line.labels and line.name in ("start", "end", "time")]
+    # 1.2 m of way in a picture of twice 7.3 m: no instant between start and end can be read.
+    assert [line.name for line in marks] == ["start", "end"]
+    (ring,) = named(panel, "95\u00a0% ellipse")
+    assert np.nanmax(np.abs(ring.y)) > 5.0
+
+
 def test_fixes_outside_of_the_picture_do_not_widen_it():
     made = record()
     given = told(made)

@@ -143,6 +143,17 @@ def test_most_epochs_far_off_refute_it_and_outliers_do_not():
     assert found.sentence.startswith("It should not be trusted: rtk.position scatters more")
 
 
+def test_large_errors_that_last_refute_it():
+    made = record(seconds=300.0, outage=None, reject=())
+    table = made.innovations["rtk.position"]
+    # Less than half of the epochs, one after the other: the median does not see them.
+    wave = 14.0 * np.sin(np.arange(140) / 5.0) * np.sqrt(table["s north, m"].iloc[0])
+    table.iloc[:140, 0] = wave
+    (found,) = examine(told(made)).agreements
+    assert found.usual < 3.0 < found.ratio
+    assert found.refutes
+
+
 def test_an_aid_that_is_mostly_refused_refutes_it():
     made = record(outage=None, reject=())
     table = made.innovations["rtk.position"]
@@ -181,6 +192,27 @@ def test_a_run_beyond_its_bounds_cannot():
     assert trust(found).verdict == "distrusted"
     assert found.errors.score("horizontal").share == 0.0
     assert rows(error_table(found))["horizontal, m"][0] == "30.0"
+
+
+def test_errors_are_of_the_time_and_not_of_the_instants():
+    """Off by 30 m in the second half, where instants are five times as wide apart."""
+    made = record(outage=None)
+    near = np.flatnonzero((made.sd.index <= 60.0) | (np.arange(120) % 5 == 4))
+    thin = replace(
+        made,
+        sd=made.sd.iloc[near],
+        covariance=made.covariance[near],
+        sensors=made.sensors.iloc[near],
+        sensors_sd=made.sensors_sd.iloc[near],
+    )
+    truth = shifted(made.trajectory, north=30.0)
+    early = made.trajectory.index.to_numpy() <= 60.0
+    for name in ("lat", "lon", "alt"):
+        truth.loc[truth.index[early], name] = made.trajectory[name].to_numpy()[early]
+    (north,) = (s for s in examine(told(thin, truth=truth)).errors.scores if s.quantity == "north")
+    # Steps of 5 s count as 3: an instant stands for three times one before, of 60 and 12.
+    assert north.share == pytest.approx(60.0 / (60.0 + 3.0 * 12.0), abs=0.02)
+    assert north.rms == pytest.approx(30.0 * np.sqrt(1.0 - north.share), rel=1e-6)
 
 
 def test_a_truth_of_another_time_is_refused():

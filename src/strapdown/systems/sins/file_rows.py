@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import pandas as pd
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.exceptions import DataError, DivergenceError, Finding
+from strapdown.tables.checks import source_of
 
 __all__ = ["in_file", "said_of_file"]
 
@@ -44,9 +45,16 @@ def _moved(row: int, first: int | None) -> int | None:
 
 @contextmanager
 def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
-    """Errors that are raised within name rows of the file."""
+    """Errors that are raised within name rows of the file, and the first table's file at least."""
     try:
         yield
+    except DivergenceError as error:
+        said = error.finding
+        if said.file is not None or not tables:
+            raise
+        raise DivergenceError(
+            said.what, file=source_of(tables[0]), quantity=said.quantity, remedy=said.remedy
+        ) from None
     except DataError as error:
         said = error.finding
         (moved,) = in_file((said,), *tables)

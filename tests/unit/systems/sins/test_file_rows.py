@@ -7,7 +7,7 @@ import pytest
 from tests.cli.bad_navigate import write_drive
 
 from strapdown.config.alignment import AxesTable, LogTable
-from strapdown.exceptions import DataError, Finding
+from strapdown.exceptions import DataError, DivergenceError, Finding
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.sins.file_rows import in_file, said_of_file
@@ -33,6 +33,12 @@ def test_errors_are_moved_too():
     assert caught.value.finding == Finding(
         "stuck", file="log.csv", row=5, quantity="gyro_x", remedy="mend it"
     )
+
+
+def test_a_state_that_diverges_is_of_the_first_table():
+    with pytest.raises(DivergenceError) as caught, said_of_file(table(first_row=4)):
+        raise DivergenceError("it diverged at 40 s", quantity="state")
+    assert caught.value.finding.file == "log.csv"
 
 
 def test_readers_say_where_their_first_row_stands(tmp_path):
