@@ -39,9 +39,23 @@ JUST_BEFORE = 1e-6
 ROUNDING = 1e-12
 PHYSICAL_LABELS = ("place", "velocity", "attitude")
 
-__all__ = ["Navigator", "NavigatorState", "with_states"]
+__all__ = ["LostCovarianceError", "Navigator", "NavigatorState", "with_states"]
 
 Array = NDArray[np.float64]
+
+
+class LostCovarianceError(DivergenceError):
+    """A variance became negative.
+
+    Attributes
+    ----------
+    place : ndarray, (3,), m²
+        What stood for the variances of the place then.
+    """
+
+    def __init__(self, place: Array, what: str, *, quantity: str, remedy: str) -> None:
+        super().__init__(what, quantity=quantity, remedy=remedy)
+        self.place = place
 
 
 @dataclass(frozen=True, eq=False)
@@ -488,7 +502,8 @@ class _Going:
         if not good.all():
             k = int(np.argmin(good))
             label = PHYSICAL_LABELS[k // 3] if k < 9 else list(model.layout.labels())[k - len(P)]
-            raise DivergenceError(
+            raise LostCovarianceError(
+                np.asarray(variances[:3]),
                 f"the variance of {label} is {variances[k]:.3g} at {time:.9g} s, and so there is "
                 "no covariance any more",
                 quantity="covariance",

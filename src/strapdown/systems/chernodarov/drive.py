@@ -23,7 +23,8 @@ from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.navigation.damping import Damping, Feedback
-from strapdown.navigation.navigator import Navigator
+from strapdown.navigation.navigator import LostCovarianceError, Navigator
+from strapdown.navigation.piece import NavigationPiece
 from strapdown.simulation import Origin, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.manoeuvres import Accelerate, LaneChange, Stop, Straight, Turn
@@ -224,16 +225,17 @@ class Drive:
         if fixes is not None:
             state = navigator.tell(state, "gnss", fixes)
         ends, rows = after(self.increments, begun.time)
-        pieces, lost = [], ""
+        pieces: list[NavigationPiece] = []
+        lost, least = "", np.inf
         for k in range(0, len(ends), PIECE):
             try:
-                # A filter that is lost has negative variances, of which it takes roots.
-                with np.errstate(invalid="ignore"):
-                    state, piece = navigator.advance(
-                        state, ends[k : k + PIECE], rows[k : k + PIECE]
-                    )
+                state, piece = navigator.advance(state, ends[k : k + PIECE], rows[k : k + PIECE])
             except (DataError, DivergenceError) as error:
                 lost = error.finding.what
+                if isinstance(error, LostCovarianceError):
+                    least = float(error.place.min())
+                if not pieces:
+                    raise
                 break
             pieces.append(piece)
         time = np.concatenate([p.time for p in pieces])
@@ -247,7 +249,7 @@ class Drive:
             (path[VELOCITY[:2]].to_numpy() - self.truth[VELOCITY[:2]].to_numpy()[: len(time)]),
             np.array([m.time for m in marks]),
             np.sqrt(np.maximum(each, 0.0).sum(axis=1)),
-            float(each.min()),
+            min(float(each.min()), least),
             history,
             lost,
         )
