@@ -122,6 +122,8 @@ class Plan:
     # What is wrong: stated over true standard deviation, assumed over true noise of the gyros,
     # stamps that are late, autocorrelation of the fixes from one second to the next.
     grade: float = 1.0
+    # How many times as large as usual the biases are, which is known.
+    bias: float = 1.0
     stated: float = 1.0
     gyro_noise: float = 1.0
     late: float = 0.0
@@ -168,7 +170,7 @@ def drawn(plan, seed):
     imu, _ = exact()
     n = len(imu)
     bias = np.zeros((n, 6))
-    sd = np.r_[[GYRO_BIAS] * 3, [ACCEL_BIAS] * 3]
+    sd = plan.bias * np.r_[[GYRO_BIAS] * 3, [ACCEL_BIAS] * 3]
     bias[:] = rng.normal(size=6) * sd
     if plan.correlation_time:
         # Means over steps of a process that is followed at their ends.
@@ -234,7 +236,7 @@ def drawn(plan, seed):
 
 def navigator_of(plan):
     mechanization, model = MODELS[plan.model]
-    gyro, accel = gyro_bias(GYRO_BIAS), accel_bias(ACCEL_BIAS)
+    gyro, accel = gyro_bias(plan.bias * GYRO_BIAS), accel_bias(plan.bias * ACCEL_BIAS)
     if plan.correlation_time:
         gyro, accel = (gauss_markov(one, plan.correlation_time) for one in (gyro, accel))
     made = model(
@@ -249,7 +251,8 @@ def run(plan, seed):
     """Errors of the physical states and their covariance at the epochs."""
     inc, gnss, begin, bias = drawn(plan, seed)
     navigator = navigator_of(plan)
-    P = np.diag(np.r_[plan.start_sd, [GYRO_BIAS] * 3, [ACCEL_BIAS] * 3] ** 2)
+    biases = plan.bias * np.r_[[GYRO_BIAS] * 3, [ACCEL_BIAS] * 3]
+    P = np.diag(np.r_[plan.start_sd, biases] ** 2)
     state = navigator.tell(navigator.begin(begin, P), "gnss", gnss)
     time, rows = inc.index.to_numpy(), inc.to_numpy()
     errors, covariances = [], []

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapdown.estimation.adaptive_rule import AdaptiveRule
+from strapdown.estimation.adaptive_scale import AdaptiveScale
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.influence_igg3 import Igg3
@@ -28,6 +30,7 @@ RUNS = 100
 # Epochs before which an outlier may still find a state of which little is known.
 SETTLED = 6
 NED, WANDER, QUATERNIONS = MODELS
+SMALL_START = tuple(0.1 * np.array(START_SD))
 
 
 def kept(plan):
@@ -133,15 +136,25 @@ def test_ned_and_wander_azimuth_are_one_filter():
         Plan(model=QUATERNIONS, correlation_time=60.0),
         Plan(step=1.0),
         Plan(start_sd=(*START_SD[:8], np.radians(10.0))),
-        Plan(damping="feedforward"),
+        # What is not taken off the state stays: a better start and better sensors, see below.
+        Plan(damping="feedforward", start_sd=SMALL_START, bias=0.1),
     ],
     ids=lambda plan: (
         f"{plan.model} {plan.form} {plan.damping} {plan.fix_offset:g} {plan.correlation_time:g} "
-        f"{plan.step:g} {np.degrees(plan.start_sd[8]):.0f}"
+        f"{plan.step:g} {np.degrees(plan.start_sd[8]):.1f}"
     ),
 )
 def test_a_hundred_drives_are_as_wrong_as_they_are_said_to_be(plan):
     believable(trials(plan), len(kept(plan)))
+
+
+@pytest.mark.slow
+def test_forward_alone_errors_that_are_not_small_leave_the_linear_model():
+    # 2 deg of heading and 20 deg/h stay in a mechanization that is never corrected: over 4 minutes
+    # the squares of the errors, which the equations leave out, outgrow what is known by fixes.
+    forward = trials(Plan(damping="feedforward"), 20).mean(axis=0)
+    _, high = band_of_mean(15, 20)
+    assert forward[-5:].mean() > 1.5 * high
 
 
 @pytest.mark.slow
@@ -187,8 +200,10 @@ def test_a_robust_rule_keeps_its_accuracy_among_gross_errors_and_the_plain_one_d
     seeds = range(40)
     clean = place_rms(Plan(), seeds)
     # The same noise, and in a tenth of the fixes 50 standard deviations in some direction.
-    for influence in (Igg3(), Tukey()):
-        rule = RobustUpdate(influence)
+    # What is proposed for a log, which cannot reject for ever, and does not call a receiver better
+    # than it says: 10 % worse over a hundred drives.
+    proposed = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
+    for rule in (RobustUpdate(Igg3()), RobustUpdate(Tukey()), proposed):
         assert place_rms(Plan(rule=rule, outliers=0.1), seeds) < 1.2 * clean
         assert place_rms(Plan(rule=rule), seeds) < 1.1 * clean
     assert place_rms(Plan(outliers=0.1), seeds) > 3.0 * clean

@@ -23,8 +23,8 @@ WEEK = 604_800.0
 GPS_EPOCH, LEAP = 315_964_800.0, 18.0
 #: Unix time since 1995 and until 2040, s.
 UNIX = (7.9e8, 2.21e9)
-#: Offsets that are looked at, s, and the step of the search.
-LARGEST, STEP = 20.0, 0.05
+#: Offsets that are looked at, s, the step of the search, and of the fit about what it finds.
+LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
 #: How far apart integrals of the sensors are kept for it, s.
 NODES = 0.02
 #: Below this speed a course says nothing, m/s.
@@ -282,7 +282,7 @@ def _best(
     ):
         return None
     # Again about the least, with a step that is wide beside its noise and narrow beside motions.
-    fine = grid[k] + np.arange(-4, 5) * 0.5 * STEP
+    fine = grid[k] + np.arange(-4, 5) * FINE_STEP
     second, first, _ = np.polyfit(fine - grid[k], [misfit(float(one)) for one in fine], 2)
     if not second > 0.0:
         return None

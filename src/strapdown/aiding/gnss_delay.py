@@ -69,8 +69,6 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     deviation allows for what is correlated, as pieces that overlap are (Newey and West,
     Econometrica 55 (1987) 703).
     """
-    from scipy.interpolate import CubicSpline
-
     good = values_of(table, ["quality"])[:, 0] > 0.0
     good &= np.isfinite(values_of(table, [*POSITION_SD, *VELOCITY_SD])).all(axis=1)
     if good.sum() <= LEAST_STEPS:
@@ -82,6 +80,8 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     apart = max(1, round(PIECE / float(np.median(steps))))
     if len(time) <= LEAST_STEPS + apart:
         return None
+    from scipy.interpolate import CubicSpline
+
     moved = place_difference(place[apart:], place[:-apart])
     speed = CubicSpline(time, velocity)
     way = speed.antiderivative()

@@ -248,6 +248,7 @@ class NavigationSpec(TableSpec):
     live: LiveTable | None = None
     axes: AxesTable = AxesTable()
     sensors: NavigationSensorsTable = NavigationSensorsTable()
+    states: TableSpec = TableSpec()
     prefilter: PrefilterSpec = PrefilterSpec()
     start: StartTable | None = None
     site: NavigationSiteTable | None = None

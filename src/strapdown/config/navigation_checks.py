@@ -18,9 +18,11 @@ from strapdown.config.crash_checks import Written
 from strapdown.config.navigation import NavigationSpec, ReceiverTable, aids_of, receivers_of
 from strapdown.config.slots import SLOTS
 from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
+from strapdown.config.state_tables import processes_of
 from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.state_process import with_processes
 from strapdown.estimation.stated_states import stated_states
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
@@ -308,9 +310,11 @@ class _Checks(SourceChecks):
             aids = make_aids(spec)
         except ConfigError as error:
             # Options of modules are told by themselves, and with their own keys.
-            if (error.finding.quantity or "") != "states":
-                return
-            self.told(("sensors",), partial(_raise, error))
+            about = error.finding.quantity or ""
+            if about == "states":
+                self.told(("sensors",), partial(_raise, error))
+            elif about.startswith("states"):
+                self.told(("states",), partial(_raise, error))
             return
         self.told(("filter",), partial(_begun, spec, with_states(made, aids)))
 
@@ -376,7 +380,9 @@ def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
         options.model(
             gyro_noise=sensors.gyro.axis("noise_density"),
             accel_noise=sensors.accel.axis("noise_density"),
-            sensors=stated_states(sensors, spec.sensors.states),
+            sensors=with_processes(
+                stated_states(sensors, spec.sensors.states), processes_of(spec.states)
+            ),
         ),
         options.form,
         options.rule,

@@ -34,6 +34,7 @@ from strapdown.config.navigation_wanted import what_navigation_wants, write_of_n
 from strapdown.config.placeholders import refuse_placeholders
 from strapdown.config.slots import SLOTS
 from strapdown.config.spec import TableSpec
+from strapdown.config.state_tables import StatesTable
 from strapdown.config.together import together
 from strapdown.config.toml_file import TomlFile, place_of, read_toml
 from strapdown.config.toml_lines import KeyPath
@@ -85,6 +86,7 @@ def navigation_form(table: Mapping[str, Any], file: TomlFile | None = None) -> t
             path=(name,),
         )
         parts[name] = _field(form, {"kind": stage_default(name, table)})
+    parts["states"] = (StatesTable, StatesTable())
     parts["aiding"] = _field(_aiding_form(table, file), {})
     if isinstance(table.get("simulation"), Mapping):
         parts["simulation"] = (_simulation_form(table, file), ...)

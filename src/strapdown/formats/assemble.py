@@ -90,7 +90,15 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     for triad, (unit, why) in units.items():
         factor = {**UNITS[triad], **SUMS[triad]}[unit]
-        body[triad] = (values[triad][:, axes.axis] * np.array(axes.sign) * factor)[kept]
+        # A long log is a large part of the memory there is: in place, and nothing kept beside it.
+        block = values.pop(triad)
+        first = block[kept[0]].copy()
+        turned = block[:, axes.axis]
+        del block
+        turned *= np.array(axes.sign)
+        turned *= factor
+        body[triad] = turned if kept.size == len(turned) else turned[kept]
+        del turned
         if triad in summed:
             body[triad] /= intervals(time, kept)
         for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
@@ -101,7 +109,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
                     ("-" if sign < 0 else "") + f"{triad}_{AXES[j]}",
                     unit,
                     f"{column.why}; unit {why}; axes {axes.why}",
-                    float(values[triad][kept[0], axis]),
+                    float(first[axis]),
                 )
             )
     if summed:
@@ -111,7 +119,12 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     report_gaps(raw.name, time, body["gyro"], findings)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
     imu = imu_table(
-        time, body["gyro"], body.get("accel"), body.get("mag"), sampling=sampling, source=raw.name
+        time,
+        body.pop("gyro"),
+        body.pop("accel", None),
+        body.pop("mag", None),
+        sampling=sampling,
+        source=raw.name,
     )
     with_clock(imu, _clock(raw, found, stamps, dated))
     first, last = raw.row(int(kept[0])), raw.row(int(kept[-1]))
@@ -157,8 +170,8 @@ def _values(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> d
 
 
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
-    parts = [numbers(raw, found[f"{triad}_{a}"], f"{triad}_{a}").astype(np.float64) for a in AXES]
-    return np.column_stack(parts)
+    parts = [numbers(raw, found[f"{triad}_{a}"], f"{triad}_{a}") for a in AXES]
+    return np.column_stack(parts).astype(np.float64, copy=False)
 
 
 def _left_out(raw: RawLog, triad: str, error: DataError) -> Finding:

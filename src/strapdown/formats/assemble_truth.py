@@ -68,18 +68,21 @@ def truth_of_log(
         if q is None:
             _mention(raw, found, findings)
             return None, None
-        if not _known(q[kept]).any():
+        # Of a long log no copy is made that is not needed.
+        q = q if kept.size == len(q) else q[kept]
+        if not _known(q).any():
             return None, None
         for name in names:
             column = found[name]
-            values = numbers(raw, column, name)[kept]
-            first = float(values[np.argmax(np.isfinite(values))])
+            values = numbers(raw, column, name)
+            first = float(values[kept[np.argmax(np.isfinite(values[kept]))]])
             readings.append(Reading(column.source, name, column.unit or "", column.why, first))
-        q_ns, scored = q[kept], np.ones(kept.size, dtype=bool)
+        q_ns, scored = q, np.ones(kept.size, dtype=bool)
+        del q
     known = _known(q_ns)
     if not known.any():
         return None, None
-    q_nb = q_ns[known]
+    q_nb = q_ns if known.all() else q_ns[known]
     if axes != AS_THEY_ARE:
         q_nb = rotation.compose(q_nb, _sensor_from_body(raw, axes))
     return attitude_table(time[known], q_nb, raw.name), scored[known]
@@ -141,15 +144,16 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
 
 
 def _known(q: Array) -> NDArray[np.bool_]:
-    known: NDArray[np.bool_] = np.isfinite(q).all(axis=1) & (np.abs(q).max(axis=1) > LOST)
+    large = (q.max(axis=1) > LOST) | (q.min(axis=1) < -LOST)
+    known: NDArray[np.bool_] = np.isfinite(q).all(axis=1) & large
     return known
 
 
 def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, list[str]]:
     """Attitude of each row, NaN where unknown, and the columns it came from."""
     if all(n in found for n in QUATERNIONS):
-        parts = [numbers(raw, found[n], n).astype(np.float64) for n in QUATERNIONS]
-        return np.column_stack(parts), list(QUATERNIONS)
+        parts = [numbers(raw, found[n], n) for n in QUATERNIONS]
+        return np.column_stack(parts).astype(np.float64, copy=False), list(QUATERNIONS)
     if not all(n in found for n in EULERS):
         return None, []
     angles = np.column_stack([numbers(raw, found[n], n) for n in EULERS]).astype(np.float64)

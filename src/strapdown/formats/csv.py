@@ -29,8 +29,8 @@ _DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:.*")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 # What of a text is looked at to learn how its table begins, in bytes.
 HEAD = 1 << 16
-# Quotes, zeros, and breaks of lines that few programs write.
-_ODD = (b'"', b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
+# Zeros, and breaks of lines that few programs write.
+_ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 
 
 def detect(path: Path) -> bool:
@@ -100,7 +100,10 @@ def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
     start = 0
     for _ in range(first - 1):
         start = data.index(b"\n", start) + 1
-    columns = columns_at_once(data[start:], len(top.names), top.separator)
+    # In the names of columns alone a quote is nothing odd.
+    if data.find(b'"', start) >= 0:
+        return None
+    columns = columns_at_once(data, len(top.names), top.separator, start)
     if columns is None:
         return None
     return _log(name, files, top, columns, np.arange(first, first + columns[0].size), comments, [])

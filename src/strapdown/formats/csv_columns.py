@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any, Literal
 
 import numpy as np
@@ -13,19 +14,25 @@ __all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
 Columns = list[NDArray[Any]]
 #: What programs write for a value that is not there.
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
+#: From this many bytes on the first of them tell what is a number.
+LONG = 1 << 22
 
 
-def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns | None:
+def columns_at_once(
+    data: bytes, count: int, separator: str | None, start: int = 0
+) -> Columns | None:
     """Columns of lines of one width.
 
     Parameters
     ----------
-    body : bytes
-        ASCII without quotes; the last line has its end.
+    data : bytes
+        ASCII, from `start` on without quotes; the last line has its end.
     count : int
         Columns.
     separator : str or None
         Between fields; None for any run of blanks.
+    start : int
+        Letters before the first of these lines.
 
     Returns
     -------
@@ -33,15 +40,18 @@ def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns |
         As `parsed`. None where a line has another width, is empty, or holds what may be no number.
     """
     # A comma may be a decimal sign, and an x that of a hexadecimal number.
-    if count < 2 or b"x" in body or b"X" in body or (separator != "," and b"," in body):
+    odd = (b"x", b"X", *(() if separator == "," else (b",",)))
+    if count < 2 or any(data.find(c, start) >= 0 for c in odd):
         return None
-    if b"\r" in body:
-        body = body.replace(b"\r\n", b"\n")
-        if b"\r" in body:
+    if data.find(b"\r", start) >= 0:
+        data, start = data[start:].replace(b"\r\n", b"\n"), 0
+        if b"\r" in data:
             return None
-    columns = _parsed_or_none(body, count, separator or " ")
+    # No copy: a text may be half of the memory there is.
+    columns = _parsed_or_none(memoryview(data)[start:], count, separator or " ")
     if columns is not None and all(_full(c) for c in columns):
         return columns
+    body = data[start:]
     # A value that is missing may be two blanks beside each other, or a line without any.
     if separator is None:
         body = single_blanks(body)
@@ -49,7 +59,7 @@ def columns_at_once(body: bytes, count: int, separator: str | None) -> Columns |
     return None if b"\n\n" in body or body.startswith(b"\n") else columns
 
 
-def _parsed_or_none(body: bytes, count: int, delimiter: str) -> Columns | None:
+def _parsed_or_none(body: bytes | memoryview, count: int, delimiter: str) -> Columns | None:
     import pyarrow as pa
 
     try:
@@ -87,7 +97,7 @@ def single_blanks(text: bytes) -> bytes:
 
 
 def parsed(
-    body: bytes,
+    body: bytes | memoryview,
     count: int,
     delimiter: str,
     *,
@@ -99,7 +109,7 @@ def parsed(
 
     Parameters
     ----------
-    body : bytes
+    body : bytes or memoryview
         UTF-8, without a header.
     count : int
         Columns.
@@ -120,9 +130,42 @@ def parsed(
         A line has another number of fields.
     """
     import pyarrow as pa
+
+    def read(part: bytes | memoryview, types: dict[str, Any]) -> Any:
+        return _table(part, types, count, delimiter, decimal, quote)
+
+    asked = {str(k): pa.string() for k in text}
+    table = None
+    if len(body) > LONG:
+        # Where a type is not stated, all of the text is kept until it is known.
+        with suppress(pa.ArrowInvalid):
+            top = bytes(body[:LONG])
+            seen = read(top[: top.rfind(b"\n") + 1], asked).schema
+            numbers = {f.name: f.type for f in seen if str(f.type) in ("int64", "double")}
+            table = read(body, {**numbers, **asked})
+    if table is None:
+        table = read(body, asked)
+    columns = []
+    # One after the other, so that no more than one stands there twice.
+    for _ in range(count):
+        columns.append(_array(table.column(0)))
+        table = table.remove_column(0)
+    pa.default_memory_pool().release_unused()
+    return columns
+
+
+def _table(
+    body: bytes | memoryview,
+    types: dict[str, Any],
+    count: int,
+    delimiter: str,
+    decimal: str,
+    quote: str | Literal[False],
+) -> Any:
+    import pyarrow as pa
     import pyarrow.csv as pa_csv
 
-    table = pa_csv.read_csv(
+    return pa_csv.read_csv(
         pa.BufferReader(body),
         read_options=pa_csv.ReadOptions(
             column_names=[str(k) for k in range(count)], use_threads=False
@@ -134,10 +177,9 @@ def parsed(
             decimal_point=decimal,
             null_values=list(NULLS),
             strings_can_be_null=True,
-            column_types={str(k): pa.string() for k in text},
+            column_types=types,
         ),
     )
-    return [_array(table.column(k)) for k in range(count)]
 
 
 def _array(column: Any) -> NDArray[Any]:

@@ -54,7 +54,14 @@ def read(path: Path) -> RawLog:
             table = file.read()
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
-        arrays = {n: _array(table.column(k)) for k, n in enumerate(table.column_names)}
+        meta = {_text(k): _text(v) for k, v in (table.schema.metadata or {}).items()}
+        units = _units(table)
+        arrays = {}
+        # One after the other, so that no more than one stands there twice.
+        for name in table.column_names:
+            arrays[name] = _array(table.column(0))
+            table = table.remove_column(0)
+        pa.default_memory_pool().release_unused()
     except DataError:
         raise
     except Exception as error:  # a damaged file can break any of the decoders it goes through
@@ -63,8 +70,7 @@ def read(path: Path) -> RawLog:
             file=path.name,
             remedy="the file is cut or damaged; copy it again",
         ) from None
-    meta = {_text(k): _text(v) for k, v in (table.schema.metadata or {}).items()}
-    return raw_log(path, {n: a for n, a in arrays.items() if a is not None}, _units(table), meta)
+    return raw_log(path, {n: a for n, a in arrays.items() if a is not None}, units, meta)
 
 
 def _units(table: Any) -> dict[str, str]:
@@ -94,7 +100,8 @@ def _array(column: Any) -> NDArray[Any] | None:
         return dates
     if pa.types.is_integer(kind) or pa.types.is_floating(kind):
         values: NDArray[Any] = column.to_numpy()
-        return values
+        # What Arrow has allocated stays with it when it is freed.
+        return values if values.flags.owndata else values.copy()
     return None
 
 

@@ -33,8 +33,11 @@ class Feedback(Damping):
 class Feedforward(Damping):
     """The mechanization runs free, and estimates are taken off what is shown of it.
 
-    Errors grow as those of an unaided system, and the model of the filter is linear in them: it
-    holds for minutes with a low-cost sensor, and for hours with a good one.
+    Errors grow as those of an unaided system, and the model of the filter is linear in them: what
+    is said of its errors holds while they are small. Of a hundred drives of four minutes it did
+    with a heading known to 0.2 deg and biases of 2 deg/h and 0.2 mg at the start; with ten times
+    these the mean normalised square of the errors was seven times what was claimed, where feedback
+    kept to it. It is for good sensors, and for comparison.
     """
 
     kind: ClassVar[str] = "feedforward"

@@ -235,6 +235,8 @@ def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
             remedy="give another span of the log's own stamps (from_s, to_s, duration_s; --from, "
             "--duration)",
         )
+    if kept.all():
+        return imu
     out = imu[kept]
     out.attrs = dict(imu.attrs)
     if out.attrs.get("first_row") is not None:

@@ -48,6 +48,7 @@ def attitude_table(time: ArrayLike, q_nb: ArrayLike, source: str | None = None) 
         np.hstack([q, rotation.euler_from_quaternion(q)]),
         index=pd.Index(stamps, name="time"),
         columns=QUATERNION + EULER,
+        copy=False,
     )
     table.attrs["source"] = source
     check_attitude(table)
@@ -70,5 +71,6 @@ def check_attitude(table: pd.DataFrame) -> None:
     source = source_of(table)
     check_columns(table, QUATERNION + EULER, source)
     check_time(index_of(table), source)
-    check_rows(values_of(table, QUATERNION + EULER), QUATERNION + EULER, source)
-    rotation.conjugate(values_of(table, QUATERNION))
+    values = values_of(table, QUATERNION + EULER)
+    check_rows(values, QUATERNION + EULER, source)
+    rotation.conjugate(values[:, : len(QUATERNION)])

@@ -70,7 +70,13 @@ def imu_table(
         field = as_array(mag, 3, "mag", source)
         check_same_length(source, time=stamps, mag=field)
         columns, values = columns + MAG, np.hstack([values, field])
-    table = pd.DataFrame(values, index=pd.Index(stamps, name="time"), columns=columns)
+    table = pd.DataFrame(
+        values,
+        index=pd.Index(stamps, name="time"),
+        columns=columns,
+        # What was put together here belongs to nobody else.
+        copy=accel is None and mag is None,
+    )
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
     check_imu(table)
     return table

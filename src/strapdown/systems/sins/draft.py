@@ -238,7 +238,7 @@ def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
     """Options that are chosen as keys, the others as comments with their defaults."""
     for option in options_of(module):
         if option.key in chosen:
-            page.key(option.key, toml_value(chosen[option.key]) or "")
+            page.key(option.key, _inline(chosen[option.key]))
             continue
         value = toml_value(option.default)
         if option.slot is not None:
@@ -249,6 +249,17 @@ def _options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
         elif not option.has_default:
             page.key(option.key, ASK, f"only you know: {_WANTED.get(option.key, 'no default')}")
 
+
+def _inline(value: Any) -> str:
+    """A value, or a module with its options, on one line."""
+    if isinstance(value, Mapping):
+        parts = ", ".join(f"{key} = {_inline(one)}" for key, one in value.items())
+        return f"{{ {parts} }}"
+    return toml_value(value) or ""
+
+
+#: For a vehicle that drives, ready to be used.
+WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
 
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north",
@@ -274,6 +285,14 @@ def _aids(page: Page, made: Proposal, folder: Path) -> list[str]:
         page.key("kind", string(aid["kind"]))
         page.key("path", string(_from(Path(aid["path"]), folder)))
         _options(page, slot.entries[aid["kind"]], _with_remarks(page, aid))
+    if made.drives:
+        page.say(
+            "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. How "
+            "the unit stands in the vehicle is estimated; lever_arm_m is of the middle of the axle "
+            "that is not steered."
+        )
+        for line in WHEELS:
+            page.say(line)
     page.say(*_other(slot, OTHER_AIDS))
     if made.gnss is None:
         return []

@@ -46,6 +46,10 @@ NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
 COARSE = 100.0
 #: An alignment by a course ends when angles are known so well, deg.
 WELL = 3.0
+#: Of the rules, those that give a gross error no weight keep their accuracy among them; with its
+#: scale this one cannot reject for ever. Errors that last make innovations small: they are no sign
+#: of a receiver that is better than it says.
+RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
 #: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
 OFFSET_SD = 0.2
 #: What the motion tells of clocks is taken where it is so many standard deviations, and a delay
@@ -72,6 +76,8 @@ class Proposal:
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
         Whether the sensor is only the one of the catalogue that is nearest by its noise.
+    drives : bool
+        Whether it drives fast enough for a course, by the fixes.
     how : str
         Why it is aligned so, in words.
     findings : tuple of Finding
@@ -85,6 +91,7 @@ class Proposal:
     rest: float
     noise: tuple[float, ...] | None
     guessed: bool
+    drives: bool
     how: str
     findings: tuple[Finding, ...]
 
@@ -151,11 +158,11 @@ def propose(
                 "kind": "gnss",
                 "path": str(gnss),
                 "lever_arm_m": (0.0, 0.0, 0.0),
-                "update_rule": "robust",
+                "update_rule": RULE,
                 **_clock(fixes, imu, drives),
             }
         }
-    return Proposal(table, recording, imu, fixes, rest, noise, guessed, how, findings)
+    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
 
 
 @dataclass(frozen=True, eq=False)
