@@ -2,96 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown._kernels.split_increment import split_increment
-from strapdown._kernels.steady_motion import STEADY, steady_motion
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.gnss import Gnss
-from strapdown.aiding.view import View
-from strapdown.estimation.adaptive_rule import AdaptiveRule, Scales
-from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
-from strapdown.estimation.observation import Observation
-from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError, DivergenceError, nearest
+from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
-from strapdown.navigation.compiled_engine import CompiledEngine, Fixed, compiled
+from strapdown.navigation.compiled_engine import CompiledEngine, compiled
 from strapdown.navigation.damping import Damping, Feedback
 from strapdown.navigation.engine import SAME_INSTANT, Engine, EngineState, GeneralEngine, begun
-from strapdown.navigation.piece import Mark, NavigationPiece, Seen
+from strapdown.navigation.going import Going
+from strapdown.navigation.navigator_state import NavigatorState
+from strapdown.navigation.piece import NavigationPiece
 
-#: Over which shaking is taken out of rates and forces, s: beyond a tenth of a second it is not seen
-#: by receivers, and a vehicle does not change its acceleration by much in it.
-STEADY_TIME = 0.2
-#: Where nothing was observed for so many intervals of marks, there is a mark before the next
-#: observation, too; its stamp is so much earlier, s.
-ALONE = 1.5
-JUST_BEFORE = 1e-6
-#: A variance is negative by rounding alone within this part of those of its kind.
-ROUNDING = 1e-12
-PHYSICAL_LABELS = ("place", "velocity", "attitude")
-
-__all__ = ["LostCovarianceError", "Navigator", "NavigatorState", "with_states"]
+__all__ = ["Navigator", "NavigatorState", "with_states"]
 
 Array = NDArray[np.float64]
-
-
-class LostCovarianceError(DivergenceError):
-    """A variance became negative.
-
-    Attributes
-    ----------
-    place : ndarray, (3,), m²
-        What stood for the variances of the place then.
-    """
-
-    def __init__(self, place: Array, what: str, *, quantity: str, remedy: str) -> None:
-        super().__init__(what, quantity=quantity, remedy=remedy)
-        self.place = place
-
-
-@dataclass(frozen=True, eq=False)
-class NavigatorState:
-    """Everything that a navigator remembers: from here it goes on.
-
-    Attributes
-    ----------
-    engine : EngineState
-        Of mechanization, estimates and covariance.
-    queues : mapping of str to Epochs
-        Of each aid, the epochs that are still to come.
-    memories : mapping of str to object
-        Of each aid that watches the sensors.
-    marked : float, s
-        Time of the last mark.
-    observed : float, s
-        When something was observed last; the start, before that.
-    scales : mapping of str to tuple of ScaleState
-        By name of an observation whose rule learns: what it has learnt of each component.
-    steady : ndarray, (7,)
-        Fading means of rate and force (`_kernels.steady_motion`), where an aid wants them.
-    """
-
-    engine: EngineState
-    queues: Mapping[str, Epochs]
-    memories: Mapping[str, Any]
-    marked: float
-    observed: float
-    scales: Mapping[str, Scales] = field(default_factory=dict)
-    steady: Array = field(default_factory=lambda: np.zeros(STEADY))
-
-    @property
-    def time(self) -> float:
-        """Time of the newest sample, s."""
-        return self.engine.time
 
 
 @dataclass(frozen=True)
@@ -228,7 +160,7 @@ class Navigator:
         DivergenceError
             The state has left what the mechanization can do; the sample is named.
         """
-        going = _Going(self, state)
+        going = Going(self, state)
         # Copies: rows are cut at epochs, and what is writeable is one type for compiled code, what
         # is not another.
         going.over(np.array(time, dtype=np.float64), np.array(rows, dtype=np.float64, order="C"))
@@ -246,7 +178,7 @@ class Navigator:
         NavigationPiece
             Without samples; without a mark where there is one already.
         """
-        going = _Going(self, state)
+        going = Going(self, state)
         if state.time > state.marked + SAME_INSTANT:
             going.end()
         return going.piece()
@@ -256,268 +188,6 @@ class Navigator:
         if self.damping.feeds_back and compiled(self.filter):
             return CompiledEngine.going_on(self.filter, state)
         return GeneralEngine(self.filter, state, self.damping.feeds_back)
-
-
-class _Going:
-    """A navigator on its way over one piece."""
-
-    def __init__(self, navigator: Navigator, state: NavigatorState) -> None:
-        self.navigator = navigator
-        self.engine = navigator.engine(state.engine)
-        self.queues = dict(state.queues)
-        self.memories = dict(state.memories)
-        self.marked = state.marked
-        self.observed = state.observed
-        self.scales = dict(state.scales)
-        self.steady = state.steady.copy()
-        self.begun_steady = state.steady
-        self.steadies: Array | None = None
-        self.seen: list[Seen] = []
-        self.marks: list[Mark] = []
-        self.late: list[tuple[str, float]] = []
-        self.time: Array = np.empty(0)
-        self.history: Array = np.empty((0, navigator.filter.mechanization.row))
-
-    def over(self, time: Array, rows: Array) -> None:
-        """Go over steps."""
-        for aid in self.navigator.aids:
-            if isinstance(aid, WatchingAid):
-                self.memories[aid.name], self.queues[aid.name] = aid.watch(
-                    self.memories[aid.name], time, rows
-                )
-        self._drop_late()
-        if any(aid.wants_steady for aid in self.navigator.aids):
-            self.steadies = np.empty((len(rows), 6))
-            steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
-        self.time, self.history = time, np.empty((len(time), self.history.shape[1]))
-        at = self._fixes(0, time, rows)
-        while True:
-            epoch = self._next_epoch()
-            if epoch <= self.engine.time + SAME_INSTANT:
-                self._observe(self.engine.time)
-                if at and self.engine.time <= time[at - 1] + SAME_INSTANT:
-                    self.history[at - 1] = self.engine.shown()
-                at = self._fixes(at, time, rows)
-                continue
-            if at == len(time):
-                break
-            # The step at whose end, or within which, something is observed next.
-            told = int(np.searchsorted(time, epoch - SAME_INSTANT))
-            if told < len(time) and time[told] > epoch + SAME_INSTANT:
-                at = self._steps(at, told, time, rows)
-                first, second = np.empty(10), np.empty(10)
-                split_increment(rows[told], epoch - self.engine.time, first, second)
-                room = np.empty((1, self.history.shape[1]))
-                self._run(np.array([epoch]), first[None, :], room)
-                rows[told] = second
-            else:
-                at = self._steps(at, min(told + 1, len(time)), time, rows)
-
-    def end(self) -> None:
-        """Mark the newest sample."""
-        self.engine.close()
-        self._mark()
-
-    def _fixes(self, made: int, time: Array, rows: Array) -> int:
-        """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
-        aid, engine = self.navigator.lone_receiver, self.engine
-        if aid is None or not isinstance(engine, CompiledEngine):
-            return made
-        arm = np.asarray(aid.lever_arm, dtype=np.float64)
-        interval = self.navigator.mark_interval * (1.0 - 1e-9)
-        queue = self.queues[aid.name]
-        while made < len(time):
-            usual = self._until_outage(queue)
-            if not usual.time.size:
-                break
-            went, fixed, stopped = engine.over_fixes(
-                time[made:],
-                rows[made:],
-                self.history[made:],
-                self.marked + interval,
-                interval,
-                arm,
-                usual,
-            )
-            made += went
-            done = len(fixed.told)
-            self._fixed(aid, queue, fixed)
-            queue = Epochs(queue.time[done:], queue.values[done:])
-            if stopped:
-                self._mark()
-        self.queues[aid.name] = queue
-        return made
-
-    def _until_outage(self, queue: Epochs) -> Epochs:
-        """Epochs that follow each other, and the last observation, without an outage."""
-        if not queue.time.size:
-            return queue
-        longest = ALONE * self.navigator.mark_interval
-        apart = np.diff(queue.time, prepend=self.observed) > longest
-        count = int(np.argmax(apart)) if apart.any() else len(apart)
-        return Epochs(queue.time[:count], queue.values[:count])
-
-    def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
-        """Note what came of fixes."""
-        names = {code: aid.names(code) for code in set(fixes.values[: len(fixed.told), 0].tolist())}
-        every = zip(
-            fixes.values[:, 0].tolist(),
-            fixed.time.tolist(),
-            fixed.told,
-            fixed.covariance,
-            fixed.sensors,
-            fixed.sensors_sd,
-            strict=False,
-        )
-        for code, at, told, covariance, sensors, sd in every:
-            name, labels = names[code]
-            self.seen.append(Seen(at, name, labels, Innovations(told[0], told[1], told[2])))
-            self._add_mark(Mark(at, covariance, sensors, sd))
-            self.observed = at
-
-    def state(self) -> NavigatorState:
-        """Where it is now."""
-        return NavigatorState(
-            self.engine.state(),
-            self.queues,
-            self.memories,
-            self.marked,
-            self.observed,
-            self.scales,
-            self.steady,
-        )
-
-    def piece(self) -> NavigationPiece:
-        """What came of it."""
-        return NavigationPiece(
-            self.time, self.history, tuple(self.seen), tuple(self.marks), tuple(self.late)
-        )
-
-    def _steady(self, at: float) -> Array | None:
-        """Rate and force without the shaking, at the last sample before an instant."""
-        if self.steadies is None:
-            return None
-        k = int(np.searchsorted(self.time, at + SAME_INSTANT, side="right"))
-        if k:
-            return np.asarray(self.steadies[k - 1])
-        return self.begun_steady[:6] if self.begun_steady[6] else None
-
-    def _next_epoch(self) -> float:
-        return min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
-
-    def _drop_late(self) -> None:
-        for name, queue in self.queues.items():
-            count = int(np.searchsorted(queue.time, self.engine.time - SAME_INSTANT))
-            if count:
-                self.late += [(name, float(t)) for t in queue.time[:count]]
-                self.queues[name] = Epochs(queue.time[count:], queue.values[count:])
-
-    def _steps(self, begin: int, end: int, time: Array, rows: Array) -> int:
-        """Steps from `begin` to before `end`."""
-        self._run(time[begin:end], rows[begin:end], self.history[begin:end])
-        return end
-
-    def _run(self, time: Array, rows: Array, history: Array) -> None:
-        made = 0
-        while made < len(time):
-            # The interval is one of a decimal clock.
-            note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
-            made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
-            if made < len(time):
-                self._mark()
-
-    def _observe(self, at: float) -> None:
-        """Take everything that is observed at an instant."""
-        engine, filter_ = self.engine, self.navigator.filter
-        last = engine.last
-        engine.close()
-        view = View(
-            mechanization=filter_.mechanization,
-            model=filter_.model,
-            time=at,
-            state=engine.mechanization,
-            row=engine.row,
-            sensors=engine.filter.sensors,
-            rate=last[1:4] / last[0],
-            force=last[4:7] / last[0],
-            covariance_of=partial(filter_.physical_covariance, engine.filter),
-            steady=self._steady(at),
-        )
-        told: list[tuple[Aid, Observation]] = []
-        for aid in self.navigator.aids:
-            queue = self.queues[aid.name]
-            count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
-            for values in queue.values[:count]:
-                told += [(aid, one) for one in aid.observe(view, values)]
-            self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
-        if told:
-            if at > self.observed + ALONE * self.navigator.mark_interval:
-                self._mark(JUST_BEFORE)
-            self.observed = at
-            observations = [one for _, one in told]
-            innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
-            self.seen += [
-                Seen(at, one.name, one.labels, nu)
-                for one, nu in zip(observations, innovations, strict=True)
-            ]
-        self._mark()
-
-    def _told(
-        self, rules: list[UpdateRule | None], observations: list[Observation]
-    ) -> list[Innovations]:
-        """Take observations; what their rules learn of them is kept."""
-        asked: list[Rules] = []
-        for rule, one in zip(rules, observations, strict=True):
-            if isinstance(rule, AdaptiveRule):
-                asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
-            else:
-                asked.append(rule)
-        innovations = self.engine.observe(observations, asked)
-        for rule, one, nu in zip(rules, observations, innovations, strict=True):
-            if isinstance(rule, AdaptiveRule):
-                before = self.scales.get(one.name) or rule.begin(one.z.size)
-                self.scales[one.name] = rule.after(before, nu, one.R)
-        return innovations
-
-    def _mark(self, before: float = 0.0) -> None:
-        """Note covariance and estimates, with a stamp that is so much earlier."""
-        filter_, state = self.navigator.filter, self.engine.filter
-        P = filter_.physical_covariance(state)
-        turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
-        mark = Mark(
-            state.time - before,
-            turn.T @ P[:9, :9] @ turn,
-            self.engine.estimates(filter_),
-            self._sd(state.time, P),
-        )
-        self._add_mark(mark)
-
-    def _sd(self, time: float, P: Array) -> Array:
-        """Standard deviations of the sensors' errors; refuses what is no covariance."""
-        variances, model = np.diagonal(P), self.navigator.filter.model
-        kinds = np.concatenate(
-            [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]
-        )
-        good = variances >= -ROUNDING * kinds
-        if not good.all():
-            k = int(np.argmin(good))
-            label = PHYSICAL_LABELS[k // 3] if k < 9 else list(model.layout.labels())[k - len(P)]
-            raise LostCovarianceError(
-                np.asarray(variances[:3]),
-                f"the variance of {label} is {variances[k]:.3g} at {time:.9g} s, and so there is "
-                "no covariance any more",
-                quantity="covariance",
-                remedy="use update_rule 'robust' where it was 'paper', whose step takes more off "
-                "than there is with an influence that descends again; or covariance 'ud' or 'wd' "
-                "where it was 'plain' or 'joseph'",
-            )
-        return np.sqrt(np.maximum(variances[9:], 0.0))
-
-    def _add_mark(self, mark: Mark) -> None:
-        if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:
-            self.marks.pop()
-        self.marks.append(mark)
-        self.marked = mark.time
 
 
 def with_states(filter_: ErrorFilter, aids: tuple[Aid, ...]) -> ErrorFilter:

@@ -23,7 +23,8 @@ from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.navigation.damping import Damping, Feedback
-from strapdown.navigation.navigator import LostCovarianceError, Navigator
+from strapdown.navigation.lost_covariance import LostCovarianceError
+from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.simulation import Origin, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
