@@ -233,6 +233,8 @@ class NavigationOutputTable(TableSpec):
 
     #: Forms of the trajectory.
     files: tuple[Word, ...] = ("csv", "kml", "geojson")
+    #: Whether every chart is drawn as a picture, too: for print, and for a page without scripts.
+    figures: StrictBool = True
 
 
 class NavigationSpec(TableSpec):

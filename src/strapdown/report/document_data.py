@@ -25,7 +25,7 @@ from strapdown.report.document import (
 )
 from strapdown.report.document_text import plain_document
 
-__all__ = ["document_data", "draw_stills"]
+__all__ = ["document_data", "draw_stills", "no_stills"]
 
 Place = Callable[[str], str]
 _INTERVAL_MS = 60  # between frames, where an animation does not say
@@ -43,9 +43,20 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     tuple of str
         An SVG of each, in their order.
     """
-    plain = plain_document(document)
-    blocks = [*plain.front, *(block for section in plain.sections for block in section.blocks)]
-    return tuple(_drawn(block.chart) for block in blocks if isinstance(block, ChartBlock))
+    return tuple(_drawn(chart) for chart in _charts(plain_document(document)))
+
+
+def no_stills(document: Document) -> tuple[str, ...]:
+    """Return as many empty drawings as `draw_stills` gives: for a page of live charts alone."""
+    return tuple("" for _ in _charts(document))
+
+
+def _charts(document: Document) -> list[Chart]:
+    blocks = [
+        *document.front,
+        *(block for section in document.sections for block in section.blocks),
+    ]
+    return [block.chart for block in blocks if isinstance(block, ChartBlock)]
 
 
 def _drawn(chart: Chart) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 from strapdown.bundle import Seal, check_destination, to_json, write_bundle
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
-from strapdown.report.document_data import draw_stills
+from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.navigation_document import navigation_document
@@ -122,8 +122,11 @@ def write_navigation(
         write_navigation_files(result, folder)
         progress("drawing the figures", 0.86)
         document = navigation_document(found.told, name, found)
-        stills = draw_stills(document)
-        write_drawings(document, stills, folder / "figures")
+        if result.spec.output.figures:
+            stills = draw_stills(document)
+            write_drawings(document, stills, folder / "figures")
+        else:
+            stills = no_stills(document)
         progress("writing the page", 0.95)
         write_text(folder / "report.html", document_page(document, stills=stills))
         progress("sealing", 0.97)
