@@ -16,7 +16,7 @@ def test_there_are_runs_to_hold():
     assert len(RUNS) == 3
 
 
-@pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash", "align"])
+@pytest.mark.parametrize(("command", "shown"), RUNS, ids=["attitude", "crash", "navigate"])
 def test_the_output_shown_is_the_output(command, shown, run_cli, tmp_path, monkeypatch, sketched):
     words = shlex.split(command.replace("\\\n", " "))
     (tmp_path / "docs").symlink_to(Path(__file__).parent.parent / "docs")
