@@ -20,6 +20,8 @@ GYRO_NOISE, ACCEL_NOISE = math.radians(0.1) / 60.0, 0.05 / 60.0  # rad/√s, m/s
 GYRO_BIAS, ACCEL_BIAS = math.radians(100.0) / 3600.0, 0.03  # rad/s, m/s²
 # What the filters are told of the start: m, m/s, deg of the level, deg of the heading.
 START_SD = (5.0, 0.5, 0.5, 3.0)
+#: Samples of a piece: 50 s.
+PIECE = 5000
 FORMS = ("joseph", "ud", "wd")
 
 
@@ -91,7 +93,7 @@ def navigator(form: str) -> Any:
 
 
 def ratios() -> Iterator[Ratio]:
-    from strapdown.increments import motion_increments
+    from strapdown.increments import IncrementStream
     from strapdown.rotation import dcm_from_quaternion
     from strapdown.tables import ACCEL, GYRO, gnss_table
 
@@ -101,6 +103,8 @@ def ratios() -> Iterator[Ratio]:
     made = drive(1)
     n = len(made.imu)
     gyro, accel = (np.ascontiguousarray(made.imu[c].to_numpy()) for c in (GYRO, ACCEL))
+    stamps, samples = made.imu.index.to_numpy(), np.hstack([gyro, accel])
+    stream = IncrementStream()
     s = made.start
     initial = np.r_[s.lat, s.lon, s.alt, s.v_n, dcm_from_quaternion(s.q_nb).ravel()]
     radians = np.column_stack([np.radians(made.fix[:, :2]), made.fix[:, 2]])
@@ -139,15 +143,23 @@ def ratios() -> Iterator[Ratio]:
         found = []
 
         def ours(used: Any = used, P: np.ndarray = P, found: list[Any] = found) -> None:
-            # As the C filter: from rates to states.
-            table = motion_increments(made.imu)
+            # As the C filter, from rates to every state; in pieces, as a command does.
             state = used.tell(used.begin(made.start, P), "gnss", fixes)
-            _, piece = used.advance(state, table.index.to_numpy(), table.to_numpy())
-            found[:] = [piece]
+            states, at = np.empty((n - 1, 10)), 0
+            waiting = stream.begin("instantaneous")
+            for first in range(0, n, PIECE):
+                end = min(first + PIECE, n)
+                waiting, ends, rows = stream.advance(
+                    waiting, stamps[first:end], samples[first:end], end == n
+                )
+                state, piece = used.advance(state, ends, rows)
+                states[at : at + len(ends)] = piece.history
+                at += len(ends)
+            found[:] = [states]
 
         taken, limit = by_turns(ours, theirs, rounds=7)
         # Both must have done the same work: nearer to each other than either is to the truth.
-        apart = (found[0].history[30_000:, :3] - out[30_001:, :3]) * [6.37e6, 3.65e6, 1.0]
+        apart = (found[0][30_000:, :3] - out[30_001:, :3]) * [6.37e6, 3.65e6, 1.0]
         assert np.sqrt((apart**2).sum(axis=1).mean()) < 0.1
         yield Ratio(
             f"30 min at 100 Hz, a fix a second, covariance at 10 Hz, {form}",

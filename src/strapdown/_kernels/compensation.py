@@ -10,7 +10,9 @@ from strapdown._kernels.rotation_vector import cross
 @njit(cache=True, error_model="numpy")
 def errors_of_states(terms, states, out):
     """Fill (7, 3): what states of couplings, given by their terms, add to a triad's readings."""
-    out[:, :] = 0.0
+    for i in range(7):
+        for j in range(3):
+            out[i, j] = 0.0
     for e in range(terms.shape[0]):
         m, axis, j = int(terms[e, 0]), int(terms[e, 1]), int(terms[e, 2])
         out[m, axis] += terms[e, 3] * states[j]

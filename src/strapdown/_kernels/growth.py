@@ -8,12 +8,16 @@ the first nine have dynamics F, (9, n); each of the others decays by itself.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numba import njit
 
 CORE = 9
+SIXTH = 1.0 / 6.0
+# Numbers in a line of the cache.
+LINE = 8
 
 
 @njit(cache=True)
@@ -26,7 +30,22 @@ def padded(n):
 def growth_room(n: int) -> tuple[Any, ...]:
     """Arrays to work in, for n states."""
     rows, width = padded(n)
-    return tuple(np.empty((m, width)) for m in (9, 9, 9, 9, 9, 6, 6, 9, rows))
+    return side_by_side([(m, width) for m in (9, 9, 9, 9, 9, 6, 6, 9, rows)])
+
+
+def side_by_side(shapes: Sequence[tuple[int, int]]) -> tuple[Any, ...]:
+    """Return arrays of zeros in one block, each from the begin of a line of the cache on.
+
+    Four numbers that a processor takes at once are then never of two lines.
+    """
+    sizes = [-(-a * b // LINE) * LINE for a, b in shapes]
+    whole = np.zeros(sum(sizes) + LINE)
+    at = -whole.ctypes.data % (8 * LINE) // 8
+    out = []
+    for (a, b), size in zip(shapes, sizes, strict=True):
+        out.append(whole[at : at + a * b].reshape(a, b))
+        at += size
+    return tuple(out)
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
@@ -80,30 +99,43 @@ def powers(f, decay, dt, one, two, three):
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def series(one, two, three, part, out):
-    """Fill ``exp(F dt part)`` to third order from the powers of F dt."""
-    b, c = part * part / 2.0, part * part * part / 6.0
+def series(one, two, three, whole, half):
+    """Fill ``exp(F dt)`` and ``exp(F dt/2)`` to third order from the powers of F dt."""
     for i in range(CORE):
         for j in range(one.shape[1]):
-            out[i, j] = part * one[i, j] + b * two[i, j] + c * three[i, j]
-        out[i, i] += 1.0
+            a, b, c = one[i, j], two[i, j], three[i, j]
+            whole[i, j] = a + 0.5 * b + SIXTH * c
+            half[i, j] = 0.5 * a + 0.125 * b + 0.125 * SIXTH * c
+        whole[i, i] += 1.0
+        half[i, i] += 1.0
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def turned_noise(matrix, noise, dt, out, at):
-    """Fill ``C diag(noise²) C' dt``, (3, 3), into rows `at` and after of `out`."""
+def weighted_by_noise(lift, at, matrix, noise, dt, turned, out, to):
+    """Fill three columns of `out` with those of `lift` from `at` on times ``C diag(noise²) C' dt``.
+
+    `turned` (6, w) is room to work in.
+    """
     if noise[0] == noise[1] and noise[1] == noise[2]:
         # C C' is one.
-        for i in range(3):
+        scale = dt * noise[0] * noise[0]
+        for i in range(CORE):
             for j in range(3):
-                out[at + i, j] = dt * noise[0] * noise[0] if i == j else 0.0
+                out[i, to + j] = scale * lift[i, at + j]
         return
     for i in range(3):
         for j in range(3):
             total = 0.0
             for m in range(3):
                 total += matrix[i, m] * matrix[j, m] * noise[m] * noise[m]
-            out[at + i, j] = dt * total
+            turned[i, j] = dt * total
+    for i in range(CORE):
+        for j in range(3):
+            out[i, to + j] = (
+                lift[i, at] * turned[0, j]
+                + lift[i, at + 1] * turned[1, j]
+                + lift[i, at + 2] * turned[2, j]
+            )
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -120,14 +152,13 @@ def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, 
     k, w = decay.shape[0], f.shape[1]
     one, two, three, lift, weighted, across, turned, _, _ = room
     powers(f, decay, dt, one, two, three)
-    series(one, two, three, 1.0, phi)
-    series(one, two, three, 0.5, lift)
+    series(one, two, three, phi, lift)
     for i in range(CORE):
         if still & (1 << i):
             for j in range(w):
                 lift[i, j] = 0.0
-    turned_noise(matrix, accel_noise, dt, turned, 0)
-    turned_noise(matrix, gyro_noise, dt, turned, 3)
+    weighted_by_noise(lift, 3, matrix, accel_noise, dt, turned, weighted, 0)
+    weighted_by_noise(lift, 6, matrix, gyro_noise, dt, turned, weighted, 3)
     for m in range(6):
         for j in range(w):
             across[m, j] = 0.0
@@ -136,14 +167,6 @@ def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, 
     for i in range(q.shape[0]):
         for j in range(w):
             q[i, j] = 0.0
-    for i in range(CORE):
-        for at in range(0, 6, 3):
-            for j in range(3):
-                weighted[i, at + j] = (
-                    lift[i, 3 + at] * turned[at, j]
-                    + lift[i, 4 + at] * turned[at + 1, j]
-                    + lift[i, 5 + at] * turned[at + 2, j]
-                )
     for i in range(0, CORE, 3):
         for at in range(0, 6, 3):
             add_block(q, i, weighted, at, across)

@@ -103,7 +103,9 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
     wx, wy, wz = level[OMEGA_EL], level[OMEGA_EL + 1], level[OMEGA_EL + 2]
     spin = earth[RATE]
     ex, ey, ez = spin * level[AXIS], spin * level[AXIS + 1], spin * level[AXIS + 2]
-    f[:, :] = 0.0
+    for i in range(f.shape[0]):
+        for j in range(f.shape[1]):
+            f[i, j] = 0.0
     minus_cross(f, 0, 0, wx, wy, wz)
     f[0, 3] = f[1, 4] = f[2, 5] = 1.0
     g = gravity_gradient(f, 3, 0, level, up, earth)
@@ -133,18 +135,22 @@ def means_of_steps(states, q_at, rows, at, longest, matrix):
     step that is not among them, and their time.
     """
     dt = 0.0
-    matrix[:, :] = 0.0
+    for i in range(6):
+        for j in range(3):
+            matrix[i, j] = 0.0
     end = at
     count = rows.shape[0]
     while end < count and (end == at or dt + rows[end, 0] <= longest * 1.000001):
         h = rows[end, 0]
-        a, b = states[end, q_at : q_at + 4], states[end + 1, q_at : q_at + 4]
+        aw, ax = states[end, q_at], states[end, q_at + 1]
+        ay, az = states[end, q_at + 2], states[end, q_at + 3]
+        bw, bx = states[end + 1, q_at], states[end + 1, q_at + 1]
+        by, bz = states[end + 1, q_at + 2], states[end + 1, q_at + 3]
         # Between the two ends; the sign of a quaternion is not its own.
         sign = 1.0
-        if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] < 0.0:
+        if aw * bw + ax * bx + ay * by + az * bz < 0.0:
             sign = -1.0
-        qw, qx = a[0] + sign * b[0], a[1] + sign * b[1]
-        qy, qz = a[2] + sign * b[2], a[3] + sign * b[3]
+        qw, qx, qy, qz = aw + sign * bw, ax + sign * bx, ay + sign * by, az + sign * bz
         norm = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
         c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
         # Velocity increments are in the axes of the start of their step: to those of its middle.

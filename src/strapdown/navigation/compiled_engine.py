@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import error_loop as kernel
 from strapdown._kernels import fix_loop as fix_kernel
-from strapdown._kernels.growth import growth_room, padded
+from strapdown._kernels.growth import growth_room, padded, side_by_side
 from strapdown._kernels.level import LEVEL
 from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
@@ -109,7 +109,9 @@ class CompiledEngine(Engine):
             filter_.earth,
             used.kernel_options(),
         )
-        self._covariance = np.zeros(shape)
+        self._covariance, f, phi, q, after = side_by_side(
+            [shape, (9, width), (9, width), (rows_of_q, width), shape]
+        )
         self._sensors = state.filter.sensors.copy()
         self._times = np.array([state.filter.time, state.time])
         self.mechanization = state.mechanization.copy()
@@ -125,14 +127,14 @@ class CompiledEngine(Engine):
         )
         self._group = (np.empty((LARGEST_GROUP + 1, used.row)), np.empty((LARGEST_GROUP, 10)))
         closing = (
-            np.empty((9, width)),
-            np.empty((9, width)),
+            f,
+            phi,
             np.empty(n - 9),
-            np.empty((rows_of_q, width)),
+            q,
             growth_room(n),
             np.empty((6, 3)),
             np.empty((1, LEVEL)),
-            np.zeros(shape),
+            after,
             np.empty((n, n)),
             np.empty((n, n)),
         )

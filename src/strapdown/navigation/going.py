@@ -71,6 +71,8 @@ class Going:
                     self.memories[aid.name], time, rows
                 )
         self._drop_late()
+        if len(time) and self._cuts(time):
+            rows = rows.copy()
         if any(aid.wants_steady for aid in self.navigator.aids):
             self.steadies = np.empty((len(rows), 6))
             steady_motion(rows, STEADY_TIME, self.steady, self.steadies)
@@ -98,6 +100,14 @@ class Going:
             else:
                 at = self._steps(at, min(told + 1, len(time)), time, rows)
 
+    def _cuts(self, time: Array) -> bool:
+        """Whether an epoch is within a step, which is then cut there."""
+        for queue in self.queues.values():
+            due = queue.time[: np.searchsorted(queue.time, time[-1] - SAME_INSTANT)]
+            if (time[np.searchsorted(time, due - SAME_INSTANT)] > due + SAME_INSTANT).any():
+                return True
+        return False
+
     def end(self) -> None:
         """Mark the newest sample."""
         self.engine.close()
@@ -112,7 +122,8 @@ class Going:
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
         while made < len(time):
-            usual = self._until_outage(queue)
+            due = int(np.searchsorted(queue.time, time[-1] + SAME_INSTANT, side="right"))
+            usual = self._until_outage(Epochs(queue.time[:due], queue.values[:due]))
             if not usual.time.size:
                 break
             went, fixed, stopped = engine.over_fixes(

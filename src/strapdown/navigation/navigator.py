@@ -161,9 +161,9 @@ class Navigator:
             The state has left what the mechanization can do; the sample is named.
         """
         going = Going(self, state)
-        # Copies: rows are cut at epochs, and what is writeable is one type for compiled code, what
-        # is not another.
-        going.over(np.array(time, dtype=np.float64), np.array(rows, dtype=np.float64, order="C"))
+        # What is writeable is one type for compiled code, and what is not another.
+        stamps = np.require(time, np.float64, ["C", "W"])
+        going.over(stamps, np.require(rows, np.float64, ["C", "W"]))
         return going.state(), going.piece()
 
     def finish(self, state: NavigatorState) -> NavigationPiece:
