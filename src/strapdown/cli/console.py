@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
+from strapdown.cli.compiling import Compilations
+
 if TYPE_CHECKING:
     from rich.console import Console
 
@@ -87,7 +89,23 @@ def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
         transient=True,
     ) as bar:
         task = bar.add_task("starting", total=1.0)
-        yield lambda stage, share: bar.update(task, description=stage, completed=share)
+        at = "starting"
+
+        def compiling(begun: bool) -> None:
+            bar.update(task, description=f"{at} (compiling, once on this machine)" if begun else at)
+
+        compilations = Compilations(compiling)
+
+        def show(stage: str, share: float) -> None:
+            nonlocal at
+            at = stage
+            compilations.listen()
+            bar.update(task, description=stage, completed=share)
+
+        try:
+            yield show
+        finally:
+            compilations.stop()
 
 
 def print_table(
