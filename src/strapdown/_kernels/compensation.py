@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from numba import njit
 
+from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.rotation_vector import cross
 
+#: Each takes the errors of what the one before left of the inputs.
+ROUNDS = 5
 
-@njit(cache=True, error_model="numpy")
+
+@njit(**GIVEN)
 def errors_of_states(terms, states, out):
     """Fill (7, 3): what states of couplings, given by their terms, add to a triad's readings."""
     for i in range(7):
@@ -40,7 +44,25 @@ def changes(errors):
     return False
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
+def of_inputs(gyro, of_gyros, accel, of_accels, rate, force):
+    """Errors of both triads with true inputs, of the inputs that they measured.
+
+    A scale factor is of the true input, which is the reading less the error itself. Taken of the
+    reading, a bias and a scale factor of an input that stays would not make up for each other as
+    they do in the covariance: the part that nothing tells would be seen, and a filter that corrects
+    it would correct itself, ever faster. Errors of 5 % are found to 1e-6 of the input.
+    """
+    dx, dy, dz, ex, ey, ez = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for _ in range(ROUNDS if of_gyros or of_accels else 1):
+        true_rate = (rate[0] - dx, rate[1] - dy, rate[2] - dz)
+        true_force = (force[0] - ex, force[1] - ey, force[2] - ez)
+        dx, dy, dz = reading(gyro, of_gyros, true_rate, true_force)
+        ex, ey, ez = reading(accel, of_accels, true_rate, true_force)
+    return dx, dy, dz, ex, ey, ez
+
+
+@njit(**GIVEN)
 def compensate(rows, gyro, accel, out):
     """Fill increments without errors (7, 3) of gyros and accelerometers (`errors_of_states`).
 
@@ -59,8 +81,7 @@ def compensate(rows, gyro, accel, out):
             tx, ty, tz = cross(px, py, pz, ux, uy, uz)
             rate = (px / dt, py / dt, pz / dt)
             force = ((ux - 0.5 * tx) / dt, (uy - 0.5 * ty) / dt, (uz - 0.5 * tz) / dt)
-        dx, dy, dz = reading(gyro, of_gyros, rate, force)
-        ex, ey, ez = reading(accel, of_accels, rate, force)
+        dx, dy, dz, ex, ey, ez = of_inputs(gyro, of_gyros, accel, of_accels, rate, force)
         dx, dy, dz = dx * dt, dy * dt, dz * dt
         ex, ey, ez = ex * dt, ey * dt, ez * dt
         tx, ty, tz = cross(px, py, pz, ex, ey, ez)

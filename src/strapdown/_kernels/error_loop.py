@@ -13,7 +13,8 @@ from numba import njit
 
 from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.factors import udu_predict
-from strapdown._kernels.growth import CORE, grown_covariance, growth_of_step
+from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.growth import grown_covariance, growth_of_step, unfold_growth
 from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.ned import ned_advance
 from strapdown._kernels.ned_level import ned_levels
@@ -44,19 +45,13 @@ BEYOND = 1.000001
 # - room: arrays to work in.
 
 
-@njit(cache=True, error_model="numpy")
-def close_group(kinds, model, states, group, count, room):
-    """Take the covariance over the steps of a group; return -1, or the first state gone bad.
-
-    The covariance is padded (`growth.padded`), or holds the (n, n) factors.
-    """
-    if count == 0:
-        return -1
-    which, form, held = kinds
+@njit(**GIVEN)
+def growth_of_group(kinds, model, states, group, count, room):
+    """Fill transition and noise over the steps of a group."""
+    which, _, held = kinds
     gyro_terms, accel_terms, decay, drive, gyro_noise, accel_noise, earth, _ = model
-    state, at_covariance, covariance, sensors, times, _ = states
     open_history, open_rows = group
-    f, phi, tail, q, work, matrix, level, after, whole, added = room
+    f, growth, work, matrix, level, _, _, _ = room
     q_at, up = Q_NB, -1.0
     if which == WANDER:
         q_at, up = Q_WB, 1.0
@@ -80,28 +75,51 @@ def close_group(kinds, model, states, group, count, room):
         earth,
     )
     still = HELD_ROWS if held else 0
-    growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, phi, tail, q, work)
-    if form < UD:
-        bad = grown_covariance(covariance, phi, tail, q, after, work)
-    else:
-        n = CORE + decay.shape[0]
-        for i in range(n):
-            for j in range(n):
-                whole[i, j] = phi[i, j] if i < CORE else 0.0
-                added[i, j] = q[i, j] if i <= j else q[j, i]
-            if i >= CORE:
-                whole[i, i] = tail[i - CORE]
-        bad = udu_predict(covariance, whole, added, after)
-    for i in range(covariance.shape[0]):
-        for j in range(covariance.shape[1]):
-            covariance[i, j] = after[i, j]
+    growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, work)
+
+
+@njit(**GIVEN)
+def matrix_over_group(states, room):
+    """Take a covariance that is a matrix over a group; return -1, or the first state gone bad."""
+    return grown_covariance(states[2], room[1], room[2])
+
+
+@njit(cache=True, error_model="numpy")
+def factors_over_group(states, room):
+    """Take the factors of a covariance over a group; return -1, or the first state gone bad."""
+    _, growth, _, _, _, whole, added, after = room
+    unfold_growth(growth, whole, added)
+    bad = udu_predict(states[2], whole, added, after)
+    states[2][:, :] = after
+    return bad
+
+
+@njit(**GIVEN)
+def begin_group(states, group, count, room):
+    """Begin a group where one of `count` steps ended."""
+    state, at_covariance, _, sensors, times, _ = states
+    open_history, _ = group
+    _, _, _, tail, _ = room[1]
     for j in range(state.shape[0]):
         at_covariance[j] = state[j]
-    for j in range(tail.shape[0]):
+    for j in range(sensors.shape[0]):
         sensors[j] *= tail[j]
     for j in range(open_history.shape[1]):
         open_history[0, j] = open_history[count, j]
     times[AT_COVARIANCE] = times[AT_STEP]
+
+
+@njit(cache=True, error_model="numpy")
+def close_group(kinds, model, states, group, count, room):
+    """Take the covariance over the steps of a group; return -1, or the first state gone bad.
+
+    The covariance is (n, n), as its form has it: the matrix, or its factors.
+    """
+    if count == 0:
+        return -1
+    growth_of_group(kinds, model, states, group, count, room)
+    bad = matrix_over_group(states, room) if kinds[1] < UD else factors_over_group(states, room)
+    begin_group(states, group, count, room)
     return bad
 
 

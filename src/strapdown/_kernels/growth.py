@@ -1,233 +1,334 @@
 """From the dynamics of errors to their transition and their noise over a step.
 
-Matrices are padded with zeros, to rows by threes and columns by fours (`padded`), so that rows are
-added to rows three at a time and a processor takes several numbers of them at once. Of n states
-the first nine have dynamics F, (9, n); each of the others decays by itself.
+Of n states the first nine, the core, have dynamics F, (9, n); each of the others decays by itself.
+The core is place, velocity and attitude in this order, and the attitude turns by itself: of F the
+blocks (place, attitude), (attitude, place) and (attitude, velocity) are zero.
+
+Matrices of the core's rows are kept in panels, (panels, 9 LANES): sixteen columns each, of which
+row i begins at ``16 i`` and unused ones are zero. As these places are known when this is compiled,
+a processor takes several columns at once, in loops that keep their numbers in its registers; that
+is why they are written out.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numba import njit
 
+from strapdown._kernels.given_arrays import GIVEN
+
 CORE = 9
 SIXTH = 1.0 / 6.0
-# Numbers in a line of the cache.
-LINE = 8
+# Columns of a panel, and numbers in it.
+LANES = 16
+PANEL = CORE * LANES
+# Columns of velocity and attitude, by which white noise enters; the first sensor's.
+VELOCITY, ATTITUDE, SENSORS = 3, 6, 9
+# Sensors that are taken with the core: a bias of each axis of two triads.
+WITH_CORE = 6
 
 
-@njit(cache=True)
-def padded(n):
-    """Rows and columns of a padded matrix of n states."""
-    rows = (n + 2) // 3 * 3
-    return rows, (rows + 3) // 4 * 4
+def padded_width(n: int) -> int:
+    """Columns of a matrix of dynamics of n states, which are zero beyond n."""
+    return -(-n // LANES) * LANES
+
+
+def growth_arrays(n: int) -> tuple[Any, ...]:
+    """Room for what `growth_of_step` fills, for n states.
+
+    Panels of the transition and of the lift of noise to the end of the step; per column, in rows
+    of LANES, the variance that enters by it; decay of the sensors over the step (k,), and over its
+    second half.
+    """
+    count = padded_width(n) // LANES
+    return (
+        np.zeros((count, PANEL)),
+        np.zeros((count, PANEL)),
+        np.zeros((count, LANES)),
+        np.ones(n - CORE),
+        np.ones(n - CORE),
+    )
 
 
 def growth_room(n: int) -> tuple[Any, ...]:
-    """Arrays to work in, for n states."""
-    rows, width = padded(n)
-    return side_by_side([(m, width) for m in (9, 9, 9, 9, 9, 6, 6, 9, rows)])
+    """Arrays to work in, for n states: three of panels, their fading, a covariance in panels."""
+    count = padded_width(n) // LANES
+    return (
+        np.zeros((count, PANEL)),
+        np.zeros((count, PANEL)),
+        np.zeros((count, PANEL)),
+        np.zeros((count, LANES)),
+        np.zeros((count, (n + 3) // 4 * 4, LANES)),
+    )
 
 
-def side_by_side(shapes: Sequence[tuple[int, int]]) -> tuple[Any, ...]:
-    """Return arrays of zeros in one block, each from the begin of a line of the cache on.
+@njit(**GIVEN, fastmath={"contract"}, forceinline=True)
+def driven(a, x0, x1, x2, x3, x4, x5, x6, x7, x8):
+    """Change of the core by F, whose first panel is `a`: nine numbers of nine."""
+    return (
+        a[0] * x0 + a[1] * x1 + a[2] * x2 + a[3] * x3 + a[4] * x4 + a[5] * x5,
+        a[16] * x0 + a[17] * x1 + a[18] * x2 + a[19] * x3 + a[20] * x4 + a[21] * x5,
+        a[32] * x0 + a[33] * x1 + a[34] * x2 + a[35] * x3 + a[36] * x4 + a[37] * x5,
+        (a[48] * x0 + a[49] * x1 + a[50] * x2 + a[51] * x3 + a[52] * x4 + a[53] * x5)
+        + (a[54] * x6 + a[55] * x7 + a[56] * x8),
+        (a[64] * x0 + a[65] * x1 + a[66] * x2 + a[67] * x3 + a[68] * x4 + a[69] * x5)
+        + (a[70] * x6 + a[71] * x7 + a[72] * x8),
+        (a[80] * x0 + a[81] * x1 + a[82] * x2 + a[83] * x3 + a[84] * x4 + a[85] * x5)
+        + (a[86] * x6 + a[87] * x7 + a[88] * x8),
+        a[102] * x6 + a[103] * x7 + a[104] * x8,
+        a[118] * x6 + a[119] * x7 + a[120] * x8,
+        a[134] * x6 + a[135] * x7 + a[136] * x8,
+    )
 
-    Four numbers that a processor takes at once are then never of two lines.
+
+@njit(**GIVEN, fastmath={"contract"}, forceinline=True)
+def to_third_order(x, y, z):
+    """``exp(F dt)`` and ``exp(F dt/2)``, each less one, of F dt, its square and its cube."""
+    return x + 0.5 * y + SIXTH * z, 0.5 * x + 0.125 * y + 0.125 * SIXTH * z
+
+
+@njit(**GIVEN, fastmath={"contract"}, forceinline=True)
+def series(a, one, fading, whole, half):
+    """Fill a panel of ``exp(F dt)`` and of ``exp(F dt/2)``, less one, to third order.
+
+    `one` is the panel of F dt, `a` its first panel; `fading` what decay multiplies a column by.
     """
-    sizes = [-(-a * b // LINE) * LINE for a, b in shapes]
-    whole = np.zeros(sum(sizes) + LINE)
-    at = -whole.ctypes.data % (8 * LINE) // 8
-    out = []
-    for (a, b), size in zip(shapes, sizes, strict=True):
-        out.append(whole[at : at + a * b].reshape(a, b))
-        at += size
-    return tuple(out)
+    for j in range(LANES):
+        d = fading[j]
+        x0, x1, x2 = one[j], one[16 + j], one[32 + j]
+        x3, x4, x5 = one[48 + j], one[64 + j], one[80 + j]
+        x6, x7, x8 = one[96 + j], one[112 + j], one[128 + j]
+        y0, y1, y2, y3, y4, y5, y6, y7, y8 = driven(a, x0, x1, x2, x3, x4, x5, x6, x7, x8)
+        y0, y1, y2 = y0 + d * x0, y1 + d * x1, y2 + d * x2
+        y3, y4, y5 = y3 + d * x3, y4 + d * x4, y5 + d * x5
+        y6, y7, y8 = y6 + d * x6, y7 + d * x7, y8 + d * x8
+        z0, z1, z2, z3, z4, z5, z6, z7, z8 = driven(a, y0, y1, y2, y3, y4, y5, y6, y7, y8)
+        d *= d
+        z0, z1, z2 = z0 + d * x0, z1 + d * x1, z2 + d * x2
+        z3, z4, z5 = z3 + d * x3, z4 + d * x4, z5 + d * x5
+        z6, z7, z8 = z6 + d * x6, z7 + d * x7, z8 + d * x8
+        whole[j], half[j] = to_third_order(x0, y0, z0)
+        whole[16 + j], half[16 + j] = to_third_order(x1, y1, z1)
+        whole[32 + j], half[32 + j] = to_third_order(x2, y2, z2)
+        whole[48 + j], half[48 + j] = to_third_order(x3, y3, z3)
+        whole[64 + j], half[64 + j] = to_third_order(x4, y4, z4)
+        whole[80 + j], half[80 + j] = to_third_order(x5, y5, z5)
+        whole[96 + j], half[96 + j] = to_third_order(x6, y6, z6)
+        whole[112 + j], half[112 + j] = to_third_order(x7, y7, z7)
+        whole[128 + j], half[128 + j] = to_third_order(x8, y8, z8)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def add_block(out, i, left, m, rows):
-    """Add to three rows of `out` from i on the block (i, m) of `left` times three rows from m on.
+@njit(**GIVEN, fastmath={"contract"})
+def turn_columns(panel, at, matrix):
+    """Multiply the three columns of a panel from `at` on by a matrix, (3, 3)."""
+    for i in range(at, at + PANEL, LANES):
+        x, y, z = panel[i], panel[i + 1], panel[i + 2]
+        panel[i] = x * matrix[0, 0] + y * matrix[1, 0] + z * matrix[2, 0]
+        panel[i + 1] = x * matrix[0, 1] + y * matrix[1, 1] + z * matrix[2, 1]
+        panel[i + 2] = x * matrix[0, 2] + y * matrix[1, 2] + z * matrix[2, 2]
 
-    A block of zeros costs nothing.
+
+@njit(**GIVEN, fastmath={"contract"})
+def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, room):
+    """Fill transition and noise of a step of dynamics f, (9, `padded_width`).
+
+    Of `growth` (`growth_arrays`) the transition takes the core's rows of ``exp(F dt)`` to third
+    order, as drift reaches the place through tilt and velocity, and the exact decay of the others.
+    White noise enters at the middle of the step: its covariance is
+    ``exp(F dt/2) G q G' exp(F dt/2)' dt``, which holds its correlations to second order and is
+    positive semidefinite; of it `growth` takes the factors, lift and variances. `matrix` is C_lb;
+    rows that are `still`, a bit each, take no noise. `room` is of `growth_room`.
     """
-    a0, a1, a2 = left[i, m], left[i, m + 1], left[i, m + 2]
-    b0, b1, b2 = left[i + 1, m], left[i + 1, m + 1], left[i + 1, m + 2]
-    c0, c1, c2 = left[i + 2, m], left[i + 2, m + 1], left[i + 2, m + 2]
-    if (
-        a0 != 0.0
-        or a1 != 0.0
-        or a2 != 0.0
-        or b0 != 0.0
-        or b1 != 0.0
-        or b2 != 0.0
-        or c0 != 0.0
-        or c1 != 0.0
-        or c2 != 0.0
-    ):
-        for j in range(rows.shape[1]):
-            x, y, z = rows[m, j], rows[m + 1, j], rows[m + 2, j]
-            out[i, j] += a0 * x + a1 * y + a2 * z
-            out[i + 1, j] += b0 * x + b1 * y + b2 * z
-            out[i + 2, j] += c0 * x + c1 * y + c2 * z
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def powers(f, decay, dt, one, two, three):
-    """Fill the core's rows of F dt and of its square and cube; `f` and they are (9, w)."""
-    k = decay.shape[0]
-    for i in range(CORE):
-        for j in range(f.shape[1]):
-            one[i, j] = dt * f[i, j]
-            two[i, j] = 0.0
-            three[i, j] = 0.0
-    for i in range(0, CORE, 3):
-        for m in range(0, CORE, 3):
-            add_block(two, i, one, m, one)
-    for j in range(k):
-        fading = -decay[j] * dt
-        if fading != 0.0:
-            for i in range(CORE):
-                two[i, CORE + j] += fading * one[i, CORE + j]
-                three[i, CORE + j] += fading * fading * one[i, CORE + j]
-    for i in range(0, CORE, 3):
-        for m in range(0, CORE, 3):
-            add_block(three, i, one, m, two)
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def series(one, two, three, whole, half):
-    """Fill ``exp(F dt)`` and ``exp(F dt/2)`` to third order from the powers of F dt."""
-    for i in range(CORE):
-        for j in range(one.shape[1]):
-            a, b, c = one[i, j], two[i, j], three[i, j]
-            whole[i, j] = a + 0.5 * b + SIXTH * c
-            half[i, j] = 0.5 * a + 0.125 * b + 0.125 * SIXTH * c
-        whole[i, i] += 1.0
-        half[i, i] += 1.0
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
-def weighted_by_noise(lift, at, matrix, noise, dt, turned, out, to):
-    """Fill three columns of `out` with those of `lift` from `at` on times ``C diag(noise²) C' dt``.
-
-    `turned` (6, w) is room to work in.
-    """
-    if noise[0] == noise[1] and noise[1] == noise[2]:
-        # C C' is one.
-        scale = dt * noise[0] * noise[0]
+    phi, lift, weight, tail, own = growth
+    one, _, _, fading, _ = room
+    count = phi.shape[0]
+    for p in range(count):
+        panel = one[p]
         for i in range(CORE):
-            for j in range(3):
-                out[i, to + j] = scale * lift[i, at + j]
-        return
-    for i in range(3):
-        for j in range(3):
-            total = 0.0
-            for m in range(3):
-                total += matrix[i, m] * matrix[j, m] * noise[m] * noise[m]
-            turned[i, j] = dt * total
+            row = f[i, LANES * p : LANES * p + LANES]
+            for j in range(LANES):
+                panel[LANES * i + j] = dt * row[j]
+    for s in range(decay.shape[0]):
+        p, j = (SENSORS + s) // LANES, (SENSORS + s) % LANES
+        faded = -decay[s] * dt
+        fading[p, j] = faded
+        weight[p, j] = dt * drive[s] * drive[s]
+        if faded != 0.0:
+            tail[s], own[s] = math.exp(faded), math.exp(0.5 * faded)
+    for p in range(count):
+        series(one[0], one[p], fading[p], phi[p], lift[p])
     for i in range(CORE):
-        for j in range(3):
-            out[i, to + j] = (
-                lift[i, at] * turned[0, j]
-                + lift[i, at + 1] * turned[1, j]
-                + lift[i, at + 2] * turned[2, j]
+        phi[0, (LANES + 1) * i] += 1.0
+        lift[0, (LANES + 1) * i] += 1.0
+    for j in range(3):
+        weight[0, VELOCITY + j] = dt * accel_noise[j] * accel_noise[j]
+        weight[0, ATTITUDE + j] = dt * gyro_noise[j] * gyro_noise[j]
+    # Noise that is the same in every axis of the body is so in those of the level.
+    if accel_noise[0] != accel_noise[1] or accel_noise[1] != accel_noise[2]:
+        turn_columns(lift[0], VELOCITY, matrix)
+    if gyro_noise[0] != gyro_noise[1] or gyro_noise[1] != gyro_noise[2]:
+        turn_columns(lift[0], ATTITUDE, matrix)
+    if still:
+        for i in range(CORE):
+            if still & (1 << i):
+                for p in range(count):
+                    for j in range(LANES):
+                        lift[p, LANES * i + j] = 0.0
+
+
+@njit(**GIVEN, fastmath={"contract"}, forceinline=True)
+def add_product(a, m, first, second, third, fourth, out):
+    """Add to a panel the columns m to m + 3 of panel `a` times four rows of LANES."""
+    a0, a1, a2, a3 = a[m], a[m + 1], a[m + 2], a[m + 3]
+    b0, b1, b2, b3 = a[m + 16], a[m + 17], a[m + 18], a[m + 19]
+    c0, c1, c2, c3 = a[m + 32], a[m + 33], a[m + 34], a[m + 35]
+    d0, d1, d2, d3 = a[m + 48], a[m + 49], a[m + 50], a[m + 51]
+    e0, e1, e2, e3 = a[m + 64], a[m + 65], a[m + 66], a[m + 67]
+    f0, f1, f2, f3 = a[m + 80], a[m + 81], a[m + 82], a[m + 83]
+    g0, g1, g2, g3 = a[m + 96], a[m + 97], a[m + 98], a[m + 99]
+    h0, h1, h2, h3 = a[m + 112], a[m + 113], a[m + 114], a[m + 115]
+    i0, i1, i2, i3 = a[m + 128], a[m + 129], a[m + 130], a[m + 131]
+    for j in range(LANES):
+        w, x, y, z = first[j], second[j], third[j], fourth[j]
+        out[j] += a0 * w + a1 * x + a2 * y + a3 * z
+        out[16 + j] += b0 * w + b1 * x + b2 * y + b3 * z
+        out[32 + j] += c0 * w + c1 * x + c2 * y + c3 * z
+        out[48 + j] += d0 * w + d1 * x + d2 * y + d3 * z
+        out[64 + j] += e0 * w + e1 * x + e2 * y + e3 * z
+        out[80 + j] += f0 * w + f1 * x + f2 * y + f3 * z
+        out[96 + j] += g0 * w + g1 * x + g2 * y + g3 * z
+        out[112 + j] += h0 * w + h1 * x + h2 * y + h3 * z
+        out[128 + j] += i0 * w + i1 * x + i2 * y + i3 * z
+
+
+@njit(**GIVEN, fastmath={"contract"}, forceinline=True)
+def times_covariance(phi, P, wide, out):
+    """Fill the panels of ``Phi P``; `wide` takes P in panels, (panels, rows by fours, LANES)."""
+    n = P.shape[0]
+    for p in range(wide.shape[0]):
+        end = min(n - LANES * p, LANES)
+        for m in range(n):
+            row = P[m, LANES * p : LANES * p + end]
+            for j in range(end):
+                wide[p, m, j] = row[j]
+    for p in range(wide.shape[0]):
+        part, panel = wide[p], out[p]
+        for j in range(PANEL):
+            panel[j] = 0.0
+        for q in range(phi.shape[0]):
+            at = LANES * q
+            for m in range(0, min(part.shape[0] - at, LANES), 4):
+                i = at + m
+                add_product(phi[q], m, part[i], part[i + 1], part[i + 2], part[i + 3], panel)
+
+
+@njit(**GIVEN, fastmath={"contract"}, forceinline=True)
+def core_products(a, b, c, d, P):
+    """Fill the upper half of the core of P: rows of panel a times rows of b, of c times d.
+
+    Of a and b the core's columns and six sensors', of c and d those of velocity and attitude.
+    """
+    for i in range(CORE):
+        at = LANES * i
+        a0, a1, a2, a3, a4 = a[at], a[at + 1], a[at + 2], a[at + 3], a[at + 4]
+        a5, a6, a7, a8, a9 = a[at + 5], a[at + 6], a[at + 7], a[at + 8], a[at + 9]
+        a10, a11, a12, a13, a14 = a[at + 10], a[at + 11], a[at + 12], a[at + 13], a[at + 14]
+        c3, c4, c5 = c[at + 3], c[at + 4], c[at + 5]
+        c6, c7, c8 = c[at + 6], c[at + 7], c[at + 8]
+        for k in range(i, CORE):
+            at = LANES * k
+            P[i, k] = (
+                (a0 * b[at] + a1 * b[at + 1] + a2 * b[at + 2])
+                + (a3 * b[at + 3] + a4 * b[at + 4] + a5 * b[at + 5])
+                + (a6 * b[at + 6] + a7 * b[at + 7] + a8 * b[at + 8])
+                + (a9 * b[at + 9] + a10 * b[at + 10] + a11 * b[at + 11])
+                + (a12 * b[at + 12] + a13 * b[at + 13] + a14 * b[at + 14])
+                + (c3 * d[at + 3] + c4 * d[at + 4] + c5 * d[at + 5])
+                + (c6 * d[at + 6] + c7 * d[at + 7] + c8 * d[at + 8])
             )
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, phi, tail, q, room):
-    """Fill transition and noise of a step of dynamics f, (9, w).
-
-    `phi` (9, w) takes the core's rows of ``exp(F dt)`` to third order, as drift reaches the place
-    through tilt and velocity; `tail` (k,) the exact decay of the others. `q` (rows, w) takes the
-    covariance that white noise adds, of which only the upper half is filled: it
-    enters at the middle of the step, ``exp(F dt/2) G q G' exp(F dt/2)' dt``, which holds its
-    correlations to second order and is positive semidefinite. `matrix` is C_lb; rows that are
-    `still`, a bit each, take no noise. `room` is of `growth_room`.
-    """
-    k, w = decay.shape[0], f.shape[1]
-    one, two, three, lift, weighted, across, turned, _, _ = room
-    powers(f, decay, dt, one, two, three)
-    series(one, two, three, phi, lift)
+@njit(**GIVEN, fastmath={"contract"})
+def add_column_products(a, b, scale, j, P):
+    """Add to the upper half of the core of P a column of panel a times the same of b."""
     for i in range(CORE):
-        if still & (1 << i):
-            for j in range(w):
-                lift[i, j] = 0.0
-    weighted_by_noise(lift, 3, matrix, accel_noise, dt, turned, weighted, 0)
-    weighted_by_noise(lift, 6, matrix, gyro_noise, dt, turned, weighted, 3)
-    for m in range(6):
-        for j in range(w):
-            across[m, j] = 0.0
-        for i in range(CORE):
-            across[m, i] = lift[i, 3 + m]
-    for i in range(q.shape[0]):
-        for j in range(w):
-            q[i, j] = 0.0
-    for i in range(0, CORE, 3):
-        for at in range(0, 6, 3):
-            add_block(q, i, weighted, at, across)
-    for j in range(k):
-        tail[j] = math.exp(-decay[j] * dt) if decay[j] != 0.0 else 1.0
-        if drive[j] != 0.0:
-            spread = dt * drive[j] * drive[j]
-            own = math.exp(-0.5 * decay[j] * dt)
-            for i in range(CORE):
-                share = spread * lift[i, CORE + j]
-                if share != 0.0:
-                    for m in range(CORE):
-                        q[i, m] += share * lift[m, CORE + j]
-                    q[i, CORE + j] += share * own
-            q[CORE + j, CORE + j] += spread * own * own
+        factor = scale * a[LANES * i + j]
+        for k in range(i, CORE):
+            P[i, k] += factor * b[LANES * k + j]
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def grown_covariance(P, phi, tail, q, out, room):
-    """Fill ``Phi P Phi' + Q``, exactly symmetric; all are padded, `room` is of `growth_room`.
+@njit(**GIVEN, fastmath={"contract"})
+def grown_covariance(P, growth, room):
+    """Change P to ``Phi P Phi' + Q``, exactly symmetric; `growth` is of `growth_of_step`.
 
     Return -1, or the first state whose variance is no number or negative.
     """
-    k, rows, w = tail.shape[0], P.shape[0], P.shape[1]
-    n = CORE + k
-    half, turned = room[7], room[8]
-    for i in range(rows):
-        for j in range(w):
-            turned[i, j] = 0.0
+    phi, lift, weight, tail, own = growth
+    _, half, weighted, _, wide = room
+    n, k = P.shape[0], tail.shape[0]
+    times_covariance(phi, P, wide, half)
+    noisy, entering, by = weighted[0], lift[0], weight[0]
     for i in range(CORE):
-        for j in range(n):
-            turned[j, i] = phi[i, j]
-        for j in range(w):
-            half[i, j] = 0.0
-            out[i, j] = q[i, j]
-    for i in range(0, CORE, 3):
-        for m in range(0, rows, 3):
-            add_block(half, i, phi, m, P)
-    for j in range(k):
-        turned[CORE + j, CORE + j] = tail[j]
-    for i in range(0, CORE, 3):
-        for m in range(0, rows, 3):
-            add_block(out, i, half, m, turned)
+        for j in range(LANES):
+            noisy[LANES * i + j] = entering[LANES * i + j] * by[j]
+    core_products(half[0], phi[0], noisy, entering, P)
+    for s in range(k):
+        p, j = (SENSORS + s) // LANES, (SENSORS + s) % LANES
+        if s >= WITH_CORE:
+            add_column_products(half[p], phi[p], 1.0, j, P)
+        spread, at = weight[p, j], SENSORS + s
+        for i in range(CORE):
+            P[i, at] = half[p, LANES * i + j] * tail[s]
+        for m in range(s, k):
+            P[at, SENSORS + m] *= tail[s] * tail[m]
+        if spread != 0.0:
+            add_column_products(lift[p], lift[p], spread, j, P)
+            for i in range(CORE):
+                P[i, at] += spread * own[s] * lift[p, LANES * i + j]
+            P[at, at] += spread * own[s] * own[s]
     bad = -1
     for i in range(n):
-        if i >= CORE:
-            for j in range(i, n):
-                out[i, j] = tail[i - CORE] * tail[j - CORE] * P[i, j] + q[i, j]
         for j in range(i):
-            out[i, j] = out[j, i]
-        if bad < 0 and not 0.0 <= out[i, i] < math.inf:
+            P[i, j] = P[j, i]
+        if bad < 0 and not 0.0 <= P[i, i] < math.inf:
             bad = i
     return bad
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def compose_growth(step, tail, added, phi, q, work):
-    """Let a step follow: ``phi <- step phi`` and ``q <- step q step' + added``.
+@njit(**GIVEN, fastmath={"contract"})
+def unfold_growth(growth, Phi, Q):
+    """Fill the transition and the covariance of noise of a step, (n, n) each."""
+    phi, lift, weight, tail, own = growth
+    n = Phi.shape[0]
+    for i in range(n):
+        for j in range(n):
+            p, at = j // LANES, j % LANES
+            Phi[i, j] = phi[p, LANES * i + at] if i < CORE else 0.0
+            Q[i, j] = 0.0
+        if i >= CORE:
+            Phi[i, i] = tail[i - CORE]
+    for m in range(VELOCITY, n):
+        p, at = m // LANES, m % LANES
+        spread = weight[p, at]
+        if spread != 0.0:
+            add_column_products(lift[p], lift[p], spread, at, Q)
+            if m >= SENSORS:
+                for i in range(CORE):
+                    Q[i, m] += spread * own[m - CORE] * lift[p, LANES * i + at]
+                Q[m, m] += spread * own[m - CORE] * own[m - CORE]
+    for i in range(n):
+        for j in range(i):
+            Q[i, j] = Q[j, i]
 
-    `phi`, `q` and `work` are (n, n); `step` (9, w), `tail` (k,) and `added` are of
-    `growth_of_step`.
+
+@njit(**GIVEN, fastmath={"contract"})
+def compose_growth(step, added, phi, q, work):
+    """Let a step follow: ``phi <- step phi`` and ``q <- step q step' + added``; all are (n, n).
+
+    Beyond the core `step` is diagonal.
     """
     n = phi.shape[0]
     for i in range(n):
@@ -237,9 +338,11 @@ def compose_growth(step, tail, added, phi, q, work):
                 for m in range(n):
                     total += step[i, m] * phi[m, j]
             else:
-                total = tail[i - CORE] * phi[i, j]
+                total = step[i, i] * phi[i, j]
             work[i, j] = total
-    phi[:, :] = work
+    for i in range(n):
+        for j in range(n):
+            phi[i, j] = work[i, j]
     for i in range(n):
         for j in range(n):
             total = 0.0
@@ -247,7 +350,7 @@ def compose_growth(step, tail, added, phi, q, work):
                 for m in range(n):
                     total += step[i, m] * q[m, j]
             else:
-                total = tail[i - CORE] * q[i, j]
+                total = step[i, i] * q[i, j]
             work[i, j] = total
     for i in range(n):
         for j in range(i, n):
@@ -256,5 +359,5 @@ def compose_growth(step, tail, added, phi, q, work):
                 for m in range(n):
                     total += work[i, m] * step[j, m]
             else:
-                total += work[i, j] * tail[j - CORE]
+                total += work[i, j] * step[j, j]
             q[i, j] = q[j, i] = total

@@ -7,6 +7,7 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import E2, A, radii, transport_rate
+from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.level import ALT as LEVEL_ALT
 from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L
 from strapdown._kernels.ned import (
@@ -22,7 +23,7 @@ from strapdown._kernels.ned import (
 from strapdown._kernels.rotation import quat_from_rotvec, quat_multiply, quat_normalise
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def ned_levels(history, earth, out):
     """Fill level rows from rows of a history."""
     for i in range(history.shape[0]):
@@ -40,7 +41,7 @@ def ned_levels(history, earth, out):
         )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def ned_correct(row, error, earth):
     """Take an error off the place, velocity and attitude of a row of a history, in place.
 
@@ -66,3 +67,10 @@ def ned_correct(row, error, earth):
     row[LAT], row[LON], row[ALT] = row[LAT] + dlat, row[LON] + dlon, alt + dalt
     row[V], row[V + 1], row[V + 2] = vn, ve, vd
     row[Q], row[Q + 1], row[Q + 2], row[Q + 3] = bw, bx, by, bz
+
+
+@njit(**GIVEN)
+def ned_correct_rows(rows, errors, earth):
+    """Take an error off each row, in place."""
+    for i in range(rows.shape[0]):
+        ned_correct(rows[i], errors[i], earth)

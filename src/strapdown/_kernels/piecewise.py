@@ -27,6 +27,23 @@ def panel_of(edges, t, guess):
 
 
 @njit(cache=True)
+def lines(knots, values, time, out):
+    """Rows between rows of `values`, (p, m), on straight lines; the outermost ones go on."""
+    k, last = 0, knots.shape[0] - 2
+    usual = (knots[last + 1] - knots[0]) / (last + 1)
+    for i in range(time.shape[0]):
+        t = time[i]
+        # Knots are mostly even, and many from one instant to the next.
+        guess = min(max(k + int((t - knots[k]) / usual), 0), last)
+        if guess > 0 and knots[guess] > t:
+            guess -= 1
+        k = panel_of(knots, t, guess)
+        share = (t - knots[k]) / (knots[k + 1] - knots[k])
+        for j in range(values.shape[1]):
+            out[i, j] = values[k, j] + share * (values[k + 1, j] - values[k, j])
+
+
+@njit(cache=True)
 def legendre_sums(edges, before, series, time, out):
     """Fill ``out = before + series`` at each instant by Clenshaw's recursion.
 

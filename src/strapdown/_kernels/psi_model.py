@@ -15,7 +15,8 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
-from strapdown._kernels.growth import CORE, compose_growth, growth_of_step
+from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.growth import CORE, compose_growth, growth_of_step, unfold_growth
 from strapdown._kernels.level import ALT, AXIS, OMEGA_EL, Q_LB, curvatures
 from strapdown._kernels.rotation import dcm_from_quat
 from strapdown._kernels.rotation_vector import cross
@@ -35,7 +36,7 @@ def minus_cross(f, row, column, x, y, z):
     f[row + 2, column], f[row + 2, column + 1] = y, -x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def gravity_gradient(f, row, column, level, up, earth):
     """Set the block at (row, column) to the change of gravity, as a vector, with the place.
 
@@ -75,7 +76,7 @@ def gravity_gradient(f, row, column, level, up, earth):
     return g
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def couple(f, row, matrix, terms, rate, force):
     """Add to the sensors' columns of three rows ``matrix @ coupling(rate, force)``.
 
@@ -93,7 +94,7 @@ def couple(f, row, matrix, terms, rate, force):
             f[row + i, j] += weight * matrix[i, axis]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held, earth):
     """Fill the first nine rows of F, (9, w).
 
@@ -121,11 +122,11 @@ def psi_dynamics(f, level, up, matrix, specific, rate, force, gyro, accel, held,
         for i in range(3, 5):
             for j in range(2):
                 f[i, j] *= bearing
-        f[2, :] = 0.0
-        f[5, :] = 0.0
+        for j in range(f.shape[1]):
+            f[2, j] = f[5, j] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def means_of_steps(states, q_at, rows, at, longest, matrix):
     """Fill `matrix` (6, 3) with means over the steps from `at` on, up to `longest` seconds.
 
@@ -175,7 +176,7 @@ def means_of_steps(states, q_at, rows, at, longest, matrix):
     return end, dt
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**GIVEN)
 def psi_transitions(
     levels,
     rows,
@@ -193,8 +194,8 @@ def psi_transitions(
     q,
     f,
     step,
-    tail,
     added,
+    growth,
     room,
     work,
     matrix,
@@ -203,8 +204,8 @@ def psi_transitions(
 
     `levels` are level rows at both sides of every step; steps are taken together up to `longest`
     seconds, with the means of attitude, force and rate over them. `gyro` and `accel` are terms of
-    couplings (`couple`). The rest is room to work in: `f` and `step` (9, w), `tail` (k,), `added`
-    (rows, w), `room` of `growth.growth_room`, `work` (n, n), `matrix` (6, 3).
+    couplings (`couple`). The rest is room to work in: `f` (9, `growth.padded_width`); `step`,
+    `added` and `work` (n, n); `growth` and `room` of `growth`; `matrix` (6, 3).
     """
     n = phi.shape[0]
     for i in range(n):
@@ -221,8 +222,7 @@ def psi_transitions(
         psi_dynamics(
             f, middle, up, matrix, matrix[3], matrix[4], matrix[5], gyro, accel, held, earth
         )
-        growth_of_step(
-            f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, step, tail, added, room
-        )
-        compose_growth(step, tail, added, phi, q, work)
+        growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, still, growth, room)
+        unfold_growth(growth, step, added)
+        compose_growth(step, added, phi, q, work)
         at = end

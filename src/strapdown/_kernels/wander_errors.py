@@ -25,7 +25,7 @@ import math
 from numba import njit
 
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_parts, radii
-from strapdown._kernels.growth import compose_growth, growth_of_step
+from strapdown._kernels.growth import compose_growth, growth_of_step, unfold_growth
 from strapdown._kernels.level import ALT, AXIS, LEVEL, OMEGA_EL, Q_LB, V_L, curvatures
 from strapdown._kernels.psi_model import couple, means_of_steps, minus_cross
 
@@ -166,8 +166,8 @@ def wander_transitions(
     q,
     f,
     step,
-    tail,
     added,
+    growth,
     room,
     work,
     matrix,
@@ -204,11 +204,10 @@ def wander_transitions(
             matrix[9:12],
             matrix[12:15],
         )
-        growth_of_step(
-            f, decay, dt, matrix, gyro_noise, accel_noise, drive, 0, step, tail, added, room
-        )
+        growth_of_step(f, decay, dt, matrix, gyro_noise, accel_noise, drive, 0, growth, room)
+        unfold_growth(growth, step, added)
         if held:
             for j in range(n):
                 added[DV + 2, j] = added[j, DV + 2] = 0.0
-        compose_growth(step, tail, added, phi, q, work)
+        compose_growth(step, added, phi, q, work)
         at = end

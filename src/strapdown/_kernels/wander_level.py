@@ -27,6 +27,7 @@ from strapdown._kernels.wander import (
     Q_IB,
     Q_WB,
     SPIN,
+    STATE,
     V,
     put,
 )
@@ -204,3 +205,15 @@ def wander_correct(state, error, earth):
     put(state, LOW_IB, (0.0, 0.0, 0.0, 0.0))
     sine = earth_axis(state[0], state[1], state[2], state[3])[2]
     state[PRIME] = 1.0 / math.sqrt(1.0 - e2 * sine * sine)
+
+
+@njit(cache=True, error_model="numpy")
+def wander_correct_rows(rows, errors, earth):
+    """Take an error off each row of a history, in place."""
+    state = np.zeros(STATE)
+    # Of the Earth's turn since the start, which only the memory of the kernel needs.
+    state[SPIN] = 1.0
+    for i in range(rows.shape[0]):
+        state[: rows.shape[1]] = rows[i]
+        wander_correct(state, errors[i], earth)
+        rows[i] = state[: rows.shape[1]]

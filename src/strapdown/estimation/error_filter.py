@@ -291,7 +291,7 @@ class ErrorFilter:
         state: FilterState,
         observations: Sequence[Observation],
         rules: Sequence[Rules] | None = None,
-    ) -> tuple[FilterState, list[Innovations]]:
+    ) -> tuple[FilterState, Array, list[Innovations]]:
         """Take the observations of an epoch, and take off what they tell of the errors.
 
         Parameters
@@ -306,13 +306,15 @@ class ErrorFilter:
         Returns
         -------
         state : FilterState
+        taken : ndarray, (p,)
+            The physical errors that were taken off.
         innovations : list of Innovations
             Of each observation.
         """
         to_physical = self.model.to_physical(self.mechanization, state.time, state.row)
         x = np.zeros(to_physical.shape[1])
         after, x, seen = self.estimate(state, x, observations, rules)
-        return self._fed_back(after, to_physical, x), seen
+        return self._fed_back(after, to_physical, x), to_physical @ x, seen
 
     def estimate(
         self,
@@ -352,8 +354,11 @@ class ErrorFilter:
 
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
+        P = self.form.matrix(state.covariance)
+        if self.model.states_are_physical:
+            return P
         T = self.model.to_physical(self.mechanization, state.time, state.row)
-        return symmetric(T @ self.form.matrix(state.covariance) @ T.T)
+        return symmetric(T @ P @ T.T)
 
     def _transition(self, segment: Segment) -> tuple[Array, Array]:
         """How errors go over a segment."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown._kernels import wander_error_states as states
 from strapdown._kernels import wander_errors as kernel
-from strapdown._kernels.growth import growth_room, padded
+from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import (
@@ -55,7 +55,10 @@ class QuaternionModel(ErrorModel):
     """
 
     name: ClassVar[str] = "quaternions"
-    summary: ClassVar[str] = "17 states: velocity and two quaternions by components, biases"
+    summary: ClassVar[str] = (
+        "17 states: velocity and two quaternions by components, biases; none of the height, which "
+        "no aid corrects"
+    )
     source: ClassVar[str] = "Chernodarov (2009) (3)"
     has_height: ClassVar[bool] = False
     core: ClassVar[tuple[StateBlock, ...]] = (
@@ -85,7 +88,6 @@ class QuaternionModel(ErrorModel):
         levels = used.levels(segment.history)
         phi, q = np.empty((n, n)), np.empty((n, n))
         sensors = self.stacked
-        rows, width = padded(n)
         earth = find_ellipsoid(used.ellipsoid).parameters()
         kernel.wander_transitions(
             levels,
@@ -101,10 +103,10 @@ class QuaternionModel(ErrorModel):
             earth,
             phi,
             q,
-            np.empty((PHYSICAL, width)),
-            np.empty((PHYSICAL, width)),
-            np.empty(k),
-            np.empty((rows, width)),
+            np.empty((PHYSICAL, padded_width(n))),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            growth_arrays(n),
             growth_room(n),
             np.empty((n, n)),
             np.empty((15, 3)),

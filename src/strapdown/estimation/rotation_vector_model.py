@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels import psi_model as kernel
-from strapdown._kernels.growth import growth_room, padded
+from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_model import (
     PHYSICAL,
@@ -60,10 +60,8 @@ class RotationVectorModel(ErrorModel):
         used = segment.mechanization
         refuse_damped_height(used)
         n = self.layout.size
-        k = n - PHYSICAL
         phi, q = np.empty((n, n)), np.empty((n, n))
         sensors = self.stacked
-        rows, width = padded(n)
         kernel.psi_transitions(
             used.levels(segment.history),
             segment.increments,
@@ -79,10 +77,10 @@ class RotationVectorModel(ErrorModel):
             find_ellipsoid(used.ellipsoid).parameters(),
             phi,
             q,
-            np.empty((PHYSICAL, width)),
-            np.empty((PHYSICAL, width)),
-            np.empty(k),
-            np.empty((rows, width)),
+            np.empty((PHYSICAL, padded_width(n))),
+            np.empty((n, n)),
+            np.empty((n, n)),
+            growth_arrays(n),
             growth_room(n),
             np.empty((n, n)),
             np.empty((6, 3)),

@@ -23,7 +23,7 @@ from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
-__all__ = ["STATED_STATES", "stated_states"]
+__all__ = ["STATED_STATES", "stated_states", "states_that_are_stated"]
 
 #: By name of the block: triad, attribute of its uncertainty, what makes the block of it, and the
 #: key of [sensors.gyro] or [sensors.accel] that states it.
@@ -84,6 +84,28 @@ def stated_states(
             raise ConfigError(f"'{name}' stands there twice", quantity="states", remedy="keep one")
         out.append(_block(name, sensors, bounds, names))
     return tuple(out)
+
+
+def states_that_are_stated(sensors: ImuUncertainty) -> tuple[str, ...]:
+    """Return those of `STATED_STATES` whose size is stated: all that can be estimated.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of str
+    """
+    return tuple(
+        name
+        for name, (triad, attribute, _, _) in STATED_STATES.items()
+        if any(_size(name, sensors))
+        and (
+            attribute != "drift"
+            or math.isfinite(getattr(sensors, f"{triad}_drift").correlation_time)
+        )
+    )
 
 
 def _block(

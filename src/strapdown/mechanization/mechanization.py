@@ -26,7 +26,7 @@ from strapdown._kernels.ned import (
     V,
     reverse_increments,
 )
-from strapdown._kernels.ned_level import ned_correct, ned_levels
+from strapdown._kernels.ned_level import ned_correct, ned_correct_rows, ned_levels
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, DataError, DivergenceError, Finding, nearest
@@ -182,6 +182,24 @@ class Mechanization(ABC):
         after = state.copy()
         earth = find_ellipsoid(self.ellipsoid).parameters()
         ned_correct(after, np.asarray(error, dtype=np.float64), earth)
+        return after
+
+    def corrected_history(self, history: Array, errors: Array) -> Array:
+        """Take an error off each row of a history.
+
+        Parameters
+        ----------
+        history : ndarray, (n, `row`)
+            It is not changed.
+        errors : ndarray, (n, 9)
+            As `correct`, in level axes of each row.
+
+        Returns
+        -------
+        ndarray, (n, `row`)
+        """
+        after = np.array(history)
+        ned_correct_rows(after, errors, find_ellipsoid(self.ellipsoid).parameters())
         return after
 
     def nav_state(self, state: Array, time: float) -> NavState:

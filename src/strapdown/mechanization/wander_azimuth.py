@@ -130,6 +130,12 @@ class WanderAzimuth(Mechanization):
         level.wander_correct(after, np.asarray(error, dtype=np.float64), earth)
         return after
 
+    def corrected_history(self, history: Array, errors: Array) -> Array:
+        """Take an error off each row of a history, as `Mechanization.corrected_history`."""
+        after = np.array(history)
+        level.wander_correct_rows(after, errors, find_ellipsoid(self.ellipsoid).parameters())
+        return after
+
     def nav_state(self, state: Array, time: float) -> NavState:
         """Return the place, velocity and attitude of a state, as `Mechanization.nav_state`."""
         place = np.empty((1, 10))

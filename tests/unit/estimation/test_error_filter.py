@@ -74,12 +74,10 @@ def test_errors_that_samples_have_are_taken_off_increments():
     true = moving()
     wrong = true.copy()
     wrong.attrs = dict(true.attrs)
-    # The errors are shares of what is measured: m = true + E m.
-    rate, force = true[GYRO].to_numpy(), true[ACCEL].to_numpy()
-    for _ in range(20):
-        weights = np.column_stack([np.ones(len(true)), rate, force])
-        rate = true[GYRO].to_numpy() + np.einsum("ni,ijk,k->nj", weights, gyro, states)
-        force = true[ACCEL].to_numpy() + np.einsum("ni,ijk,k->nj", weights, accel, states)
+    # The errors are shares of the truth, as in the chain of errors: m = true + b + E true.
+    weights = np.column_stack([np.ones(len(true)), true[GYRO].to_numpy(), true[ACCEL].to_numpy()])
+    rate = true[GYRO].to_numpy() + np.einsum("ni,ijk,k->nj", weights, gyro, states)
+    force = true[ACCEL].to_numpy() + np.einsum("ni,ijk,k->nj", weights, accel, states)
     wrong[GYRO], wrong[ACCEL] = rate, force
     _, wanted = increments_of(true)
     _, given = increments_of(wrong)
@@ -115,7 +113,7 @@ def test_a_perfect_observation_takes_an_error_off(mechanization, model):
     turn = np.kron(np.eye(3), mechanization.level_from_ned(row))
     z = turn @ state_error(there, START)
     observation = Observation("all", z[rows], np.eye(size)[rows], np.full(len(rows), 1e-12), ())
-    after, (seen,) = filter_.observe(state, [observation])
+    after, _, (seen,) = filter_.observe(state, [observation])
     left = state_error(mechanization.nav_state(after.mechanization, 0.0), START)
     # The second order of 3e-3 rad, 50 m / 6.4e6 m and their products.
     assert np.abs(left[:3]).max() < 1e-3
@@ -137,7 +135,7 @@ def test_what_is_nothing_physical_stays_at_zero(mechanization, model):
         state, _ = filter_.predict(state, time[at : at + 100], rows[at : at + 100])
         H = np.eye(size)[3:6]
         z = np.array([0.3, -0.2, 0.1])
-        state, _ = filter_.observe(state, [Observation("v", z, H, np.full(3, 1e-2), ())])
+        state, _, _ = filter_.observe(state, [Observation("v", z, H, np.full(3, 1e-2), ())])
     P = filter_.form.matrix(state.covariance)
     T = filter_.model.to_physical(mechanization, state.time, state.row)
     E = filter_.model.from_physical(mechanization, state.time, state.row)
@@ -189,3 +187,17 @@ def test_every_mechanization_tells_what_a_filter_needs():
         axis = C @ [np.cos(lat), 0.0, -np.sin(lat)]
         np.testing.assert_allclose(level[7:10], axis, atol=1e-15)
         assert C[2, 2] == pytest.approx(-used.level_up)
+
+
+def test_what_a_bias_and_a_scale_factor_share_is_not_seen():
+    """By how much an input that stays is corrected is the same wherever the two share it."""
+    gyro, accel, *_ = stack((accel_bias(1.0), accel_scale(1.0)))
+    force, dt = -9.8, 0.01
+    row = np.array([[dt, 0, 0, 0, 0, 0, (force + 0.5) * dt, 0, 0, 0.5 * (force + 0.5) * dt**2]])
+    for scale in (0.0, -0.03, 0.05, 0.1):
+        states = np.array([0.0, 0.0, 0.5 - scale * force, 0.0, 0.0, scale])
+        out = np.empty_like(row)
+        compensate(row, gyro @ states, accel @ states, out)
+        # The rounds leave the sixth power of the scale factor of the input; shares of the reading
+        # would leave the share of what is taken off, 0.1 x 0.5 m/s² and more.
+        assert abs(out[0, 6] / dt - force) < 10.0 * 0.1**6 * 16.0 + 1e-12, scale

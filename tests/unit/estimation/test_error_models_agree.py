@@ -163,7 +163,7 @@ def test_two_filters_tell_the_same():
             state, _ = used.predict(state, 0.02 * np.arange(50 * k + 1, 50 * k + 51), wrong[part])
             z = physical_error(state.row, truth[50 * (k + 1)], WGS84)[seen] + noise[k]
             H = np.eye(model.physical_size)[seen]
-            state, _ = used.observe(state, [Observation("receiver", z, H, R, ("",) * 4)])
+            state, _, _ = used.observe(state, [Observation("receiver", z, H, R, ("",) * 4)])
         P_end = used.physical_covariance(state)
         ends.append((state, np.sqrt(np.diag(P_end))))
     (ours, sd), (theirs, sd_theirs) = ends
