@@ -36,6 +36,13 @@ class Alignment:
         Whether the heading owes nothing to the gyros: it was stated, or is that of a course.
     measured_latitude_deg, measured_latitude_sd_deg : float, deg, optional
         Where the method tells it without the site's: from gravity and the Earth's rate.
+    velocity : ndarray, (3,), m/s, optional
+        North, east, down, where the method tells it.
+    joint : ndarray, (12, 12), optional
+        Covariance of the errors of velocity, of the rotation as above, and of gyros and
+        accelerometers, SI, where the method tells how they go together: with a bias that is not
+        known an attitude errs the way the bias turned it. Errors are computed less true, those of
+        the sensors what they still read too much: bias less estimate.
     findings : tuple of Finding
         Assumptions that do not hold, and what the sensors cannot tell.
     """
@@ -51,6 +58,8 @@ class Alignment:
     heading_given: bool = False
     measured_latitude_deg: float | None = None
     measured_latitude_sd_deg: float | None = None
+    velocity: Array | None = None
+    joint: Array | None = None
     findings: tuple[Finding, ...] = field(default=())
 
     @property
@@ -65,3 +74,23 @@ class Alignment:
         Near a pitch of ±90° those of roll and heading grow without bound.
         """
         return rotation.euler_sd(self.roll_pitch_heading, self.covariance)
+
+    def sd_deg_after(self, seconds: float) -> Array:
+        """Standard deviations of roll, pitch and heading when the gyros have carried them on.
+
+        Parameters
+        ----------
+        seconds : float, s
+
+        Returns
+        -------
+        ndarray, (3,), deg
+            With what an unknown bias of the gyros turns meanwhile, where the method tells of it;
+            else those of now.
+        """
+        if self.joint is None:
+            return self.sd_deg
+        carry = np.zeros((3, len(self.joint)))
+        carry[:, 3:6] = np.eye(3)
+        carry[:, 6:9] = rotation.dcm_from_quaternion(self.q_nb) * seconds
+        return rotation.euler_sd(self.roll_pitch_heading, carry @ self.joint @ carry.T)

@@ -1,4 +1,4 @@
-"""Fixes of a drive laid on the stamps of its inertial record."""
+"""Velocities of the fixes of a drive, and which of them have a course."""
 
 from __future__ import annotations
 
@@ -8,56 +8,82 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
-from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.exceptions import DataError
-from strapdown.increments import motion_increments
-from strapdown.tables import DV, VELOCITY, VELOCITY_SD, check_gnss
+from strapdown.tables import VELOCITY, VELOCITY_SD, check_gnss
 from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
 
-__all__ = ["CourseFixes", "course_fixes"]
+__all__ = ["Antenna", "CourseFixes", "course_fixes"]
+
+#: No receiver knows a velocity better, m/s.
+LEAST_SD = 1e-6
+
+
+@dataclass(frozen=True)
+class Antenna:
+    """Where a receiver measures, and when.
+
+    Attributes
+    ----------
+    lever_arm : triad, m
+        From the inertial sensors, body axes.
+    velocity_delay : float, s
+        By which a stated velocity is older than its stamp.
+    time_offset_sd : float, s
+        By which all stamps may be wrong.
+    """
+
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity_delay: float = 0.0
+    time_offset_sd: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class CourseFixes:
-    """Fixes fast enough to have a course, at the inertial samples next to them.
+    """Fixes with a velocity during an inertial record.
 
     Attributes
     ----------
     time : ndarray, (k,), s
-        Of the samples.
-    velocity : ndarray, (k, 3), m/s
-        North, east, down, between the fixes along lines.
-    velocity_sd : ndarray, (k,), m/s
-        Horizontal, of the worse axis.
-    course, course_sd : ndarray, (k,), rad
-    turned : ndarray, (k, 4)
-        From the body's axes into those at the first sample, held still in inertial space.
-    turned_end : ndarray, (4,)
-        At the last sample.
-    gained : ndarray, (k, 3), m/s
-        Integral of the specific force, in the axes at the first sample.
+        At which the velocities hold.
+    velocity, sd : ndarray, (k, 3), m/s
+        North, east, down. The standard deviation of the last may be infinite.
+    fast : ndarray of bool, (k,)
+        Whether they are fast enough to have a course.
+    row : ndarray of int, (k,)
+        Of the table, from 1.
     source : str, optional
         Of the fixes.
     """
 
     time: Array
     velocity: Array
-    velocity_sd: Array
-    course: Array
-    course_sd: Array
-    turned: Array
-    turned_end: Array
-    gained: Array
+    sd: Array
+    fast: NDArray[np.bool_]
+    row: NDArray[np.int64]
     source: str | None
+
+    def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
+        """Some of them."""
+        return CourseFixes(
+            self.time[rows],
+            self.velocity[rows],
+            self.sd[rows],
+            self.fast[rows],
+            self.row[rows],
+            self.source,
+        )
 
 
 def course_fixes(
-    imu: pd.DataFrame, gnss: pd.DataFrame | None, least_speed: float, largest_sd: float
+    imu: pd.DataFrame,
+    gnss: pd.DataFrame | None,
+    least_speed: float,
+    largest_sd: float,
+    velocity_delay: float = 0.0,
 ) -> CourseFixes:
-    """Take the fixes of a record that have a course.
+    """Take the fixes with a velocity of a record that ends while it drives.
 
     Parameters
     ----------
@@ -65,17 +91,18 @@ def course_fixes(
     gnss : DataFrame, optional
     least_speed : float, m/s
     largest_sd : float, rad
+        Of a course by the noise of the receiver.
+    velocity_delay : float, s
 
     Returns
     -------
     CourseFixes
-        The longest run of fixes at speed that ends with the record.
 
     Raises
     ------
     DataError
         There is no Gnss table, fewer than two fixes with a velocity during the record, or the
-        last of them are too slow.
+        last two of them are too slow.
     """
     if gnss is None:
         raise DataError(
@@ -86,16 +113,16 @@ def course_fixes(
         )
     check_gnss(gnss)
     source = source_of(gnss)
-    stamps = imu.index.to_numpy(dtype=np.float64)
-    time = gnss.index.to_numpy(dtype=np.float64)
+    first, last = float(imu.index[0]), float(imu.index[-1])
+    time = gnss.index.to_numpy(dtype=np.float64) - velocity_delay
     velocity = gnss[VELOCITY].to_numpy(dtype=np.float64)
-    sd = gnss[VELOCITY_SD].to_numpy(dtype=np.float64)[:, :2].max(axis=1)
-    good = (time >= stamps[0]) & (time <= stamps[-1]) & (gnss["quality"].to_numpy() > 0.0)
+    sd = gnss[VELOCITY_SD].to_numpy(dtype=np.float64)
+    good = (time >= first) & (time <= last) & (gnss["quality"].to_numpy() > 0.0)
     timely = int(good.sum())
-    good &= np.isfinite(sd)
+    good &= np.isfinite(sd[:, :2]).all(axis=1)
     if good.sum() < 2:
         raise DataError(
-            f"fixes between {stamps[0]:.6g} and {stamps[-1]:.6g} s of the inertial "
+            f"fixes between {first:.6g} and {last:.6g} s of the inertial "
             f"record: {timely}, and with a velocity that has a standard deviation: "
             f"{int(good.sum())}; two are needed",
             file=source,
@@ -104,47 +131,20 @@ def course_fixes(
             "use a receiver that measures velocity",
         )
     rows = np.flatnonzero(good)
-    time, velocity, sd = time[rows], velocity[rows], sd[rows]
+    time, velocity, sd = time[rows], velocity[rows], np.maximum(sd[rows], LEAST_SD)
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    course_sd = sd / np.maximum(speed, 1e-9)
-    slow = (speed < least_speed) | (course_sd > largest_sd)
-    if slow[-1] or (len(slow) > 1 and slow[-2]):
-        k = len(slow) - 1 if slow[-1] else len(slow) - 2
+    course_sd = sd[:, :2].max(axis=1) / np.maximum(speed, 1e-9)
+    fast = (speed >= least_speed) & (course_sd <= largest_sd)
+    if not fast[-2:].all():
+        k = len(fast) - 2 + int(np.flatnonzero(~fast[-2:])[-1])
         raise DataError(
             f"the vehicle moves at {speed[k]:.3g} m/s at {time[k]:.6g} s (standard deviation "
-            f"{sd[k]:.2g}): its course is known to {np.degrees(min(course_sd[k], np.pi)):.3g} "
-            f"deg; at least {least_speed:g} m/s and {np.degrees(largest_sd):.3g} deg are needed",
+            f"{sd[k, :2].max():.2g}): its course is known to "
+            f"{np.degrees(min(course_sd[k], np.pi)):.3g} deg; at least {least_speed:g} m/s and "
+            f"{np.degrees(largest_sd):.3g} deg are needed",
             file=source,
             row=int(rows[k]) + 1,
             quantity="VN, VE",
             remedy="align over a stretch that ends while it drives, or at rest by another method",
         )
-    keep = int(np.flatnonzero(slow)[-1]) + 1 if slow.any() else 0
-    # The sample at or after a fix, and before the last fix: velocities lie between two fixes.
-    at = np.minimum(
-        np.searchsorted(stamps, time[keep:]),
-        np.searchsorted(stamps, time[-1], side="right") - 1,
-    )
-    at, kept = np.unique(at, return_index=True)
-    if len(at) < 2:
-        raise DataError(
-            f"{len(at)} inertial samples lie between the fixes",
-            file=source_of(imu),
-            quantity="time",
-            remedy="use an inertial record that is faster than the fixes",
-        )
-    there = np.column_stack([np.interp(stamps[at], time, v) for v in velocity.T])
-    sums = sum_inertially(imu)
-    dv = np.ascontiguousarray(motion_increments(imu)[DV].to_numpy(dtype=np.float64))
-    gained = np.vstack([np.zeros((1, 3)), np.cumsum(rotation.rotate(sums.turned[:-1], dv), 0)])
-    return CourseFixes(
-        stamps[at],
-        there,
-        sd[keep:][kept],
-        np.arctan2(there[:, 1], there[:, 0]),
-        course_sd[keep:][kept],
-        sums.turned[at],
-        sums.turned[-1],
-        gained[at],
-        source,
-    )
+    return CourseFixes(time, velocity, sd, fast, rows + 1, source)

@@ -49,7 +49,7 @@ def settled_epoch(
     else:
         state, _ = filter_.predict(state, time, rows)
     others = still_observations(filter_, state, home, standing, observe)
-    state, several = filter_.observe(state, others)
+    state, _, several = filter_.observe(state, others)
     seen |= {one.name: (one, of) for one, of in zip(others, several, strict=True)}
     return state, seen
 

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.alignment.course_fixes import CourseFixes
-from strapdown.exceptions import Finding
+from strapdown.alignment.drive_sums import DriveSums
+from strapdown.exceptions import DataError
 from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ CLEAR = 5.0
 LEAST_STEPS = 6
 
 
-def check_forward(imu: pd.DataFrame, fixes: CourseFixes, reverse: bool) -> tuple[Finding, ...]:
+def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, reverse: bool) -> None:
     """Compare the force along the forward axis with the change of the speed.
 
     Parameters
@@ -28,41 +28,42 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, reverse: bool) -> tuple
     imu : DataFrame
         For its name.
     fixes : CourseFixes
+    sums : DriveSums
+        At the fixes.
     reverse : bool
         What was taken.
 
-    Returns
-    -------
-    tuple of Finding
-        One, where the force falls while the vehicle gains speed. Without six steps from fix to
-        fix, or without changes of speed, nothing can be said.
+    Raises
+    ------
+    DataError
+        The force falls while the vehicle gains speed. Without six steps from fix to fix, or
+        without changes of speed, nothing can be said.
     """
-    if len(fixes.time) <= LEAST_STEPS:
-        return ()
+    fast = fixes.fast
+    if fast.sum() <= LEAST_STEPS:
+        return
+    fixes, gained, turned = fixes.only(fast), sums.gained[fast], sums.turned[fast]
     steps = np.diff(fixes.time)
     speed = np.hypot(fixes.velocity[:, 0], fixes.velocity[:, 1])
     gain = np.diff(speed) / steps * (-1.0 if reverse else 1.0)
-    force = np.diff(fixes.gained, axis=0) / steps[:, None]
+    force = -np.diff(gained, axis=0) / steps[:, None]
     # Body axes at the end of each step, near enough to those within it for a sign.
-    forward = rotation.rotate(rotation.conjugate(fixes.turned[1:]), force)[:, 0]
+    forward = np.einsum("ki,ki->k", turned[1:, :, 0], force)
     x, y = gain - gain.mean(), forward - forward.mean()
     power = float(x @ x)
     if power == 0.0:
-        return ()
+        return
     slope = float(x @ y) / power
     left = y - slope * x
     sd = float(np.sqrt(left @ left / (len(x) - 2) / power))
     if not (slope < 0.0 and abs(slope) > CLEAR * sd):
-        return ()
-    return (
-        Finding(
-            f"the force along the forward axis falls by {-slope:.2g} m/s² per m/s² by which the "
-            f"vehicle gains speed (standard deviation {sd:.1g}): it drives the other way round "
-            "than taken",
-            file=source_of(imu),
-            quantity="heading",
-            remedy="state reverse = "
-            + ("false" if reverse else "true")
-            + ", or mend the mounting: the heading may be wrong by 180 deg",
-        ),
+        return
+    raise DataError(
+        f"the force along the forward axis falls by {-slope:.2g} m/s² per m/s² by which the "
+        f"vehicle gains speed (standard deviation {sd:.1g}): it drives the other way round "
+        "than taken",
+        file=source_of(imu),
+        quantity="heading",
+        remedy=f"state reverse = {'false' if reverse else 'true'}, or mend the mounting: the "
+        "heading would be wrong by 180 deg",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -13,23 +13,24 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.coarse import CoarseAlignment
-from strapdown.alignment.course_fixes import CourseFixes, course_fixes
-from strapdown.alignment.forward_sign import check_forward
-from strapdown.alignment.mean_errors import force_covariance
+from strapdown.alignment.course_fit import CourseModel
+from strapdown.alignment.course_fixes import Antenna, course_fixes
+from strapdown.alignment.course_rests import rest_rates
+from strapdown.alignment.course_search import CourseSearch, left_out
 from strapdown.alignment.record_checks import check_record
 from strapdown.alignment.site import Site
-from strapdown.alignment.tilt_and_heading import error_of_force_and_heading
-from strapdown.earth import transport_rate
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.tables.checks import is_number, source_of
+from strapdown.tables.checks import is_number
 
 Array = NDArray[np.float64]
 
 __all__ = ["GnssCourse"]
 
-#: What the horizontal part of a force may err by, as a part of the whole, rad.
+#: What the level may err by, rad: beyond it errors of attitude are no longer small.
 LARGEST_TILT_SD = 0.35
+#: Part of a sideslip that changes from second to second, beside what stays.
+SLIP_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,9 @@ class GnssCourse(CoarseAlignment):
         Of a course by the noise of the receiver; more is refused.
     reverse : bool
         It drives backward.
+    axle_sd : float, m
+        How far the unit may be ahead of the axle that is not steered, or behind it: what is off it
+        goes aside while the vehicle turns.
 
     Raises
     ------
@@ -66,6 +70,7 @@ class GnssCourse(CoarseAlignment):
     least_speed: float = 2.0
     largest_sd_deg: float = 10.0
     reverse: bool = False
+    axle_sd: float = field(default=1.0, metadata={"unit": "m"})
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -74,6 +79,7 @@ class GnssCourse(CoarseAlignment):
             ("sideslip_sd_deg", 0.0),
             ("least_speed", 0.0),
             ("largest_sd_deg", 0.0),
+            ("axle_sd", 0.0),
         ):
             value = getattr(self, name)
             if not (is_number(value) and math.isfinite(value) and value >= least):
@@ -89,8 +95,16 @@ class GnssCourse(CoarseAlignment):
         site: Site,
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None = None,
+        antenna: Antenna = Antenna(),  # noqa: B008
     ) -> Alignment:
-        """As `CoarseAlignment.align`; the gyros carry the attitude from the fixes to the end.
+        """As `CoarseAlignment.align`, with velocity and biases.
+
+        Parameters
+        ----------
+        imu, site, sensors, gnss
+            As there.
+        antenna : Antenna
+            Where and when the receiver measures.
 
         Raises
         ------
@@ -99,112 +113,37 @@ class GnssCourse(CoarseAlignment):
             is too slow, or what is known of the accelerations leaves no level.
         """
         findings = check_record(imu)
-        source = source_of(imu)
-        fixes = course_fixes(imu, gnss, self.least_speed, math.radians(self.largest_sd_deg))
-        first = _window(fixes, sensors)
-        force_b, force_n, force_sd = _forces(fixes, first, site, sensors)
-        if not force_sd / np.linalg.norm(force_n) < LARGEST_TILT_SD:
+        slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
+        fixes = course_fixes(imu, gnss, slowest, widest, antenna.velocity_delay)
+        rests = rest_rates(imu, fixes, sensors)
+        yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
+        slip = math.radians(self.sideslip_sd_deg)
+        yaw_sd = math.hypot(slip, math.radians(self.mounting_yaw_sd_deg))
+        model = CourseModel(self.reverse, yaw, yaw_sd, SLIP_SHARE * slip, self.axle_sd, antenna)
+        search = CourseSearch(imu, fixes, rests, site, sensors, model)
+        found = search.over()
+        sd = np.sqrt(np.linalg.eigvalsh(found.covariance[3:5, 3:5])[-1])
+        if not sd < LARGEST_TILT_SD:
             raise DataError(
-                f"the accelerations are known to {force_sd:.2g} m/s² over "
-                f"{fixes.time[-1] - fixes.time[first]:.3g} s, and the level to no better than "
-                f"{np.degrees(force_sd / np.linalg.norm(force_n)):.2g} deg",
+                f"the fixes of {fixes.time[-1] - fixes.time[0]:.3g} s leave the level known to no "
+                f"better than {np.degrees(sd):.2g} deg",
                 file=fixes.source,
                 quantity="VN, VE",
                 remedy="give more fixes, a receiver that measures velocity, or better gyros",
             )
-        yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
-        # The last course gives an attitude, and that tells how the others turn into the last.
-        C_last = _attitude(force_b, force_n, fixes.course[-1] + yaw)
-        turned = rotation.dcm_from_quaternion(fixes.turned)
-        ago = (fixes.time[-1] - fixes.time)[:, None]
-        level = rotation.dcm_from_rotation_vector(_level_rate(fixes, site) * ago)
-        back = level @ C_last @ turned[-1].T @ turned
-        heading = np.arctan2(back[:, 1, 0], back[:, 0, 0])
-        off = np.radians(rotation.within_half_turn(np.degrees(fixes.course + yaw - heading)))
-        drift = _gyro_sd(sensors) * (fixes.time[-1] - fixes.time)
-        weight = 1.0 / (np.square(fixes.course_sd) + np.square(drift) + 1e-12)
-        weight /= weight.sum()
-        C_last = _attitude(force_b, force_n, fixes.course[-1] + yaw + float(weight @ off))
-        variance = float(np.square(weight * fixes.course_sd).sum() + (weight @ drift) ** 2)
-        variance += math.radians(self.sideslip_sd_deg) ** 2
-        variance += math.radians(self.mounting_yaw_sd_deg) ** 2
-        findings += check_forward(imu, fixes, self.reverse)
-
-        _, pitch, found = rotation.euler_from_dcm(C_last)
-        by_force, by_heading = error_of_force_and_heading(force_n, pitch, found, source)
-        covariance = force_sd**2 * by_force @ by_force.T
-        covariance += variance * np.outer(by_heading, by_heading)
-        length = float(imu.index[-1] - fixes.time[-1])
-        level = rotation.dcm_from_rotation_vector(-_level_rate(fixes, site) * length)
-        C_end = level @ C_last @ turned[-1].T @ rotation.dcm_from_quaternion(fixes.turned_end)
-        drifted = _gyro_sd(sensors) * length
-        walked = max(sensors.gyro.axis("noise_density")) ** 2 * length
-        covariance += (drifted**2 + walked) * np.eye(3)
+        findings += left_out(fixes, found)
+        joint = found.covariance
         return Alignment(
             self.name,
             float(imu.index[-1]),
-            rotation.quaternion_from_dcm(C_end),
-            covariance,
+            rotation.quaternion_from_dcm(found.C),
+            joint[3:6, 3:6],
+            gyro_bias=found.bias[:3],
+            accel_bias=found.bias[3:],
+            gyro_bias_sd=np.sqrt(np.diagonal(joint)[6:9]),
+            accel_bias_sd=np.sqrt(np.diagonal(joint)[9:]),
             heading_given=True,
+            velocity=found.velocity,
+            joint=joint,
             findings=findings,
         )
-
-
-def _gyro_sd(sensors: ImuUncertainty) -> float:
-    """Bias of the worst gyro, rad/s."""
-    return float(np.hypot(sensors.gyro.axis("bias"), sensors.gyro_drift.triad).max())
-
-
-def _force_sd(fixes: CourseFixes, first: int, sensors: ImuUncertainty) -> float:
-    """Horizontal error of the force over a window that begins at a fix, m/s²."""
-    length = float(fixes.time[-1] - fixes.time[first])
-    up = np.array([0.0, 0.0, -9.8])
-    own = float(np.diagonal(force_covariance(sensors, length, up)).max())
-    receiver = (fixes.velocity_sd[-1] ** 2 + fixes.velocity_sd[first] ** 2) / length**2
-    # The gyros' bias turns gravity by half of its angle on average.
-    turned = 9.8 * 0.5 * _gyro_sd(sensors) * length
-    walked = 9.8**2 * max(sensors.gyro.axis("noise_density")) ** 2 * length / 3.0
-    return math.sqrt(own + float(receiver) + turned**2 + walked)
-
-
-def _window(fixes: CourseFixes, sensors: ImuUncertainty) -> int:
-    """Fix from which the mean force to the last is known best."""
-    return int(np.argmin([_force_sd(fixes, k, sensors) for k in range(len(fixes.time) - 1)]))
-
-
-def _level_rate(fixes: CourseFixes, site: Site) -> Array:
-    """Rate of the local level against inertial space, rad/s."""
-    moving = transport_rate(site.lat_deg, site.alt, fixes.velocity[-1], ellipsoid=site.ellipsoid)
-    return np.asarray(site.earth_rate + moving)
-
-
-def _forces(
-    fixes: CourseFixes, first: int, site: Site, sensors: ImuUncertainty
-) -> tuple[Array, Array, float]:
-    """Mean force over the window, in the axes at the last fix: body and local level; its sd.
-
-    In the level at the last fix, which turns by ``w_in``, ``f = (v_1 - C v_0)/T + w_ie x v - g``
-    with C and g of the level's turn; to first order in it.
-    """
-    length = float(fixes.time[-1] - fixes.time[first])
-    gained = (fixes.gained[-1] - fixes.gained[first]) / length
-    force_b = rotation.dcm_from_quaternion(fixes.turned[-1]).T @ gained
-    turn = _level_rate(fixes, site)
-    start = fixes.velocity[first] - np.cross(turn, fixes.velocity[first]) * length
-    force_n = (fixes.velocity[-1] - start) / length
-    weights = np.gradient(fixes.time[first:])
-    mean_v = (weights[:, None] * fixes.velocity[first:]).sum(axis=0) / weights.sum()
-    force_n = force_n + np.cross(site.earth_rate, mean_v)
-    force_n = force_n - (site.gravity - np.cross(turn, site.gravity) * 0.5 * length)
-    return force_b, force_n, _force_sd(fixes, first, sensors)
-
-
-def _attitude(force_b: Array, force_n: Array, heading: float) -> Array:
-    """``C_nb`` of a heading (rad) that lays the one force along the other."""
-    c, s = math.cos(heading), math.sin(heading)
-    size = float(np.linalg.norm(force_b) / np.linalg.norm(force_n))
-    x, y, z = size * np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) @ force_n
-    pitch = math.asin(max(-1.0, min(1.0, force_b[0] / math.hypot(x, z)))) - math.atan2(x, -z)
-    lifted = math.sin(pitch) * x + math.cos(pitch) * z
-    roll = math.atan2(lifted, y) - math.atan2(force_b[2], force_b[1])
-    return rotation.dcm_from_euler(np.degrees([roll, pitch, heading]))

@@ -12,6 +12,7 @@ from strapdown.increments import motion_increments
 from strapdown.tables import MOTION
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 __all__ = ["InertialSums", "moments", "sum_inertially"]
 
@@ -62,12 +63,15 @@ class InertialSums:
         return np.asarray(np.cumsum(self.node_length) - 0.5 * self.node_length)
 
 
-def sum_inertially(imu: pd.DataFrame) -> InertialSums:
+def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSums:
     """Sum an Imu table with specific force.
 
     Parameters
     ----------
     imu : DataFrame
+    ends : ndarray of int, (m,), optional
+        Samples at which nodes end, rising, above zero, the last one that of the record; equal
+        parts of the time, if not given.
 
     Returns
     -------
@@ -86,10 +90,13 @@ def sum_inertially(imu: pd.DataFrame) -> InertialSums:
     stamps = time - time[0]
     n = len(rows)
     nodes = min(NODES, n)
-    # Nodes end at the stamps nearest to equal parts of the time.
-    edges = np.searchsorted(stamps[1:], stamps[-1] * np.arange(1, nodes + 1) / nodes)
-    last = np.unique(np.minimum(edges, n - 1))
-    last[-1] = n - 1
+    if ends is None:
+        # Nodes end at the stamps nearest to equal parts of the time.
+        edges = np.searchsorted(stamps[1:], stamps[-1] * np.arange(1, nodes + 1) / nodes)
+        last = np.unique(np.minimum(edges, n - 1))
+        last[-1] = n - 1
+    else:
+        last = np.ascontiguousarray(ends - 1)
     m = len(last)
     turned, fallen = np.empty((n + 1, 4)), np.empty((n + 1, 3))
     velocity = np.empty((m, 3))

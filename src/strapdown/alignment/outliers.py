@@ -50,8 +50,9 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
             file=source,
             row=row + 1,
             quantity=columns[channel],
-            remedy="take a pre-filter that replaces outliers (--prefilter robust_fir; kind = "
-            '"robust_fir" in [prefilter]), or align over a stretch without them',
+            remedy="take a pre-filter that replaces outliers (kind = "
+            '"robust_fir" under [prefilter]; of align --prefilter robust_fir, too), or align over '
+            "a stretch without them",
         ),
     )
 

@@ -19,7 +19,7 @@ from strapdown.cli.log_options import (
 )
 
 EPILOG = (
-    "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000   |   "
+    "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000\n\n"
     "Example: strapdown align align.toml (strapdown init align LOG writes one)"
 )
 MOST = 6  # findings on the terminal
@@ -130,7 +130,6 @@ def align(
     from strapdown.cli.align_tables import print_alignment
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.config.alignment_file import read_alignment_spec
-    from strapdown.exceptions import Finding
     from strapdown.report.alignment import write_alignment
     from strapdown.systems.alignment_run import run_alignment
 
@@ -174,8 +173,5 @@ def align(
     if quiet:
         return
     print_alignment(result)
-    print_findings(result.findings[:MOST])
-    if len(result.findings) > MOST:
-        more = f"{len(result.findings) - MOST} more; all of them are in the report"
-        print_findings([Finding(more)])
+    print_findings(result.findings, MOST)
     print_seal(seal, "report.html")

@@ -15,7 +15,7 @@ from strapdown.exceptions import ConfigError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.formats.columns import parse_column_option
 
-__all__ = ["as_flag", "flag_words", "refused_flag", "spec_of_flags"]
+__all__ = ["as_flag", "flag_words", "module_of_flag", "refused_flag", "spec_of_flags"]
 
 #: Flags by the place in a specification.
 FLAGS = {
@@ -36,9 +36,22 @@ _STAGES = {"coarse": "--method", "prefilter": "--prefilter"}
 
 
 def flag_words(
-    source: Path, given: Mapping[str, Any], what: str = "the file of an alignment"
+    source: Path,
+    given: Mapping[str, Any],
+    what: str = "the file of an alignment",
+    flags: Mapping[str, str] = FLAGS,
 ) -> None:
-    """Refuse flags beside a file that says all of it.
+    """Refuse flags beside a file that says all of it, and name the key that says the same.
+
+    Parameters
+    ----------
+    source : Path
+    given : mapping
+        By flag, None where it is not given.
+    what : str
+        What the file is of.
+    flags : mapping
+        Flags by the place in a specification.
 
     Raises
     ------
@@ -52,8 +65,19 @@ def flag_words(
         f"{what} says how it is run, and this is said beside it",
         file=source.name,
         quantity=flag,
-        remedy="write it in the file; --out, --force, --json and --quiet go with both",
+        remedy=f"write {_key(flag, flags)} in the file; --out, --force, --json and --quiet go "
+        "with both",
     )
+
+
+def _key(flag: str, flags: Mapping[str, str]) -> str:
+    places = {**flags, **{f"{stage}, kind": name for stage, name in _STAGES.items()}}
+    place = next((place for place, name in places.items() if name == flag), None)
+    if place is None:
+        return "it"
+    table, key = place.rsplit(", ", 1)
+    value = ' = "rts"' if flag == "--smooth" else ""
+    return f"{key}{value} under [{table.replace(', ', '.')}]"
 
 
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
@@ -101,7 +125,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         "from_s": first,
         "duration_s": duration,
     }
-    coarse = _module(given["method"] or "inertial_frame")
+    coarse = module_of_flag(given["method"] or "inertial_frame")
     alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
     table = {
         "name": log.resolve().stem,
@@ -109,7 +133,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
         "axes": {"axes": given["axes"]},
         "site": _site(log, given),
         "sensors": {"sensor": given["sensor"]},
-        "prefilter": _module(given["prefilter"] or "none"),
+        "prefilter": module_of_flag(given["prefilter"] or "none"),
         "gnss": None if given["gnss"] is None else {"path": str(given["gnss"])},
         "coarse": coarse,
         "fine": {"kind": "none" if alone else "filter"},
@@ -185,7 +209,7 @@ def _site(log: Path, given: Mapping[str, Any]) -> dict[str, float]:
     return {k: float(v) for k, v in place.items() if v is not None}
 
 
-def _module(text: str) -> dict[str, Any]:
+def module_of_flag(text: str) -> dict[str, Any]:
     """A kind with its options: ``robust_fir:rate_hz=100,passband=0.4``."""
     kind, _, rest = text.partition(":")
     out: dict[str, Any] = {"kind": kind.strip()}

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from strapdown.cli.console import console, print_table
+from strapdown.cli.console import console, print_block
 from strapdown.report.alignment_tables import answer_table, bias_table, readiness_table
 from strapdown.report.alignment_trust import trust
 from strapdown.report.alignment_words import headline, limits
 from strapdown.report.crash_values import spaced
-from strapdown.report.document import TableBlock
 from strapdown.systems.alignment_run import AlignmentResult
 
 __all__ = ["print_alignment"]
@@ -24,16 +23,10 @@ def print_alignment(result: AlignmentResult) -> None:
     )
     for block in (answer_table(result), readiness_table(result), bias_table(result)):
         if block is not None:
-            _print(block)
+            print_block(block)
     out.print(spaced(headline(result)), style="bold")
     found = trust(result)
     style = {"trusted": "green", "reserve": "yellow", "distrusted": "bold red"}[found.verdict]
     out.print(spaced(found.sentence), style=style)
     for head, text in limits(result):
         out.print(spaced(f"  - {head}: {text}"))
-
-
-def _print(block: TableBlock) -> None:
-    rows = [[spaced(cell) for cell in row] for row in block.rows]
-    columns = [spaced(name) for name in block.columns]
-    print_table(columns, rows, text=block.text, strong=block.strong)

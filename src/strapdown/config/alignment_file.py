@@ -7,19 +7,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError, create_model
+from pydantic import create_model
 
 from strapdown.config.alignment import AlignmentSpec, CoarseSpec, FineSpec, PrefilterSpec
 from strapdown.config.alignment_checks import check_alignment
-from strapdown.config.alignment_wanted import what_alignment_wants, write_of_alignment
-from strapdown.config.case_keys import canonical
-from strapdown.config.case_paths import with_absolute_paths
-from strapdown.config.choice import ChoiceSpec, choice_form, with_kinds
-from strapdown.config.crash_checks import Written
-from strapdown.config.explain import explained
-from strapdown.config.placeholders import refuse_placeholders
+from strapdown.config.alignment_wanted import ALIGNMENT_WANTED
+from strapdown.config.choice import ChoiceSpec, as_table, choice_form, field_of
+from strapdown.config.filled_form import filled_form, read_named_toml
 from strapdown.config.slots import SLOTS
-from strapdown.config.toml_file import TomlFile, read_toml
+from strapdown.config.toml_file import TomlFile
 
 __all__ = ["STAGES", "alignment_spec", "read_alignment_spec"]
 
@@ -55,8 +51,7 @@ def alignment_form(table: Mapping[str, Any], file: TomlFile | None = None) -> ty
             file=file,
             path=(name,),
         )
-        needed = any(one.is_required() for one in form.model_fields.values())
-        stages[name] = (form, ... if needed else form.model_validate({}))
+        stages[name] = field_of(form, {})
     return create_model("Alignment", __base__=AlignmentSpec, **stages)
 
 
@@ -105,24 +100,13 @@ def read_alignment_spec(path: str | Path, *, files: bool = True) -> AlignmentSpe
         There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
         does not fit, or the parts do not go together; the message names the line.
     """
-    path = Path(path)
-    file = read_toml(path, "an alignment has three levels")
-    if "name" in file.table:
-        remedy = "an alignment is named after its file; write title = …"
-        raise file.refuse(("name",), "there is no such key", remedy)
-    refuse_placeholders(file, what_alignment_wants)
+    file = read_named_toml(
+        Path(path), "an alignment", "an alignment has three levels", ALIGNMENT_WANTED
+    )
     file = replace(file, table=_with_kinds(file.table))
     form = alignment_form(file.table, file)
-    table, written = canonical(file, form)
-    try:
-        spec = form(**{**table, "name": path.stem})
-        if files:
-            spec = form(**with_absolute_paths(file, spec.model_dump(), "this file"))
-    except ValidationError as error:
-        raise explained(
-            error.errors()[0], file, written=written, wanted=write_of_alignment
-        ) from None
-    check_alignment(spec, Written(file, written))
+    spec, written = filled_form(file, form, ALIGNMENT_WANTED, files=files)
+    check_alignment(spec, written)
     return spec
 
 
@@ -130,6 +114,5 @@ def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
     out = dict(table)
     for name, (_, default) in STAGES.items():
         if name in out:
-            whole = {"kind": out[name]} if isinstance(out[name], str) else out[name]
-            out[name] = with_kinds(SLOTS[name], whole, default)
+            out[name] = as_table(SLOTS[name], out[name], default)
     return out

@@ -17,7 +17,7 @@ from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.recording import Recording
 from strapdown.sensors.axes_matrix import NAMED_AXES
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, number, string
+from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, inline, number, string
 
 __all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "toml_value"]
 
@@ -94,6 +94,8 @@ def _log(
     span = f"{len(time)} samples, {time[0]:.6g} to {time[-1]:.6g} s, {rate:.4g} Hz"
     page.table("[log]", f"Found: {span}, {recording.imu.attrs['sampling']} values.")
     page.key("path", string(_from(log, folder)), "from the folder of this file")
+    if options.columns:
+        page.key("columns", inline(options.columns))
     for key, value in (
         ("gyro_unit", options.gyro_unit),
         ("accel_unit", options.accel_unit),
@@ -104,6 +106,8 @@ def _log(
             page.key(key, string(value))
     if options.rate:
         page.key("rate_hz", number(options.rate))
+    if options.repair:
+        page.key("repair", "true")
     page.say(
         f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone, where the body stands"
     )

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Aid
+from strapdown.alignment.course_fixes import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.site import Site
 from strapdown.ellipsoids import find_ellipsoid
@@ -70,7 +71,11 @@ def align(chain: Chain, state: ChainState) -> Aligned:
         return Aligned(mode.name, state.begun, state.time, fine.alignment, fine)
     assert isinstance(mode, CoarseMode)
     site, _ = _site(chain, state, None)
-    found = mode.way.align(imu, site, chain.sensors, _fixes(chain, state))
+    if isinstance(mode.way, GnssCourse):
+        fixes, antenna = _fixes(chain, state), _antenna(chain)
+        found = mode.way.align(imu, site, chain.sensors, fixes, antenna)
+    else:
+        found = mode.way.align(imu, site, chain.sensors, _fixes(chain, state))
     return Aligned(mode.name, state.begun, state.time, found)
 
 
@@ -105,16 +110,15 @@ def handed_over(chain: Chain, state: ChainState, found: Aligned) -> FilterState:
     mode = chain.modes[state.mode]
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
         ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
-        aid = _receiver(chain)
+        assert found.alignment.velocity is not None and found.alignment.joint is not None
         place = here_by_fix(
             _fixes(chain, state),
             state.time,
             q_nb,
             _lever_arm(chain),
             ellipsoid,
-            velocity_delay=float(getattr(aid, "velocity_delay", 0.0)),
-            time_offset_sd=float(getattr(aid, "time_offset_sd", 0.0)),
-            turn_at=lambda at: _turn(_window(chain, state), at),
+            found.alignment.velocity,
+            found.alignment.joint[:3, :3],
         )
         turn = _turn(_window(chain, state), state.time)
         return from_alignment(
@@ -188,6 +192,17 @@ def _site(chain: Chain, state: ChainState, q_nb: Array | None) -> tuple[Site, Ar
 def _receiver(chain: Chain) -> Aid | None:
     """That which has the fixes."""
     return chain.navigator.by_name.get(chain.fixes_from or "")
+
+
+def _antenna(chain: Chain) -> Antenna:
+    """Where and when the receiver measures."""
+    aid = _receiver(chain)
+    x, y, z = _lever_arm(chain).tolist()
+    return Antenna(
+        (x, y, z),
+        float(getattr(aid, "velocity_delay", 0.0)),
+        float(getattr(aid, "time_offset_sd", 0.0)),
+    )
 
 
 def _lever_arm(chain: Chain) -> Array:

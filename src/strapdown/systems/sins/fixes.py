@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.site import Site
+from strapdown.constants import MAD_TO_SD
 from strapdown.ellipsoids import Ellipsoid
 from strapdown.exceptions import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
@@ -24,6 +25,10 @@ Array = NDArray[np.float64]
 
 # A vehicle changes its velocity by so much, m/s², as one standard deviation.
 MANOEUVRE = 1.0
+# Fixes among which one stands out, of how long, s, and how few tell it.
+LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
+# It stands out by so many standard deviations.
+CLEAR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +114,10 @@ def here_by_fix(
     q_nb: Array,
     lever_arm: Array,
     ellipsoid: Ellipsoid,
-    velocity_delay: float = 0.0,
-    time_offset_sd: float = 0.0,
-    turn_at: Callable[[float], Array] | None = None,
+    velocity: Array,
+    velocity_covariance: Array,
 ) -> Place:
-    """Return where a vehicle is, by its newest fix.
+    """Return where a vehicle is, by its newest fix that agrees with those before.
 
     Parameters
     ----------
@@ -124,19 +128,15 @@ def here_by_fix(
     lever_arm : ndarray, (3,), m
         Of the antenna, body axes.
     ellipsoid : Ellipsoid
-    velocity_delay : float, s
-        By which a stated velocity is older than the place of its row.
-    time_offset_sd : float, s
-        By which the instants of the fixes may be wrong. What this does to the place, velocity
-        times it, is left to `by_antenna.errors_by_antenna`.
-    turn_at : callable, optional
-        Gives the rate of the body at an instant, (3,), rad/s, body axes: what an antenna on an arm
-        moves by it is taken off.
+    velocity : ndarray, (3,), m/s
+        Of the sensors at `time`, north, east, down.
+    velocity_covariance : ndarray, (3, 3), (m/s)²
 
     Returns
     -------
     Place
-        Carried from the fix by its velocity; an acceleration of 1 m/s² is taken as unknown.
+        Carried from the fix by the velocity; an acceleration of 1 m/s² is taken as unknown. By
+        which a wrong instant of the fix moves it is left to `by_antenna.errors_by_antenna`.
 
     Raises
     ------
@@ -145,30 +145,44 @@ def here_by_fix(
     """
     place, sd, stamps = _good(fixes, POSITION_SD, time)
     assert fixes is not None
-    v, v_sd, since = np.zeros(3), np.full(3, 10.0), np.inf
+    k = _newest_that_agrees(fixes, place, sd, stamps, ellipsoid)
+    after = time - float(stamps[k])
+    off = velocity * after - rotation.rotate(q_nb, lever_arm)
+    lat, lon, alt = geodetic_from_ned(off, place[k], ellipsoid=ellipsoid).tolist()
+    state = NavState(time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
+    P = np.zeros((6, 6))
+    unknown = np.square(sd[k]) + (0.5 * MANOEUVRE * after**2) ** 2
+    P[:3, :3] = np.diag(unknown) + velocity_covariance * after**2
+    P[:3, 3:] = P[3:, :3] = velocity_covariance * after
+    P[3:, 3:] = velocity_covariance
+    return Place(state, P)
+
+
+def _newest_that_agrees(
+    fixes: pd.DataFrame, place: Array, sd: Array, stamps: Array, ellipsoid: Ellipsoid
+) -> int:
+    """The newest place that is where the places before it, carried by velocities, say.
+
+    Places are carried by velocities of which each is the middle one of three; where they should
+    be is the middle of what the newest ones say.
+    """
+    rows = np.flatnonzero(stamps >= stamps[-1] - LOOKED_BACK)[-LOOKED_AT:]
     told = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
     told &= values_of(fixes, ["quality"])[:, 0] > 0.0
-    if told.any():
-        k = int(np.flatnonzero(told)[-1])
-        v, v_sd = values_of(fixes, VELOCITY)[k], values_of(fixes, VELOCITY_SD)[k]
-        since = time - float(index_of(fixes)[k]) + velocity_delay
-    elif len(stamps) > 1 and stamps[-1] > stamps[-2]:
-        step = float(stamps[-1] - stamps[-2])
-        v = ned_from_geodetic(place[-1], place[-2], ellipsoid=ellipsoid) / step
-        v_sd = np.sqrt(2.0) * sd[-1] / step + 0.5 * MANOEUVRE * step
-        since = time - float(stamps[-1])
-    if turn_at is not None and not np.isinf(since):
-        v = v - rotation.rotate(q_nb, np.cross(turn_at(time - since), lever_arm))
-    after = time - float(stamps[-1])
-    off = v * after - rotation.rotate(q_nb, lever_arm)
-    lat, lon, alt = geodetic_from_ned(off, place[-1], ellipsoid=ellipsoid).tolist()
-    state = NavState(time, np.radians(lat), np.radians(lon), alt, v, q_nb)
-    P = np.zeros((6, 6))
-    carried = np.square(v_sd * after) + (0.5 * MANOEUVRE * after**2) ** 2
-    P[:3, :3] = np.diag(np.square(sd[-1]) + carried)
-    unknown = 0.0 if np.isinf(since) else since**2 + time_offset_sd**2
-    P[3:, 3:] = np.diag(np.square(v_sd) + MANOEUVRE**2 * unknown)
-    return Place(state, P)
+    if len(rows) < LEAST_LOOKED_AT or told.sum() < LEAST_LOOKED_AT:
+        return len(stamps) - 1
+    v, v_time = values_of(fixes, VELOCITY)[told], index_of(fixes)[told]
+    near = np.clip(np.arange(len(v))[:, None] + np.arange(-1, 2), 0, len(v) - 1)
+    v = np.median(v[near], axis=1)
+    v = np.column_stack([np.interp(stamps[rows], v_time, one) for one in v.T])
+    steps = np.diff(stamps[rows])[:, None]
+    way = np.vstack([np.zeros((1, 3)), np.cumsum(0.5 * (v[1:] + v[:-1]) * steps, axis=0)])
+    at = np.array([ned_from_geodetic(one, place[-1], ellipsoid=ellipsoid) for one in place[rows]])
+    off = at - way
+    off -= np.median(off, axis=0)
+    usual = np.maximum(sd[rows], MAD_TO_SD * np.median(np.abs(off), axis=0))
+    good = (np.abs(off) <= CLEAR * usual).all(axis=1)
+    return int(rows[np.flatnonzero(good)[-1]]) if good.any() else len(stamps) - 1
 
 
 def _good(

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine_result import FineResult
 from strapdown.ellipsoids import find_ellipsoid
@@ -56,7 +57,8 @@ def from_alignment(
     start : NavState
         Place and velocity; the attitude is that of the alignment.
     P : ndarray, (6, 6)
-        Of displacement and velocity, north-east-down.
+        Of displacement and velocity, north-east-down; that of the velocity is the alignment's,
+        where it tells it.
     rest : ndarray, (6,)
         Mean rate and force of the record, which say what scale factors do.
     by_others : ndarray, (6, p), optional
@@ -66,20 +68,26 @@ def from_alignment(
     Returns
     -------
     FilterState
-        What an attitude errs by is taken as independent of the sensors: of a tilt that is the
-        fault of an accelerometer that is pessimistic.
+        Where the alignment does not tell biases, its tilt goes together with what accelerometers
+        read too much at rest (`_levelled`): were they independent, the first zero velocity would
+        take each for a witness of the other, and both for better known than they are.
     """
     whole = np.zeros((PHYSICAL, PHYSICAL))
     whole[:6, :6] = P
     whole[6:9, 6:9] = found.covariance
     start = replace(start, time=found.time, q_nb=found.q_nb)
     if found.gyro_bias is None or found.accel_bias is None:
-        return filter_.begin(start, _added(_with_sensors(filter_, whole), by_others))
+        P = _levelled(filter_, whole, found.q_nb, rest)
+        return filter_.begin(start, _added(P, by_others))
     assert found.gyro_bias_sd is not None and found.accel_bias_sd is not None
     joint = np.zeros((PHYSICAL + 6, PHYSICAL + 6))
     joint[:PHYSICAL, :PHYSICAL] = whole
     sd = np.concatenate([found.gyro_bias_sd, found.accel_bias_sd])
     joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
+    if found.joint is not None:
+        joint[3:, 3:] = found.joint
+        joint[:3, 3:6] = P[:3, 3:6]
+        joint[3:6, :3] = P[3:6, :3]
     told = np.concatenate([found.gyro_bias, found.accel_bias])
     return _with_biases(filter_, start, joint, told, rest, by_others)
 
@@ -154,6 +162,28 @@ def _with_sensors(filter_: ErrorFilter, P: Array) -> Array:
     return out
 
 
+def _levelled(filter_: ErrorFilter, P: Array, q_nb: Array, rest: Array) -> Array:
+    """Covariance of all physical errors after levelling by accelerometers.
+
+    What they read too much, ``e = A x`` of the states x, tilts what is taken for gravity: by
+    ``psi_x = -(C e)_east / g``, ``psi_y = (C e)_north / g``. A heading that goes with the tilt goes
+    with x by that. Where x may be larger than the tilt is said to be, they go together as far as
+    both can be.
+    """
+    out = _with_sensors(filter_, P)
+    P0 = out[PHYSICAL:, PHYSICAL:]
+    north_east = rotation.dcm_from_quaternion(q_nb)[:2] / float(np.linalg.norm(rest[3:]))
+    T = np.array([[0.0, -1.0], [1.0, 0.0]]) @ north_east @ _read_at_rest(filter_, rest)[3:]
+    attitude = P[6:9, 6:9]
+    root = np.linalg.cholesky(attitude[:2, :2])
+    own = np.linalg.solve(root, T @ np.sqrt(P0))
+    part = min(1.0, 1.0 / max(float(np.linalg.norm(own, 2)), 1e-300))
+    by_tilt = attitude[:, :2] @ np.linalg.inv(attitude[:2, :2])
+    out[6:9, PHYSICAL:] = part * by_tilt @ T @ P0
+    out[PHYSICAL:, 6:9] = out[6:9, PHYSICAL:].T
+    return symmetric(out)
+
+
 def _with_biases(
     filter_: ErrorFilter,
     start: NavState,
@@ -164,7 +194,7 @@ def _with_biases(
 ) -> FilterState:
     """Begin with a state whose errors are correlated with biases that were found."""
     P0 = np.diag(np.square(filter_.model.stacked.sd))
-    A = _read_at_rest(filter_, rest)
+    A = _read_at_rest(filter_, rest - told)
     parts = A @ P0 @ A.T
     known = np.diagonal(parts) > 0.0
     A, at = A[known], PHYSICAL + np.flatnonzero(known)

@@ -12,7 +12,8 @@ from strapdown.aiding.aid import TableAid
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_readiness import gnss_readiness
 from strapdown.config.navigation import NavigationSpec, aids_of
-from strapdown.config.navigation_checks import make_aids
+from strapdown.config.navigation_modules import make_aids
+from strapdown.estimation.error_models import ERROR_MODELS
 from strapdown.exceptions import DataError, Finding
 from strapdown.frames import ecef_from_geodetic
 from strapdown.tables import GEODETIC, POSITION_SD
@@ -118,16 +119,29 @@ def _apart(one: np.ndarray, other: np.ndarray) -> float:
 
 def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
     """What becomes of a height that nothing holds."""
-    length = float(imu.index[-1] - imu.index[0])
-    held = getattr(spec.mechanization, "height", "free") != "free"
-    aided = any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values())
-    if length <= LONG or held or aided:
+    if getattr(spec.mechanization, "height", "free") != "free":
         return ()
-    times = math.exp(min(length / VERTICAL, 700.0))
+    length = float(imu.index[-1] - imu.index[0])
+    grows = f"its error grows by e every {VERTICAL:g} s"
+    if length > LONG:
+        times = math.exp(min(length / VERTICAL, 700.0))
+        grows += f", {times:.2g} times in all"
+    model = getattr(getattr(spec.filter, "error_model", None), "kind", "")
+    if (named := ERROR_MODELS.get(model)) is not None and not named.has_height:
+        return (
+            Finding(
+                f"the error model '{model}' has no state of the height: no aid corrects it, and "
+                f"{grows}",
+                file=source_of(imu),
+                quantity="height",
+                remedy='write height = "held" in [mechanization], or take another error_model',
+            ),
+        )
+    if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values()):
+        return ()
     return (
         Finding(
-            f"nothing aids the height for {length / 60.0:.3g} minutes: its error grows by e every "
-            f"{VERTICAL:g} s, {times:.2g} times in all",
+            f"nothing aids the height for {length / 60.0:.3g} minutes: {grows}",
             file=source_of(imu),
             quantity="height",
             remedy='write height = "held" in [mechanization], or add a barometer',

@@ -43,7 +43,8 @@ def found(q_nb, arm, late=0.0):
     values = [[lat, lon, alt, *SPEED, *(0.02,) * 3, *(0.05,) * 3, 4]]
     fixes = pd.DataFrame(values, index=pd.Index([10.0], name="time"), columns=GNSS)
     fixes.attrs["source"] = "fixes.csv"
-    place = here_by_fix(fixes, 10.0, q_nb, arm, WGS84, turn_at=lambda at: TURN).state
+    velocity = SPEED - rotation.rotate(q_nb, np.cross(TURN, arm))
+    place = here_by_fix(fixes, 10.0, q_nb, arm, WGS84, velocity, np.zeros((3, 3))).state
     return [np.degrees(place.lat), np.degrees(place.lon), place.alt], place.v_n
 
 

@@ -22,7 +22,7 @@ from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
-from strapdown.systems.sins.handover import _with_biases, from_fine
+from strapdown.systems.sins.handover import _with_biases, from_alignment, from_fine
 from strapdown.tables import ACCEL, GYRO
 
 HERE = (50.0, 10.0, 100.0)
@@ -118,7 +118,8 @@ def test_further_states_share_a_bias_by_their_variances(aligned):
     A = np.zeros((6, len(P)))
     A[:, PHYSICAL : PHYSICAL + 6] = np.eye(6)
     A[:3, PHYSICAL + 6 : PHYSICAL + 9] = np.eye(3)
-    A[3:, PHYSICAL + 9 :] = np.diag(rest[3:])
+    # A scale factor acts on what is left without the bias.
+    A[3:, PHYSICAL + 9 :] = np.diag(rest[3:] - fine.state.sensors[3:])
     joint = np.vstack([np.eye(PHYSICAL, len(P)), A])
     sd = np.sqrt(np.diagonal(before))
     np.testing.assert_allclose(
@@ -182,3 +183,26 @@ def test_a_navigator_that_feeds_nothing_back_keeps_what_was_found(aligned):
     two = free.advance(state, time, rows)[1].history
     assert np.abs(one[:, 3:6] - two[:, 3:6]).max() < 3e-5
     assert np.abs(begun.sensors[3:6]).max() > 2e-5
+
+
+@pytest.mark.parametrize("method", ["known_heading", "two_vector"])
+def test_a_levelled_tilt_goes_with_the_accelerometers_that_made_it(method):
+    still = StationaryMotion(20.0, Origin(*HERE), roll_deg=20.0, pitch_deg=-30.0, heading_deg=70.0)
+    imu, _ = simulate_imu(still, ImuErrors(TriadErrors(), TriadErrors()), rate=20.0, seed=2)
+    sensors = ImuUncertainty(TriadUncertainty(bias=GYRO_SD), TriadUncertainty(bias=ACCEL_SD))
+    given = {"heading_deg": 70.0, "sd_deg": 0.1} if method == "known_heading" else {}
+    found = COARSE_ALIGNMENTS[method](**given).align(imu, SITE, sensors)
+    rest = imu[[*GYRO, *ACCEL]].to_numpy().mean(axis=0)
+    filter_ = made()
+    start = NavState.from_degrees(*HERE, time=found.time)
+    P = in_ned(filter_, from_alignment(filter_, found, start, np.eye(6), rest))
+    # The force along the level that is computed, psi x (0, 0, -g) + C e: nothing is felt of it,
+    # though each of the two alone is as large as a bias. Rounding and C's own second order.
+    C = rotation.dcm_from_quaternion(found.q_nb)
+    felt = np.zeros((2, len(P)))
+    felt[0, 7], felt[1, 6] = -9.81, 9.81
+    felt[:, PHYSICAL + 3 : PHYSICAL + 6] = C[:2]
+    left = np.sqrt(np.diagonal(felt @ P @ felt.T))
+    assert left == pytest.approx(0.0, abs=0.03 * ACCEL_SD)
+    assert np.sqrt(np.diagonal(P))[6:8] * 9.81 == pytest.approx(ACCEL_SD, rel=0.01)
+    assert np.linalg.eigvalsh(P[6:15, 6:15]).min() > -1e-12
