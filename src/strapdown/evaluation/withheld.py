@@ -7,7 +7,6 @@ scored at the same fixes.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
 from strapdown.estimation.update_rule import Step
+from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.piece import NavigationPiece
@@ -35,10 +35,6 @@ __all__ = [
 ]
 
 Array = NDArray[np.float64]
-
-#: Square of the Mahalanobis distance that 95 of 100 normal points of a plane are within, and its
-#: root: -2 ln 0.05.
-WITHIN_95 = -2.0 * math.log(0.05)
 
 
 @dataclass(frozen=True)
@@ -90,12 +86,7 @@ class WithheldScore:
         Where the ray through the error leaves the ellipse of 95 %: `horizontal` is below it if and
         only if the error is within the ellipse.
         """
-        far = self.distance
-        size = self.horizontal
-        along = np.sqrt(np.linalg.eigvalsh(self.covariance)[:, 1])
-        with np.errstate(divide="ignore", invalid="ignore"):
-            out = np.where(size > 0.0, size * math.sqrt(WITHIN_95) / far, 2.45 * along)
-        return np.asarray(out)
+        return plane_reach(self.horizontal, self.distance, self.covariance)
 
     @property
     def distance(self) -> Array:
@@ -107,7 +98,7 @@ class WithheldScore:
     @property
     def inside(self) -> bool:
         """Whether the largest horizontal error is within the ellipse of 95 % of its instant."""
-        return bool(self.distance[int(np.argmax(self.horizontal))] ** 2 <= WITHIN_95)
+        return bool(self.distance[int(np.argmax(self.horizontal))] <= PLANE_95)
 
 
 def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) -> tuple[Span, ...]:
@@ -268,7 +259,7 @@ def scores_table(scores: Sequence[WithheldScore]) -> pd.DataFrame:
                 "bound": float(one.bound[worst]),
                 "distance": float(one.distance[worst]),
                 "down": float(np.abs(one.error[:, 2]).max()),
-                "inside": float(np.mean(one.distance**2 <= WITHIN_95)),
+                "inside": float(np.mean(one.distance <= PLANE_95)),
             }
         )
     begins = pd.Index([one.span.begin for one in scores], name="begin")
@@ -327,6 +318,14 @@ def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> Withhe
     ConfigError
         The aid has no fixes there.
     """
+    time, nu, s = seen_of(pieces, name, span)
+    marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
+    P = np.array([marks[at][:2, :2] for at in time.tolist()])
+    return WithheldScore(span, time, nu, s, P + beyond_place(s, P))
+
+
+def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> tuple[Array, Array, Array]:
+    """Time of the fixes of a span, innovations, and variances."""
     seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
         raise ConfigError(
@@ -334,16 +333,18 @@ def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> Withhe
             quantity="withhold",
             remedy="withhold where the receiver has fixes",
         )
-    marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
-    P = np.array([marks[one.time][:2, :2] for one in seen])
-    s = np.array([one.innovations.s for one in seen])
-    # What is expected along north and east is P, what the arm adds, and the fix's own noise: the
-    # part beyond P is independent from axis to axis but for the arm's share.
-    beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
-    return WithheldScore(
-        span=span,
-        time=np.array([one.time for one in seen]),
-        error=np.array([one.innovations.nu for one in seen]),
-        variance=s,
-        covariance=P + np.eye(2) * beyond[:, None, :],
+    return (
+        np.array([one.time for one in seen]),
+        np.array([one.innovations.nu for one in seen]),
+        np.array([one.innovations.s for one in seen]),
     )
+
+
+def beyond_place(s: Array, P: Array) -> Array:
+    """Return the variance that is expected of a fix beyond that of the place, (n, 2, 2).
+
+    What is expected along north and east is P, what the arm adds, and the fix's own noise: the
+    part beyond P is independent from axis to axis but for the arm's share.
+    """
+    beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
+    return np.asarray(np.eye(2) * beyond[:, None, :])

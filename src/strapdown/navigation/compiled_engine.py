@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import error_loop as kernel
 from strapdown._kernels import fix_loop as fix_kernel
-from strapdown._kernels.growth import growth_room, padded, side_by_side
+from strapdown._kernels.growth import growth_arrays, growth_room, padded_width, unfold_growth
 from strapdown._kernels.level import LEVEL
 from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.covariance_input import bad_observation
 from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
-from strapdown.estimation.error_model import refuse_damped_height
+from strapdown.estimation.error_model import PHYSICAL, refuse_damped_height
 from strapdown.estimation.joseph import Joseph, Plain
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
@@ -97,8 +97,6 @@ class CompiledEngine(Engine):
         self.navigation = filter_
         self._kinds = (MECHANIZATIONS[type(used)], form, used.height == "held")
         self._n = n = filter_.model.layout.size
-        rows_of_q, width = padded(n)
-        shape = (n, n) if form >= kernel.UD else (rows_of_q, width)
         self._model = (
             stacked.gyro_terms,
             stacked.accel_terms,
@@ -109,9 +107,7 @@ class CompiledEngine(Engine):
             filter_.earth,
             used.kernel_options(),
         )
-        self._covariance, f, phi, q, after = side_by_side(
-            [shape, (9, width), (9, width), (rows_of_q, width), shape]
-        )
+        self._covariance = state.filter.covariance.copy()
         self._sensors = state.filter.sensors.copy()
         self._times = np.array([state.filter.time, state.time])
         self.mechanization = state.mechanization.copy()
@@ -127,19 +123,16 @@ class CompiledEngine(Engine):
         )
         self._group = (np.empty((LARGEST_GROUP + 1, used.row)), np.empty((LARGEST_GROUP, 10)))
         closing = (
-            f,
-            phi,
-            np.empty(n - 9),
-            q,
+            np.empty((PHYSICAL, padded_width(n))),
+            growth_arrays(n),
             growth_room(n),
             np.empty((6, 3)),
             np.empty((1, LEVEL)),
-            after,
+            np.empty((n, n)),
             np.empty((n, n)),
             np.empty((n, n)),
         )
         self._room = (closing, np.empty((7, 3)), np.empty((7, 3)), np.empty(0))
-        self._covariance[:n, :n] = state.filter.covariance
         self._count = len(state.open_rows)
         self._group[0][: self._count + 1] = state.open_history
         self._group[1][: self._count] = state.open_rows
@@ -240,15 +233,22 @@ class CompiledEngine(Engine):
 
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
-    ) -> list[Innovations]:
+    ) -> tuple[list[Innovations], Array]:
         """Take what is observed now."""
-        self.filter, seen = self.navigation.observe(self.filter, observations, rules)
+        self.filter, taken, seen = self.navigation.observe(self.filter, observations, rules)
         self.mechanization[:], self.row = self.filter.mechanization, self.filter.row
         self._at_covariance[:] = self.mechanization
         self._sensors[:] = self.filter.sensors
-        self._covariance[: self._n, : self._n] = self.filter.covariance
+        self._covariance[:] = self.filter.covariance
         self._group[0][0] = self.row
-        return seen
+        return seen, taken
+
+    def grown(self) -> Array:
+        """Return how the states went on over the newest group."""
+        _, growth, *_ = self._room[0]
+        out, added = np.empty((2, self._n, self._n))
+        unfold_growth(growth, out, added)
+        return out
 
     def shown(self) -> Array:
         """Return the row of the newest step."""
@@ -301,14 +301,13 @@ class CompiledEngine(Engine):
     def _note(self) -> None:
         """Read the state of the filter from the loop's arrays."""
         if self.filter.time != self._times[kernel.AT_COVARIANCE] or not self._count:
-            n = self._n
             self.filter = replace(
                 self.filter,
                 time=float(self._times[kernel.AT_COVARIANCE]),
                 mechanization=self._at_covariance.copy(),
                 row=self._group[0][0].copy(),
                 sensors=self._sensors.copy(),
-                covariance=self._covariance[:n, :n].copy(),
+                covariance=self._covariance.copy(),
             )
 
     def _no_covariance(self) -> DivergenceError:

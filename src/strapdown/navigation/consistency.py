@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.chi_square import (
     chi_square_above,
     chi_square_below,
@@ -27,6 +28,7 @@ __all__ = [
     "ObservationConsistency",
     "consistency_of",
     "consistency_of_all",
+    "gross_of",
     "whiteness",
 ]
 
@@ -40,8 +42,6 @@ FEWEST = 10
 #: Lags of the test of whiteness, where there are so many epochs for each: with fewer the tail of
 #: its distribution is longer than that of chi-square.
 LAGS, EPOCHS_A_LAG = 10, 25
-#: Median of the absolute value of a standard normal number.
-MEDIAN = 0.6744897501960817
 #: Share within which a bound of 95 % is.
 SHARE = 0.95
 
@@ -187,7 +187,7 @@ def consistency_of(
     s = innovations[[f"s {label}" for label in labels]].to_numpy(dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         u = np.where((s > 0.0) & np.isfinite(s), nu / np.sqrt(s), np.nan)
-    gross = _gross(u)
+    gross = gross_of(u)
     good = np.where(gross, np.nan, u)
     components = tuple(
         _component(label, good[:, k], nu[:, k], int(gross[:, k].sum()))
@@ -251,13 +251,13 @@ def whiteness(values: Array, lags: int = LAGS) -> tuple[Array, float]:
     return rho, float(chi_square_above(q, lags))
 
 
-def _gross(u: Array) -> NDArray[np.bool_]:
+def gross_of(u: Array) -> NDArray[np.bool_]:
     """Innovations far beyond those that are usual, by the median, which they do not move."""
     out = np.zeros(u.shape, dtype=bool)
     for k, column in enumerate(u.T):
         told = np.abs(column[~np.isnan(column)])
         if told.size:
-            usual = max(float(np.median(told)) / MEDIAN, 1.0)
+            usual = max(MAD_TO_SD * float(np.median(told)), 1.0)
             with np.errstate(invalid="ignore"):
                 out[:, k] = np.abs(column) > GROSS * usual
     return out

@@ -114,8 +114,19 @@ class Engine(ABC):
     @abstractmethod
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
-    ) -> list[Innovations]:
-        """Take what is observed now, after `close`."""
+    ) -> tuple[list[Innovations], Array]:
+        """Take what is observed now, after `close`.
+
+        Returns
+        -------
+        innovations : list of Innovations
+        taken : ndarray, (p,)
+            The physical error that the estimate is without since then.
+        """
+
+    @abstractmethod
+    def grown(self) -> Array:
+        """Return how the states went on over the newest group that was closed, (n, n)."""
 
     @abstractmethod
     def shown(self) -> Array:
@@ -150,6 +161,7 @@ class GeneralEngine(Engine):
         self.mechanization = state.mechanization.copy()
         self.open_history = list(state.open_history)
         self.open_rows = list(state.open_rows)
+        self._grown = np.eye(filter_.model.layout.size)
 
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
         """Go over steps, as `Engine.over`."""
@@ -177,7 +189,7 @@ class GeneralEngine(Engine):
             return
         ends = self.filter.time + np.cumsum([row[0] for row in self.open_rows])
         ends[-1] = self.time
-        self.filter, Phi = self.navigation.follow(
+        self.filter, self._grown = self.navigation.follow(
             self.filter,
             ends,
             np.array(self.open_history),
@@ -185,22 +197,27 @@ class GeneralEngine(Engine):
             self.mechanization,
         )
         if not self.feeds_back:
-            self.errors = Phi @ self.errors
+            self.errors = self._grown @ self.errors
         self._open_anew()
 
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
-    ) -> list[Innovations]:
+    ) -> tuple[list[Innovations], Array]:
         """Take what is observed now."""
+        used = self.navigation
         if self.feeds_back:
-            self.filter, seen = self.navigation.observe(self.filter, observations, rules)
+            self.filter, taken, seen = used.observe(self.filter, observations, rules)
             self.mechanization, self.row = self.filter.mechanization.copy(), self.filter.row
             self._open_anew()
-            return seen
-        self.filter, self.errors, seen = self.navigation.estimate(
-            self.filter, self.errors, observations, rules
-        )
-        return seen
+            return seen, taken
+        before = self.errors
+        self.filter, self.errors, seen = used.estimate(self.filter, before, observations, rules)
+        T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
+        return seen, T @ (self.errors - before)
+
+    def grown(self) -> Array:
+        """Return how the states went on over the newest group."""
+        return self._grown
 
     def shown(self) -> Array:
         """Return the row of the newest step, estimated errors taken off."""

@@ -15,13 +15,14 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.adaptive_rule import AdaptiveRule
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import Rules
+from strapdown.estimation.error_filter import FilterState, Rules
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.navigation.compiled_engine import CompiledEngine, Fixed
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.lost_covariance import LostCovarianceError
 from strapdown.navigation.navigator_state import NavigatorState
+from strapdown.navigation.node import Node, physical_transition
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 
 if TYPE_CHECKING:
@@ -60,6 +61,10 @@ class Going:
         self.seen: list[Seen] = []
         self.marks: list[Mark] = []
         self.late: list[tuple[str, float]] = []
+        self.nodes: list[Node] = []
+        self.noting = navigator.smoother is not None
+        if self.noting and state.marked == -np.inf:
+            self._node()
         self.time: Array = np.empty(0)
         self.history: Array = np.empty((0, navigator.filter.mechanization.row))
 
@@ -89,7 +94,7 @@ class Going:
             if at == len(time):
                 break
             # The step at whose end, or within which, something is observed next.
-            told = int(np.searchsorted(time, epoch - SAME_INSTANT))
+            told = int(time.searchsorted(epoch - SAME_INSTANT))
             if told < len(time) and time[told] > epoch + SAME_INSTANT:
                 at = self._steps(at, told, time, rows)
                 first, second = np.empty(10), np.empty(10)
@@ -103,26 +108,29 @@ class Going:
     def _cuts(self, time: Array) -> bool:
         """Whether an epoch is within a step, which is then cut there."""
         for queue in self.queues.values():
-            due = queue.time[: np.searchsorted(queue.time, time[-1] - SAME_INSTANT)]
-            if (time[np.searchsorted(time, due - SAME_INSTANT)] > due + SAME_INSTANT).any():
+            # Mostly nothing is due: a sample alone must not pay for what it does not meet.
+            if not queue.time.size or queue.time[0] >= time[-1] - SAME_INSTANT:
+                continue
+            due = queue.time[: queue.time.searchsorted(time[-1] - SAME_INSTANT)]
+            if (time[time.searchsorted(due - SAME_INSTANT)] > due + SAME_INSTANT).any():
                 return True
         return False
 
     def end(self) -> None:
         """Mark the newest sample."""
-        self.engine.close()
+        self._close()
         self._mark()
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
         """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
         aid, engine = self.navigator.lone_receiver, self.engine
-        if aid is None or not isinstance(engine, CompiledEngine):
+        if aid is None or not isinstance(engine, CompiledEngine) or self.noting:
             return made
         arm = np.asarray(aid.lever_arm, dtype=np.float64)
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
         while made < len(time):
-            due = int(np.searchsorted(queue.time, time[-1] + SAME_INSTANT, side="right"))
+            due = int(queue.time.searchsorted(time[-1] + SAME_INSTANT, side="right"))
             usual = self._until_outage(Epochs(queue.time[:due], queue.values[:due]))
             if not usual.time.size:
                 break
@@ -155,21 +163,17 @@ class Going:
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:
         """Note what came of fixes."""
-        names = {code: aid.names(code) for code in set(fixes.values[: len(fixed.told), 0].tolist())}
-        every = zip(
-            fixes.values[:, 0].tolist(),
-            fixed.time.tolist(),
-            fixed.told,
-            fixed.covariance,
-            fixed.sensors,
-            fixed.sensors_sd,
-            strict=False,
-        )
-        for code, at, told, covariance, sensors, sd in every:
-            name, labels = names[code]
-            self.seen.append(Seen(at, name, labels, Innovations(told[0], told[1], told[2])))
-            self._add_mark(Mark(at, covariance, sensors, sd))
-            self.observed = at
+        count = len(fixed.told)
+        codes, times = fixes.values[:count, 0].tolist(), fixed.time.tolist()
+        names = {code: aid.names(code) for code in set(codes)}
+        told = map(Innovations, fixed.told[:, 0], fixed.told[:, 1], fixed.told[:, 2])
+        self.seen += [
+            Seen(at, *names[code], nu) for at, code, nu in zip(times, codes, told, strict=True)
+        ]
+        for mark in map(Mark, times, fixed.covariance, fixed.sensors, fixed.sensors_sd):
+            self._add_mark(mark)
+        if count:
+            self.observed = times[-1]
 
     def state(self) -> NavigatorState:
         """Where it is now."""
@@ -186,14 +190,19 @@ class Going:
     def piece(self) -> NavigationPiece:
         """What came of it."""
         return NavigationPiece(
-            self.time, self.history, tuple(self.seen), tuple(self.marks), tuple(self.late)
+            self.time,
+            self.history,
+            tuple(self.seen),
+            tuple(self.marks),
+            tuple(self.late),
+            tuple(self.nodes),
         )
 
     def _steady(self, at: float) -> Array | None:
         """Rate and force without the shaking, at the last sample before an instant."""
         if self.steadies is None:
             return None
-        k = int(np.searchsorted(self.time, at + SAME_INSTANT, side="right"))
+        k = int(self.time.searchsorted(at + SAME_INSTANT, side="right"))
         if k:
             return np.asarray(self.steadies[k - 1])
         return self.begun_steady[:6] if self.begun_steady[6] else None
@@ -203,8 +212,8 @@ class Going:
 
     def _drop_late(self) -> None:
         for name, queue in self.queues.items():
-            count = int(np.searchsorted(queue.time, self.engine.time - SAME_INSTANT))
-            if count:
+            if queue.time.size and queue.time[0] < self.engine.time - SAME_INSTANT:
+                count = int(queue.time.searchsorted(self.engine.time - SAME_INSTANT))
                 self.late += [(name, float(t)) for t in queue.time[:count]]
                 self.queues[name] = Epochs(queue.time[count:], queue.values[count:])
 
@@ -218,15 +227,45 @@ class Going:
         while made < len(time):
             # The interval is one of a decimal clock.
             note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
-            made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
+            begun = self.engine.filter
+            # Who smooths notes every growth of the covariance.
+            stop_at = -np.inf if self.noting else note_at
+            made += self.engine.over(time[made:], rows[made:], history[made:], stop_at)
             if made < len(time):
-                self._mark()
+                self._grown(begun)
+                if self.engine.filter.time >= note_at:
+                    self._mark()
+
+    def _close(self) -> None:
+        """Take the covariance to the newest step."""
+        begun = self.engine.filter
+        self.engine.close()
+        self._grown(begun)
+
+    def _grown(self, begun: FilterState) -> None:
+        """Note how errors grew since a state of the filter."""
+        ended = self.engine.filter
+        if self.noting and ended.time > begun.time:
+            Phi = physical_transition(self.navigator.filter, begun, self.engine.grown(), ended)
+            self._node(transition=Phi)
+
+    def _node(
+        self,
+        transition: Array | None = None,
+        before: Array | None = None,
+        taken: Array | None = None,
+    ) -> None:
+        """Note the covariance for a smoother."""
+        filter_, state = self.navigator.filter, self.engine.filter
+        turn = filter_.mechanization.level_from_ned(state.row)
+        P = filter_.physical_covariance(state)
+        self.nodes.append(Node(state.time, P, transition, before, taken, turn))
 
     def _observe(self, at: float) -> None:
         """Take everything that is observed at an instant."""
         engine, filter_ = self.engine, self.navigator.filter
         last = engine.last
-        engine.close()
+        self._close()
         view = View(
             mechanization=filter_.mechanization,
             model=filter_.model,
@@ -238,11 +277,12 @@ class Going:
             force=last[4:7] / last[0],
             covariance_of=partial(filter_.physical_covariance, engine.filter),
             steady=self._steady(at),
+            unobserved=at - self.observed,
         )
         told: list[tuple[Aid, Observation]] = []
         for aid in self.navigator.aids:
             queue = self.queues[aid.name]
-            count = int(np.searchsorted(queue.time, at + SAME_INSTANT, side="right"))
+            count = int(queue.time.searchsorted(at + SAME_INSTANT, side="right"))
             for values in queue.values[:count]:
                 told += [(aid, one) for one in aid.observe(view, values)]
             self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
@@ -268,12 +308,22 @@ class Going:
                 asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
             else:
                 asked.append(rule)
-        innovations = self.engine.observe(observations, asked)
+        met = self.engine.filter
+        innovations, taken = self.engine.observe(observations, asked)
+        if self.noting:
+            self._updated(met, taken)
         for rule, one, nu in zip(rules, observations, innovations, strict=True):
             if isinstance(rule, AdaptiveRule):
                 before = self.scales.get(one.name) or rule.begin(one.z.size)
                 self.scales[one.name] = rule.after(before, nu, one.R)
         return innovations
+
+    def _updated(self, before: FilterState, taken: Array) -> None:
+        """Note what observations did, if they did anything."""
+        filter_ = self.navigator.filter
+        P = filter_.physical_covariance(before)
+        if taken.any() or not np.array_equal(P, filter_.physical_covariance(self.engine.filter)):
+            self._node(before=P, taken=taken)
 
     def _mark(self, before: float = 0.0) -> None:
         """Note covariance and estimates, with a stamp that is so much earlier."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -20,6 +21,9 @@ from strapdown.navigation.engine import SAME_INSTANT, Engine, EngineState, Gener
 from strapdown.navigation.going import Going
 from strapdown.navigation.navigator_state import NavigatorState
 from strapdown.navigation.piece import NavigationPiece
+
+if TYPE_CHECKING:
+    from strapdown.navigation.smoother import Smoother
 
 __all__ = ["Navigator", "NavigatorState", "with_states"]
 
@@ -45,6 +49,10 @@ class Navigator:
         Longest time between two marks of the covariance.
     damping : Damping
         Whether what is estimated is fed back.
+    smoother : Smoother, optional
+        With one, its pieces have what the run is smoothed by. Place and velocity of a lone
+        receiver are then taken together, and not one after the other: the numbers differ by what
+        is of the second order in a correction.
 
     Raises
     ------
@@ -56,6 +64,7 @@ class Navigator:
     aids: tuple[Aid, ...] = ()
     mark_interval: float = 1.0
     damping: Damping = field(default_factory=Feedback)
+    smoother: Smoother | None = None
 
     def __post_init__(self) -> None:
         names = [aid.name for aid in self.aids]

@@ -18,6 +18,7 @@ from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 from strapdown.navigation.record import Event, NavigationRecord, Span
+from strapdown.navigation.smoother import Smoothing
 from strapdown.tables import EULER, trajectory_error_table
 from strapdown.tables.checks import is_number
 
@@ -155,6 +156,7 @@ class Tape:
         events: tuple[Event, ...] = (),
         modes: tuple[Span, ...] = (),
         outages: Mapping[str, tuple[Span, ...]] | None = None,
+        smoothing: Smoothing | None = None,
     ) -> NavigationRecord:
         """Return it as tables.
 
@@ -164,6 +166,8 @@ class Tape:
             Name for messages.
         events, modes, outages
             As of `NavigationRecord`.
+        smoothing : Smoothing, optional
+            That took the same pieces: states and marks are smoothed; innovations are the filter's.
 
         Returns
         -------
@@ -183,16 +187,24 @@ class Tape:
                 remedy="give samples beyond the end of the alignment",
             )
         used, model = self.navigator.filter.mechanization, self.navigator.filter.model
-        trajectory = used.trajectory(states[:, 0].copy(), states[:, 1:].copy(), source)
         marks = self._marks.rows
         if self._newest_mark is not None:
             marks = np.vstack([marks, self._newest_mark])
+        count = model.stacked.sd.size
+        at, history = states[:, 0].copy(), states[:, 1:]
+        if smoothing is not None:
+            later = smoothing.smoothed(marks[:, 0])
+            history = later.corrected(at, history)
+            marks = marks.copy()
+            marks[:, 1:82] = later.covariance.reshape(-1, 81)
+            marks[:, 82 : 82 + count] += later.sensors
+            marks[:, 82 + count :] = later.sensors_sd
+        trajectory = used.trajectory(at, np.array(history), source)
         time = pd.Index(marks[:, 0], name="time")
         covariance = marks[:, 1:82].reshape(-1, 9, 9)
         sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
         euler = trajectory[EULER].to_numpy()[nearest]
-        count = model.stacked.sd.size
         labels = list(model.layout.labels())[model.layout.size - count :]
         units = [one.block.unit for one in model.sensors for _ in one.block.labels]
         return NavigationRecord(

@@ -2,25 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapdown.config.navigation import NavigationSpec, WithholdTable, aids_of
-from strapdown.evaluation.withheld import WithheldScore, blinded, score_of, spans_to_withhold
+from strapdown.evaluation.withheld import (
+    WithheldScore,
+    blinded,
+    score_of,
+    spans_to_withhold,
+)
+from strapdown.evaluation.withheld_smoothed import end_of_what_tells, score_of_smoothed
 from strapdown.exceptions import ConfigError
+from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.systems.progress import Progress
-from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.chain import Chain, ChainState
 from strapdown.systems.sins.source import NavigationSource
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["score_withholding", "withheld_aid"]
+__all__ = [
+    "SETTLED",
+    "Withheld",
+    "WithheldRun",
+    "score_withholding",
+    "withheld_aid",
+    "withheld_runs",
+]
+
+Array = NDArray[np.float64]
 
 #: A filter has settled so long after navigation began, s.
 SETTLED = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Withheld:
+    """One stretch without fixes.
+
+    Attributes
+    ----------
+    forward : WithheldScore
+        By what came before it.
+    smoothed : WithheldScore or None
+        By what came after it, too, where the navigator has a smoother.
+    """
+
+    forward: WithheldScore
+    smoothed: WithheldScore | None
+
+    @property
+    def told(self) -> WithheldScore:
+        """What the run is scored by."""
+        return self.smoothed or self.forward
 
 
 def withheld_aid(spec: NavigationSpec) -> str:
@@ -36,7 +74,7 @@ def score_withholding(
     source: NavigationSource,
     record: NavigationRecord,
     progress: Progress,
-) -> tuple[WithheldScore, ...]:
+) -> tuple[Withheld, ...]:
     """Run a chain with all fixes up to each stretch, and through it with none.
 
     Parameters
@@ -50,7 +88,7 @@ def score_withholding(
 
     Returns
     -------
-    tuple of WithheldScore
+    tuple of Withheld
         In the order of the stretches; empty where nothing is to be kept back.
 
     Raises
@@ -66,17 +104,11 @@ def score_withholding(
     values = values_of(source.imu, [*GYRO, *ACCEL])
     begun = float(record.trajectory.index[0])
     spans = _spans(asked, begun, float(time[-1]))
-    blind = replace(chain, navigator=blinded(chain.navigator, name))
     state = chain.begin(source.imu.attrs["sampling"], source.name)
     for aid, table in source.tables.items():
         state = chain.tell(state, aid, table)
-    found: dict[int, WithheldScore] = {}
-    at = 0
-    for number, k in enumerate(sorted(range(len(spans)), key=lambda k: spans[k].begin)):
-        progress("withholding fixes", number / len(spans))
-        span = spans[k]
-        first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
-        if span.begin < begun or span.end > time[-1] or first == last:
+    for span in spans:
+        if span.begin < begun or span.end > time[-1]:
             raise ConfigError(
                 f"from {span.begin:.9g} to {span.end:.9g} s is not within the navigation, which "
                 f"goes from {begun:.9g} to {time[-1]:.9g} s",
@@ -84,11 +116,83 @@ def score_withholding(
                 quantity="withhold, spans_s",
                 remedy="give times on the clock of the samples, within it",
             )
+    found: dict[int, Withheld] = {}
+    blind = replace(chain, navigator=blinded(chain.navigator, name))
+    runs = withheld_runs(chain, blind, state, time, values, spans)
+    for k, withheld in enumerate(runs):
+        progress("withholding fixes", k / len(spans))
+        span = spans[withheld.number]
+        smoothed = None
+        if chain.navigator.smoother is not None:
+            until = int(np.searchsorted(time, end_of_what_tells(span), side="right"))
+            then = slice(withheld.rows.stop, until)
+            _, after = chain.advance(withheld.through, time[then], values[then])
+            smoothed = score_of_smoothed(
+                chain.navigator, withheld.pieces, after.navigation, name, span
+            )
+        found[withheld.number] = Withheld(score_of(withheld.pieces, name, span), smoothed)
+    return tuple(found[k] for k in range(len(spans)))
+
+
+@dataclass(frozen=True, eq=False)
+class WithheldRun:
+    """A run over a stretch in which an aid was looked at and not used.
+
+    Attributes
+    ----------
+    number : int
+        Of the stretch.
+    state : ChainState
+        Where it begins: with all that was observed before.
+    through : ChainState
+        Where it ends.
+    rows : slice
+        Of its samples.
+    pieces : tuple of NavigationPiece
+    """
+
+    number: int
+    state: ChainState
+    through: ChainState
+    rows: slice
+    pieces: tuple[NavigationPiece, ...]
+
+
+def withheld_runs(
+    chain: Chain,
+    blind: Chain,
+    state: ChainState,
+    time: Array,
+    values: Array,
+    spans: Sequence[Span],
+) -> Iterator[WithheldRun]:
+    """Go over samples with every fix up to each stretch, and through it with none.
+
+    Parameters
+    ----------
+    chain : Chain
+    blind : Chain
+        The same, but that it does not use what is withheld (`blinded`).
+    state : ChainState
+        Before the first of the samples.
+    time : ndarray, (n,), s
+    values : ndarray, (n, 6)
+    spans : sequence of Span
+        Within the samples. Each is by itself: what follows it has had the fixes.
+
+    Yields
+    ------
+    WithheldRun
+        In the order of their begins.
+    """
+    at = 0
+    for number in sorted(range(len(spans)), key=lambda k: spans[k].begin):
+        span = spans[number]
+        first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
         state, _ = chain.advance(state, time[at:first], values[at:first])
         at = first
-        _, piece = blind.advance(state, time[first:last], values[first:last])
-        found[k] = score_of(piece.navigation, name, span)
-    return tuple(found[k] for k in range(len(spans)))
+        through, piece = blind.advance(state, time[first:last], values[first:last])
+        yield WithheldRun(number, state, through, slice(first, last), piece.navigation)
 
 
 def _spans(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:

@@ -1,0 +1,80 @@
+"""What of the innovations is told as the first that does not agree."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from innovations import innovation_table
+
+from strapdown.navigation.consistency import consistency_of_all
+from strapdown.navigation.first_inconsistency import inconsistencies
+
+
+def found(**tables):
+    made = {name.replace("__", "."): table for name, table in tables.items()}
+    return inconsistencies(consistency_of_all(made), made)
+
+
+def normal(seed, n=600):
+    return np.random.default_rng(seed).standard_normal((n, 3))
+
+
+def test_nothing_where_all_is_as_expected():
+    assert found(rtk__position=innovation_table(normal(1))) == ()
+
+
+def test_what_is_no_chance_and_too_little_to_matter_is_left_out():
+    # 1.25 times as much scatter is beyond chance for 600 epochs: its 99.9 % bound is 1.1.
+    table = innovation_table(1.25 * normal(2))
+    assert not consistency_of_all({"a": table})["a"].consistent
+    assert found(rtk__position=table) == ()
+    assert found(rtk__position=innovation_table(0.4 * normal(3))) == ()
+
+
+def test_gross_errors_are_told_with_their_epochs():
+    u = normal(4)
+    u[[100, 333], 1] = 40.0
+    (one,) = found(rtk__position=innovation_table(u))
+    assert (one.name, one.aid, one.component, one.kind) == (
+        "rtk.position",
+        "rtk",
+        "east, m",
+        "gross",
+    )
+    assert one.epochs.tolist() == [100.0, 333.0]
+    assert (one.since, one.until) == (100.0, 333.0)
+
+
+def test_the_first_in_time_comes_first():
+    late, early = normal(5), normal(6)
+    late[400:, 0] += 2.0
+    early[250, 2] = 60.0
+    names = [
+        x.name
+        for x in found(rtk__position=innovation_table(late), odo__speed=innovation_table(early))
+    ]
+    assert names == ["odo.speed", "rtk.position"]
+
+
+def test_a_change_ends_with_its_last_bad_window():
+    u = normal(7)
+    u[300:420, 0] += 4.0
+    one = found(rtk__position=innovation_table(u))[0]
+    assert one.kind == "change"
+    # Windows have 30 epochs; the change is dated within a few epochs.
+    assert one.since == pytest.approx(300.0, abs=5.0)
+    assert 415.0 <= one.until <= 450.0
+
+
+def test_noise_that_is_understated_says_by_how_much():
+    ones = found(rtk__position=innovation_table(3.0 * normal(8)))
+    assert {one.kind for one in ones} == {"understated"}
+    # The standard deviation of a scatter of 600 is 3 %.
+    assert ones[0].factor == pytest.approx(3.0, rel=0.1)
+    assert ones[0].throughout
