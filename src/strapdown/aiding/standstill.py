@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapdown.aiding.aid import Epochs, WatchingAid
 from strapdown.aiding.checks import check_number
 from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
+from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
 from strapdown.aiding.view import VELOCITY, View
 from strapdown.exceptions import ConfigError, nearest
 
@@ -40,10 +41,13 @@ class Window(NamedTuple):
         The last ones: a window, and one before it.
     number : float
         Of the interval of the last sample; NaN before the first.
+    rule : object
+        What the rule of the threshold remembers.
     """
 
     samples: Array
     number: float
+    rule: Any
 
 
 @dataclass(frozen=True)
@@ -63,6 +67,10 @@ class StandstillAid(WatchingAid):
     window : float, s
     threshold : float
         The statistic of a rest is below it: one, if the noise is as stated.
+    threshold_rule : str
+        One of `STANDSTILL_THRESHOLDS`: what becomes of it while it goes.
+    threshold_time : float, s
+        For so long a rule remembers, or is patient.
     rate_sd_deg_per_s, force_sd : float, deg/s and m/s²
         Of the noise of one sample at rest, an idling engine included.
     gravity : float, m/s²
@@ -72,59 +80,80 @@ class StandstillAid(WatchingAid):
     largest_speed : float, m/s
         Infinite: the detector alone decides, as on a foot.
     gate : float
+    gate_time : float, s
+        After so long without any observation a rest is taken at any speed: a filter that is wrong
+        by more than it knows would take none any more. Zero: never, as for what glides for longer.
     """
 
     detector: str = "force_variance"
     window: float = field(default=1.0, metadata={"unit": "s"})
     threshold: float = 3.0
+    threshold_rule: str = "stated"
+    threshold_time: float = field(default=10.0, metadata={"unit": "s"})
     rate_sd_deg_per_s: float = 0.2
     force_sd: float = field(default=0.05, metadata={"unit": "m_per_s2"})
     gravity: float = 9.81
     interval: float = 0.5
     largest_speed: float = 0.5
     gate: float = 4.0
+    gate_time: float = field(default=0.0, metadata={"unit": "s"})
 
     def __post_init__(self) -> None:
-        if self.detector not in STANDSTILL_DETECTORS:
-            raise ConfigError(
-                f"there is no detector '{self.detector}'",
-                file=self.name or None,
-                quantity="detector",
-                remedy=nearest(str(self.detector), STANDSTILL_DETECTORS),
-            )
-        for name in ("window", "threshold", "rate_sd_deg_per_s", "force_sd", "gravity"):
+        for name, what, table in (
+            ("detector", "detector", STANDSTILL_DETECTORS),
+            ("threshold_rule", "rule of a threshold", STANDSTILL_THRESHOLDS),
+        ):
+            value = getattr(self, name)
+            if value not in table:
+                raise ConfigError(
+                    f"there is no {what} '{value}'",
+                    file=self.name or None,
+                    quantity=name,
+                    remedy=nearest(str(value), table),
+                )
+        for name in ("window", "threshold", "threshold_time"):
             check_number(self, name, low=0.0, above=True)
-        for name in ("interval", "gate"):
+        for name in ("rate_sd_deg_per_s", "force_sd", "gravity"):
+            check_number(self, name, low=0.0, above=True)
+        for name in ("interval", "gate", "gate_time"):
             check_number(self, name, low=0.0)
         if self.largest_speed != math.inf:
             check_number(self, "largest_speed", low=0.0)
 
     def begin(self) -> Window:
         """Return nothing seen."""
-        return Window(np.empty((0, 8)), math.nan)
+        rule = STANDSTILL_THRESHOLDS[self.threshold_rule]
+        return Window(np.empty((0, 8)), math.nan, rule.begin(self.threshold, self.threshold_time))
 
     def watch(self, memory: Window, time: Array, rows: Array) -> tuple[Window, Epochs]:
         """Return epochs where the window that ends there is of a rest."""
         if not len(time):
             return memory, Epochs(np.empty(0), np.empty((0, 10)))
-        samples = np.column_stack([time, rows[:, 0], rows[:, 1:7] / rows[:, :1]])
-        seen = np.concatenate([memory.samples, samples])
         new = len(memory.samples)
-        number = memory.number
+        seen = np.empty((new + len(time), 8))
+        seen[:new] = memory.samples
+        seen[new:, TIME], seen[new:, DT] = time, rows[:, 0]
+        np.divide(rows[:, 1:7], rows[:, :1], out=seen[new:, 2:])
+        rule, remembered = STANDSTILL_THRESHOLDS[self.threshold_rule], memory.rule
         at, values = [], []
-        for i in self._ends(seen, new, number):
-            told = self._rest(seen, int(i))
-            if told is not None:
+        for i in self._ends(seen, new, memory.number):
+            looked = self._look(seen, int(i))
+            if looked is None:
+                continue
+            statistic, told = looked
+            remembered, threshold = rule.next(remembered, float(seen[i, TIME]), statistic)
+            if statistic < threshold:
                 at.append(seen[i, TIME])
                 values.append(told)
         kept = self._first(seen, len(seen) - 1)
-        after = Window(seen[max(kept - 1, 0) :].copy(), self._number(seen[-1:, TIME])[0])
+        number = self._number(seen[-1:, TIME])[0]
+        after = Window(seen[max(kept - 1, 0) :].copy(), number, remembered)
         return after, Epochs(np.array(at), np.array(values).reshape(-1, 10))
 
     def near_rest(self, view: View) -> bool:
         """Whether what is computed may be a rest."""
         speed = float(np.linalg.norm(view.velocity))
-        if speed <= self.largest_speed:
+        if speed <= self.largest_speed or 0.0 < self.gate_time <= view.unobserved:
             return True
         along = view.velocity / speed
         sd = math.sqrt(along @ view.covariance[VELOCITY, VELOCITY] @ along)
@@ -146,10 +175,10 @@ class StandstillAid(WatchingAid):
         """First sample of the window that ends with one."""
         begin = seen[i, TIME] - self.window * (1.0 - SLACK)
         # Ends of steps: the first that is after the begin of the window.
-        return int(np.searchsorted(seen[: i + 1, TIME], begin, side="right"))
+        return int(seen[: i + 1, TIME].searchsorted(begin, side="right"))
 
-    def _rest(self, seen: Array, i: int) -> Array | None:
-        """What a window tells that is of a rest."""
+    def _look(self, seen: Array, i: int) -> tuple[float, Array] | None:
+        """Statistic of a window that is whole, and what it tells where it is of a rest."""
         first = self._first(seen, i)
         count = i + 1 - first
         within = np.ascontiguousarray(seen[first : i + 1])
@@ -160,8 +189,5 @@ class StandstillAid(WatchingAid):
         statistic = STANDSTILL_DETECTORS[self.detector].statistic(
             rate, force, math.radians(self.rate_sd_deg_per_s), self.force_sd, self.gravity
         )
-        if not statistic < self.threshold:
-            return None
-        return np.concatenate(
-            [[count], rate.mean(axis=0), force.mean(axis=0), rate.var(axis=0, ddof=1)]
-        )
+        told = [[count], rate.mean(axis=0), force.mean(axis=0), rate.var(axis=0, ddof=1)]
+        return statistic, np.concatenate(told)

@@ -16,12 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD
+
 __all__ = ["STANDSTILL_DETECTORS", "StandstillDetector"]
 
 Array = NDArray[np.float64]
-
-# Standard deviation of a normal distribution over the median of its absolute deviations.
-OF_MEDIAN = 1.482602218505602
 
 
 @dataclass(frozen=True)
@@ -90,7 +89,7 @@ def _variance(rate: Array, force: Array, gravity: float) -> float:
 
 def _force_spread(rate: Array, force: Array, gravity: float) -> float:
     apart = np.median(np.abs(force - np.median(force, axis=0)), axis=0)
-    return float(((OF_MEDIAN * apart) ** 2).sum())
+    return float(((MAD_TO_SD * apart) ** 2).sum())
 
 
 SKOG = "Skog et al. (2010)"

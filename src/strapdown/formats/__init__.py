@@ -12,6 +12,7 @@ from strapdown.formats import (
     broad,
     comma2k19,
     csv,
+    foot_mounted,
     hdf5,
     join,
     kf_gins,
@@ -67,6 +68,9 @@ READERS: dict[str, Reader] = {
     "npz": Reader("NumPy archive (.npz)", npz.detect, npz.read),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, parquet.read),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, hdf5.read),
+    "foot-mounted": Reader(
+        "unit on a shoe: timestamps, imu_data (.mat)", foot_mounted.detect, foot_mounted.read
+    ),
     "matlab": Reader("MATLAB up to v7 (.mat)", matlab.detect, matlab.read),
 }
 

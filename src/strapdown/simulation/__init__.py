@@ -22,16 +22,19 @@ from strapdown.simulation.spline_motion import SplineMotion
 from strapdown.simulation.stationary import StationaryMotion
 from strapdown.simulation.vehicle_points import PointKinematics, point_kinematics, point_path
 from strapdown.simulation.vehicles import aircraft, car, ship
+from strapdown.simulation.walking import GAITS, Gait, Stride, WalkingMotion, walk
 from strapdown.simulation.waves import Wave
 from strapdown.simulation.waypoints import through_waypoints
 
 __all__ = [
     "CRASHES",
+    "GAITS",
     "SCENARIOS",
     "Coning",
     "CrashMotion",
     "CrashScenario",
     "EarthMotion",
+    "Gait",
     "Gesture",
     "Handling",
     "HaversinePulse",
@@ -51,8 +54,10 @@ __all__ = [
     "SmoothRandom",
     "SplineMotion",
     "StationaryMotion",
+    "Stride",
     "Track",
     "TriadErrors",
+    "WalkingMotion",
     "Wave",
     "aircraft",
     "car",
@@ -65,4 +70,5 @@ __all__ = [
     "ship",
     "simulate_imu",
     "through_waypoints",
+    "walk",
 ]

@@ -188,3 +188,16 @@ def test_options_that_mean_nothing_are_refused(options, quantity):
         ZeroVelocity(name="stop", **options)
     assert refused.value.finding.quantity == quantity
     assert refused.value.finding.remedy
+
+
+@pytest.mark.parametrize(("gate_time", "taken"), [(0.0, False), (5.0, True), (7.0, False)])
+def test_the_gate_opens_where_nothing_was_observed_for_long(gate_time, taken):
+    class Wrong:
+        """20 m/s, and known to 1 cm/s."""
+
+        velocity = np.array([20.0, 0.0, 0.0])
+        covariance = 1e-4 * np.eye(9)
+        unobserved = 6.0
+
+    aid = ZeroVelocity(name="stance", gate_time=gate_time)
+    assert aid.near_rest(Wrong()) is taken

@@ -1,0 +1,158 @@
+"""A path beside control points, after the one origin and heading that fit best.
+
+Who reckons from a start of his own finds a path up to a shift and a turn: no scale, no bend. So
+much is taken off, and what is left is the error. Of N points it takes three numbers of 2N.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.evaluation.trajectory_at import trajectory_at
+from strapdown.exceptions import DataError
+from strapdown.frames import ned_from_geodetic
+from strapdown.tables import places_of
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["ControlPointScore", "rigid_fit", "score_control_points"]
+
+Array = NDArray[np.float64]
+
+#: From point to point so far at least, m: what is nearer has no direction.
+NO_WAY = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class ControlPointScore:
+    """A path at its control points.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+    points : ndarray, (n, 2), m
+        Control points, turned and shifted onto the path: north and east of the path's start.
+    error : ndarray, (n, 2), m
+        Computed less these.
+    turn_deg : float, deg
+        Heading of the run less that of the points' own north, -180 to 180.
+    way : float, m
+        From point to point in all.
+    given : int
+        Points that there are, those before and after the run counted, too.
+    """
+
+    time: Array
+    points: Array
+    error: Array
+    turn_deg: float
+    way: float
+    given: int
+
+    @property
+    def distance(self) -> Array:
+        """Length of the error, (n,), m."""
+        return np.asarray(np.hypot(self.error[:, 0], self.error[:, 1]))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the distances, m."""
+        return float(np.sqrt(np.square(self.distance).mean()))
+
+    @property
+    def median(self) -> float:
+        """Median of the distances, m."""
+        return float(np.median(self.distance))
+
+    @property
+    def largest(self) -> float:
+        """Largest of the distances, m."""
+        return float(self.distance.max())
+
+    @property
+    def largest_at(self) -> float:
+        """When it is, s."""
+        return float(self.time[int(np.argmax(self.distance))])
+
+
+def rigid_fit(points: ArrayLike, onto: ArrayLike) -> tuple[float, Array]:
+    """Return the turn and the shift that bring points of a plane nearest to others.
+
+    Parameters
+    ----------
+    points, onto : array_like, (n, 2)
+        North, east.
+
+    Returns
+    -------
+    turn : float, rad
+        From north to east.
+    placed : ndarray, (n, 2)
+        The points, turned and shifted: the sum of squared distances to `onto` is least.
+
+    Notes
+    -----
+    With both about their means, ``turn = atan2(sum p x q, sum p . q)``: Umeyama, IEEE Trans.
+    Pattern Analysis 13 (1991) 376, for two dimensions and without scale.
+    """
+    p, q = np.asarray(points, dtype=np.float64), np.asarray(onto, dtype=np.float64)
+    a, b = p - p.mean(axis=0), q - q.mean(axis=0)
+    cross = float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())
+    turn = math.atan2(cross, float((a * b).sum()))
+    c, s = math.cos(turn), math.sin(turn)
+    return turn, a @ np.array([[c, s], [-s, c]]) + q.mean(axis=0)
+
+
+def score_control_points(
+    trajectory: pd.DataFrame, points: pd.DataFrame, ellipsoid: Ellipsoid = WGS84
+) -> ControlPointScore:
+    """Compare a trajectory with control points.
+
+    Parameters
+    ----------
+    trajectory : DataFrame
+        Trajectory table.
+    points : DataFrame
+        By time in s on its clock, ``north`` and ``east`` in m (`read_control_points`). Those
+        before its begin and after its end are left out.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    ControlPointScore
+
+    Raises
+    ------
+    DataError
+        Fewer than two are within its time, or all are at one place.
+    """
+    time, own = index_of(points), index_of(trajectory)
+    within = (time >= own[0]) & (time <= own[-1])
+    places = values_of(points, ["north", "east"])[within]
+    if len(places) < 2:
+        raise DataError(
+            f"{len(places)} of {len(time)} control points lie within the run, from {own[0]:.9g} to "
+            f"{own[-1]:.9g} s; they go from {time[0]:.9g} to {time[-1]:.9g} s",
+            file=source_of(points),
+            quantity="time",
+            remedy="give their times on the clock of the log",
+        )
+    way = float(np.hypot(*np.diff(places, axis=0).T).sum())
+    if not way > NO_WAY:
+        raise DataError(
+            "all control points within the run are at one place, which no heading fits",
+            file=source_of(points),
+            quantity="north, east",
+            remedy="give points of the way",
+        )
+    here = trajectory_at(trajectory, time[within], ellipsoid)
+    origin = places_of(trajectory.iloc[:1])[0]
+    path = ned_from_geodetic(places_of(here), origin, ellipsoid=ellipsoid)[:, :2]
+    turn, placed = rigid_fit(places, path)
+    error = path - placed
+    return ControlPointScore(time[within], placed, error, math.degrees(turn), way, len(time))

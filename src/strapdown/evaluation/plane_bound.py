@@ -1,0 +1,56 @@
+"""The area that an error in a plane is within with 95 %."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["PLANE_95", "plane_bound", "plane_reach"]
+
+Array = NDArray[np.float64]
+
+#: Half axes of the ellipse that holds 95 % of a normal error in a plane, over the standard
+#: deviations along them: the root of the chi-square of two degrees of freedom, -2 ln 0.05.
+PLANE_95 = math.sqrt(-2.0 * math.log(0.05))
+
+
+def plane_bound(covariance: Array) -> Array:
+    """Return the longer half axis of the ellipse of 95 % of each covariance.
+
+    Parameters
+    ----------
+    covariance : ndarray, (n, k, k)
+        Of two components or more, of which the first two are those of the plane.
+
+    Returns
+    -------
+    ndarray, (n,)
+        In the unit of the components.
+    """
+    largest = np.linalg.eigvalsh(covariance[:, :2, :2])[:, 1]
+    return np.asarray(PLANE_95 * np.sqrt(np.maximum(largest, 0.0)))
+
+
+def plane_reach(size: Array, distance: Array, covariance: Array) -> Array:
+    """Return how far the ellipse of 95 % reaches in the direction of each error.
+
+    Parameters
+    ----------
+    size : ndarray, (n,)
+        Length of the error.
+    distance : ndarray, (n,)
+        Its Mahalanobis distance.
+    covariance : ndarray, (n, k, k)
+        As `plane_bound`.
+
+    Returns
+    -------
+    ndarray, (n,)
+        Where the ray through the error leaves the ellipse: `size` is below it if and only if the
+        error is within. An error of no length has no direction, and gets the longer half axis.
+    """
+    some = distance > 0.0
+    along = PLANE_95 * size / np.where(some, distance, 1.0)
+    return np.where(some, along, plane_bound(covariance))

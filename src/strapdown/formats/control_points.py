@@ -1,0 +1,58 @@
+"""Control points: where a body was at instants, in a level frame of one's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import pandas as pd
+
+from strapdown.exceptions import DataError
+from strapdown.formats import foot_mounted
+from strapdown.formats.aid_table import read_aid_table
+from strapdown.formats.clocks import RELATIVE, Clock, with_clock
+
+__all__ = ["POINT", "read_control_points"]
+
+#: Columns, m.
+POINT = ["north", "east"]
+
+
+def read_control_points(path: str | Path, names: Mapping[str, str] | None = None) -> pd.DataFrame:
+    """Read control points.
+
+    Parameters
+    ----------
+    path : str or Path
+        A text table or Parquet with columns ``time north east``, s and m, north and east of any
+        mark in any direction; or the log of a unit on a shoe that has them (`foot_mounted`).
+    names : dict of str to str, optional
+        Column of the table to its name in the file.
+
+    Returns
+    -------
+    DataFrame
+        By ``time`` s: ``north``, ``east`` m.
+
+    Raises
+    ------
+    ConfigError
+        There is no such file.
+    DataError
+        It cannot be used; or it has fewer than two points, which no heading fits.
+    """
+    path = Path(path)
+    if path.is_file() and foot_mounted.detect_points(path):
+        time, places = foot_mounted.read_points(path)
+        table = pd.DataFrame(places, index=pd.Index(time, name="time"), columns=POINT)
+        table.attrs |= {"source": path.name, "findings": ()}
+        table = with_clock(table, Clock(RELATIVE))
+    else:
+        table = read_aid_table(path, dict.fromkeys(POINT, "m"), names=names)
+    if len(table) < 2:
+        raise DataError(
+            f"{len(table)} control point: an origin and a heading fit it whatever the path is",
+            file=path.name,
+            remedy="give two or more",
+        )
+    return table

@@ -1,0 +1,144 @@
+"""MATLAB files of a unit on a shoe, with the places that were trodden on.
+
+The layout of https://github.com/mtahakoroglu/LLIO-aided-iPyShoe: ``imu_data`` (n, 6), specific
+force in m/s² and rates in rad/s along forward, right, down; ``timestamps`` s. Where control points
+were surveyed: ``GCP`` (m, 2), north and east in m from a mark and a direction of one's own, and
+``strideIndex``, the sample, counted from zero, in which the foot stood on each.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError
+from strapdown.formats import matlab
+from strapdown.formats.recording import RawLog
+
+__all__ = ["detect", "detect_points", "read", "read_points"]
+
+Array = NDArray[np.float64]
+LOG, POINTS = ("timestamps", "imu_data"), ("strideIndex", "GCP")
+COLUMNS = [*(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz")]
+
+
+def detect(path: Path) -> bool:
+    """Tell by the names of the arrays."""
+    return set(LOG) <= _names(path)
+
+
+def detect_points(path: Path) -> bool:
+    """Tell by the names of the arrays."""
+    return {*LOG, *POINTS} <= _names(path)
+
+
+def _names(path: Path) -> set[str]:
+    if not matlab.detect(path):
+        return set()
+    from scipy.io import whosmat
+
+    try:
+        return {name for name, _, _ in whosmat(path)}
+    except Exception:  # what is damaged is told by the reader of MATLAB files
+        return set()
+
+
+def _arrays(path: Path, *names: str) -> dict[str, Any]:
+    arrays, _ = matlab.read_arrays(path)
+    for name in names:
+        if name not in arrays:
+            raise DataError(
+                f"there is no array of numbers '{name}' in it; it holds: {', '.join(arrays)}",
+                file=path.name,
+                quantity=name,
+                remedy="save the log with all of its arrays",
+            )
+    return {name: arrays[name].astype(np.float64) for name in names}
+
+
+def _log(path: Path) -> tuple[Array, Array]:
+    arrays = _arrays(path, *LOG)
+    time, imu = arrays["timestamps"].reshape(-1), arrays["imu_data"]
+    if imu.shape != (time.size, len(COLUMNS)):
+        raise DataError(
+            f"shapes {arrays['timestamps'].shape} and {imu.shape}, where n stamps and (n, 6) "
+            "belong",
+            file=path.name,
+            quantity="timestamps, imu_data",
+            remedy="save six numbers a stamp",
+        )
+    return time, imu
+
+
+def read(path: Path) -> RawLog:
+    """Read rates and specific force.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        The file is damaged, or its arrays have other shapes.
+    """
+    time, imu = _log(path)
+    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "s")}
+    stated |= {n: (n, "rad/s" if n.startswith("gyro") else "m/s2") for n in COLUMNS}
+    return RawLog(
+        name=path.name,
+        files=(path,),
+        columns={"time": time} | {n: imu[:, k] for k, n in enumerate(COLUMNS)},
+        stated=stated,
+        sampling="instantaneous",
+        axes="x,y,z",
+    )
+
+
+def read_points(path: Path) -> tuple[Array, Array]:
+    """Read the control points.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    time : ndarray, (m,), s
+        When the foot stood on each.
+    places : ndarray, (m, 2), m
+        North and east.
+
+    Raises
+    ------
+    DataError
+        As `read`; or a point has no sample, or there are not as many of both.
+    """
+    time, _ = _log(path)
+    arrays = _arrays(path, *POINTS)
+    at, places = arrays["strideIndex"].reshape(-1), arrays["GCP"]
+    if places.shape != (at.size, 2):
+        raise DataError(
+            f"{at.size} samples, and control points of shape {places.shape}",
+            file=path.name,
+            quantity="strideIndex, GCP",
+            remedy="save north and east of each",
+        )
+    within = (at >= 0) & (at < time.size) & (at == np.floor(at))
+    if not within.all():
+        k = int(np.argmin(within))
+        raise DataError(
+            f"{at[k]:g} is no sample of the {time.size} there are, counted from zero",
+            file=path.name,
+            row=k + 1,
+            quantity="strideIndex",
+            remedy="save the sample of each control point",
+        )
+    return time[at.astype(np.intp)], places

@@ -1,0 +1,328 @@
+"""A unit on a shoe: stances at which it does not move to the last bit, and swings between them.
+
+Each stride lifts the shoe off heel first, carries it over and sets it down heel first, with a blow;
+everything is a sum of moves of least jerk, so that velocity, acceleration and rate are exact and in
+stances exactly zero. What a leg does is simplified: the unit stays in the plane of the stride, and
+the shoe does not roll over its sole while it stands.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.exceptions import ConfigError
+from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin
+from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
+from strapdown.simulation.minimum_jerk import Track
+from strapdown.simulation.path_motion import MOST_PITCH
+from strapdown.simulation.place_integral import PlaceIntegral, integrate_velocity
+
+__all__ = ["GAITS", "Gait", "Stride", "WalkingMotion", "walk"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Gait:
+    """How a foot goes; largest values of least-jerk moves are 15/8 of the mean rate.
+
+    Attributes
+    ----------
+    stride : float, m
+        From a stance to the next of the same foot.
+    swing, stance : float, s
+    lift : float, m
+        Of the unit over the ground.
+    heel_off_deg, toe_up_deg : float, deg
+        Pitch downward when the heel is off, and upward before it strikes.
+    strike : float, m
+        Height from which the shoe falls onto its heel at the end,
+    strike_time : float, s
+        within this time: about ``5.8 strike / strike_time²`` of acceleration.
+    """
+
+    stride: float
+    swing: float
+    stance: float
+    lift: float
+    heel_off_deg: float
+    toe_up_deg: float
+    strike: float
+    strike_time: float
+
+    def __post_init__(self) -> None:
+        for name in ("swing", "stance", "strike_time"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ConfigError(
+                    "a gait needs a time above zero", quantity=name, remedy="give seconds"
+                )
+        if not self.strike_time < 0.2 * self.swing:
+            raise ConfigError(
+                "the blow lasts more than a fifth of the swing",
+                quantity="strike_time",
+                remedy="give less, as 0.02 s",
+            )
+        if not max(abs(self.heel_off_deg), abs(self.toe_up_deg)) < MOST_PITCH:
+            raise ConfigError(
+                f"the shoe pitches by {MOST_PITCH:g} deg or more",
+                quantity="pitch",
+                remedy="give less",
+            )
+
+
+#: Peaks of a walk: 460 deg/s and 7 g, of the blow; of a run: 970 deg/s and 11 g.
+GAITS: dict[str, Gait] = {
+    "walk": Gait(1.35, 0.55, 0.57, 0.08, 45.0, 22.0, 0.004, 0.020),
+    "run": Gait(2.20, 0.45, 0.22, 0.20, 70.0, 25.0, 0.007, 0.020),
+    "shuffle": Gait(0.50, 0.45, 0.75, 0.02, 15.0, 8.0, 0.001, 0.020),
+}
+
+
+@dataclass(frozen=True)
+class Stride:
+    """One stride.
+
+    Attributes
+    ----------
+    gait : Gait
+    turn_deg : float, deg
+        Of the foot, to the right, during the swing; it goes where it then points.
+    climb : float, m
+        Up a stair.
+    size : float
+        Of the length of the gait's stride; zero: a turn on the spot.
+    """
+
+    gait: Gait
+    turn_deg: float = 0.0
+    climb: float = 0.0
+    size: float = 1.0
+
+
+@dataclass(frozen=True)
+class WalkingMotion(EarthMotion):
+    """Strides one after the other, from a stance to a stance.
+
+    Attributes
+    ----------
+    strides : tuple of Stride
+    origin : Origin
+    heading_deg : float, deg
+    stand : float, s
+        At the beginning, and at the end.
+    roll_deg, pitch_deg : float, deg
+        Of the unit on a shoe that is flat on the ground.
+    ellipsoid : Ellipsoid
+
+    Raises
+    ------
+    ConfigError
+        There is no stride, or the unit would pitch by 80 deg or more.
+    """
+
+    strides: tuple[Stride, ...]
+    origin: Origin
+    heading_deg: float = 0.0
+    stand: float = 5.0
+    roll_deg: float = 0.0
+    pitch_deg: float = 0.0
+    ellipsoid: Ellipsoid = WGS84
+
+    def __post_init__(self) -> None:
+        if not self.strides or not 0.0 < self.stand < math.inf:
+            raise ConfigError(
+                "a walk has a stride and a stand",
+                quantity="strides",
+                remedy="give a stride or more, and a stand of some seconds",
+            )
+        steep = max(max(s.gait.heel_off_deg, s.gait.toe_up_deg) for s in self.strides)
+        if not steep + abs(self.pitch_deg) < MOST_PITCH + 8.0:
+            raise ConfigError(
+                f"the unit pitches by {steep + abs(self.pitch_deg):.3g} deg",
+                quantity="pitch_deg",
+                remedy="mount it less steeply",
+            )
+
+    @property
+    def duration(self) -> float:  # type: ignore[override]
+        """Length in s."""
+        return self.swings[-1][1] + self.stand
+
+    @cached_property
+    def swings(self) -> tuple[tuple[float, float], ...]:
+        """Begin and end of each swing, s: between them the unit does not move."""
+        out, at = [], self.stand
+        for stride in self.strides:
+            out.append((at, at + stride.gait.swing))
+            at += stride.gait.swing + stride.gait.stance
+        return tuple(out)
+
+    @property
+    def breaks(self) -> Sequence[float]:
+        """Where a move begins or ends, s."""
+        tracks = (*self._tracks.place, *self._tracks.lift, self._tracks.pitch, self._tracks.heading)
+        inner = {t for track in tracks for t in track.times if 0.0 < t < self.duration}
+        return [0.0, *sorted(inner), self.duration]
+
+    def stances(self, time: Array) -> NDArray[np.bool_]:
+        """Whether the unit does not move at instants, (n,) in s."""
+        begins, ends = np.array(self.swings).T
+        k = np.searchsorted(begins, time, side="left") - 1
+        return np.asarray((k < 0) | (time >= ends[k]))
+
+    @property
+    def footfalls(self) -> Array:
+        """Middles of the stances, (n + 1,), s."""
+        begins, ends = np.array(self.swings).T
+        middles: Array = 0.5 * (np.append(0.0, ends) + np.append(begins, self.duration))
+        return middles
+
+    def kinematics(self, time: Array) -> Kinematics:
+        """State at instants; as `EarthMotion.kinematics`."""
+        parts = [track.evaluate(time) for track in (self._tracks.pitch, self._tracks.heading)]
+        still = np.zeros(len(time))
+        angles = np.column_stack([still + self.roll_deg, parts[0][0], parts[1][0]])
+        rates = np.column_stack([still, parts[0][1], parts[1][1]])
+        moved = self._moving(time)
+        return Kinematics(
+            self._moved(time),
+            moved[0],
+            moved[1],
+            euler_attitude(angles, (1.0, 0.0, 0.0, 0.0)),
+            euler_body_rate(angles, rates),
+            angles,
+        )
+
+    def _moving(self, time: Array) -> tuple[Array, Array]:
+        """Velocity and acceleration."""
+        out = [track.evaluate(time) for track in self._tracks.place]
+        lifted = [track.evaluate(time) for track in self._tracks.lift]
+        velocity = np.column_stack([v for _, v, _ in out])
+        acceleration = np.column_stack([a for _, _, a in out])
+        velocity[:, 2] += sum(v for _, v, _ in lifted)
+        acceleration[:, 2] += sum(a for _, _, a in lifted)
+        return velocity, acceleration
+
+    @cached_property
+    def _moved(self) -> PlaceIntegral:
+        return integrate_velocity(
+            lambda time: self._moving(time)[0], self.breaks, self.origin, self.ellipsoid
+        )
+
+    @cached_property
+    def _steps(self) -> list[tuple[float, float, float, float]]:
+        """North, east, down, heading of each stance."""
+        out = [(0.0, 0.0, 0.0, self.heading_deg)]
+        for stride in self.strides:
+            n, e, d, heading = out[-1]
+            heading += stride.turn_deg
+            way = stride.size * stride.gait.stride
+            turned = math.radians(heading)
+            out.append(
+                (
+                    n + way * math.cos(turned),
+                    e + way * math.sin(turned),
+                    d - stride.climb,
+                    heading,
+                )
+            )
+        return out
+
+    @cached_property
+    def _tracks(self) -> _Tracks:
+        times: list[float] = [0.0]
+        places: list[tuple[float, float, float, float]] = [self._steps[0]]
+        lifted: list[tuple[float, float]] = [(0.0, 0.0)]
+        pitched: list[tuple[float, float]] = [(0.0, self.pitch_deg)]
+        for (begin, end), stride, before, after in zip(
+            self.swings, self.strides, self._steps[:-1], self._steps[1:], strict=True
+        ):
+            gait = stride.gait
+            length, blow = end - begin, end - gait.strike_time
+            times += [begin, blow]
+            places += [before, after]
+            lifted += [
+                (begin, 0.0),
+                (begin + 0.45 * length, -gait.lift),
+                (blow, -gait.strike),
+                (end, 0.0),
+            ]
+            pitched += [
+                (begin, self.pitch_deg),
+                (begin + 0.3 * length, self.pitch_deg - gait.heel_off_deg),
+                (begin + 0.8 * length, self.pitch_deg + gait.toe_up_deg),
+                (end, self.pitch_deg),
+            ]
+        north, east, down, heading = (
+            Track(tuple(times), column) for column in zip(*places, strict=True)
+        )
+        lift = Track(*(tuple(column) for column in zip(*lifted, strict=True)))
+        pitch = Track(*(tuple(column) for column in zip(*pitched, strict=True)))
+        return _Tracks((north, east, down), (lift,), pitch, heading)
+
+
+@dataclass(frozen=True)
+class _Tracks:
+    place: tuple[Track, Track, Track]
+    lift: tuple[Track, ...]
+    pitch: Track
+    heading: Track
+
+
+def walk(
+    gait: Gait,
+    strides: int,
+    origin: Origin,
+    *,
+    corner_each: int = 10,
+    corner_deg: float = 90.0,
+    stairs: Sequence[int] = (),
+    climb: float = 0.17,
+    heading_deg: float = 0.0,
+    stand: float = 5.0,
+    roll_deg: float = 0.0,
+    pitch_deg: float = 0.0,
+    ellipsoid: Ellipsoid = WGS84,
+) -> WalkingMotion:
+    """Walk around blocks.
+
+    Parameters
+    ----------
+    gait : Gait
+    strides : int
+    origin : Origin
+    corner_each : int
+        A corner after so many strides; none, if zero. It takes two strides.
+    corner_deg : float, deg
+        To the right.
+    stairs : sequence of int
+        Strides that climb two stairs, counted from zero, and come 0.6 m forward.
+    climb : float, m
+        Height of a stair.
+    heading_deg, stand, roll_deg, pitch_deg, ellipsoid
+        As `WalkingMotion`.
+
+    Returns
+    -------
+    WalkingMotion
+    """
+    listed = []
+    for k in range(strides):
+        corner = corner_each > 0 and k >= corner_each and k % corner_each in (0, 1)
+        up = k in stairs
+        listed.append(
+            Stride(
+                gait,
+                0.5 * corner_deg if corner else 0.0,
+                2.0 * climb if up else 0.0,
+                0.6 / gait.stride if up else (0.6 if corner else 1.0),
+            )
+        )
+    return WalkingMotion(tuple(listed), origin, heading_deg, stand, roll_deg, pitch_deg, ellipsoid)

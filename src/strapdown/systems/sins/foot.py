@@ -1,0 +1,186 @@
+"""A chain for the log of a unit on a shoe, without satellites: a path from where it began."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.estimation.resting_sensors import resting_sd
+from strapdown.estimation.stated_states import states_that_are_stated
+from strapdown.exceptions import DataError
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.systems.sins.proposal import Proposal
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["STANCE", "STANDING", "on_foot", "second_order", "standing_time"]
+
+#: Zero velocity at stances. Noise of a stance: a foot sways and the sole gives, far beyond the
+#: noise of a sensor: so much a sample. The threshold begins at ten of these, 10 deg/s and 1 m/s²,
+#: and goes to where stances and swings part. A speed that the filter knows better than this is no
+#: stance, unless none was seen for five seconds. The shoe rolls over its sole, about the ground
+#: 0.1 m below the unit, all of a stance.
+STANCE: dict[str, Any] = {
+    "kind": "zero_velocity",
+    "detector": "shoe",
+    "window_s": 0.025,
+    "threshold": 10.0,
+    "threshold_rule": "otsu",
+    "rate_sd_deg_per_s": 1.0,
+    "force_sd_m_per_s2": 0.1,
+    "interval_s": 0.02,
+    "largest_speed_m_per_s": 0.5,
+    "gate_time_s": 5.0,
+    "sd_m_per_s": 0.02,
+    "pivot_m": 0.1,
+    "correlation_time_s": 0.1,
+}
+#: No turn where the whole person stands: bias of the gyros, as well as a body that sways lets it
+#: be known.
+STANDING: dict[str, Any] = {
+    "kind": "zero_rate",
+    "detector": "variance",
+    "window_s": 0.4,
+    "threshold": 3.0,
+    "rate_sd_deg_per_s": 0.5,
+    "force_sd_m_per_s2": 0.05,
+    "interval_s": 0.4,
+    "largest_speed_m_per_s": 0.2,
+    "sd_deg_per_s": 0.3,
+}
+#: A foot that has left its stance turns or pushes more than this, rad/s and m/s².
+LEAVES, PUSHES = math.radians(30.0), 2.0
+#: Before the first such sample it begins to, s; and so long it must stand, s.
+BEFORE, LEAST = 0.2, 0.3
+#: Of the standing start the alignment takes half, so that gyros are told their bias by the other,
+#: and at most so much, s.
+LONGEST = 10.0
+#: Longest step of the covariance, s: in a swing of half a second a foot turns by 70 deg and back,
+#: and over steps of 0.1 s the errors of a sensor would be laid to the wrong directions.
+STEP = 0.02
+#: Over so long, some strides, what a filter takes for linear stays what it is, s.
+BENT = 10.0
+#: The place is counted from the start: how well that is known itself is not in the answer, m, m/s.
+HERE, STILL = 0.01, 0.01
+#: The heading is counted from where the unit points at the start, deg.
+FROM_START = 0.1
+
+
+def standing_time(imu: pd.DataFrame) -> float:
+    """Return how long a unit stands at the start of a record.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table with specific force.
+
+    Returns
+    -------
+    float, s
+        Until it turns by 30 deg/s or feels 2 m/s² beyond gravity, less 0.2 s.
+    """
+    time = index_of(imu)
+    rate = np.linalg.norm(values_of(imu, GYRO), axis=1)
+    force: NDArray[np.float64] = np.linalg.norm(values_of(imu, ACCEL), axis=1)
+    moves = np.flatnonzero((rate > LEAVES) | (np.abs(force - STANDARD_GRAVITY) > PUSHES))
+    end = float(time[moves[0]]) - BEFORE if moves.size else float(time[-1])
+    return max(end - float(time[0]), 0.0)
+
+
+def second_order(sensors: ImuUncertainty) -> float:
+    """Return what a linear filter leaves of a tilt that accelerometers at rest do not know.
+
+    Parameters
+    ----------
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    float, m/s²
+        ``sqrt(2) g sd²`` of the tilt's standard deviation sd: root mean square of
+        ``g (x² + y²)/2``, by which gravity along a body that is tilted by x and y differs from that
+        of one that is not. All that was learnt of the accelerometers before the tilt is known, as
+        it is at the first corner, is off by as much after that.
+    """
+    _, accel = resting_sd(sensors, (0.0, 0.0, 0.0), (0.0, 0.0, -STANDARD_GRAVITY))
+    return math.sqrt(2.0) * STANDARD_GRAVITY * float(max(accel[:2]) / STANDARD_GRAVITY) ** 2
+
+
+def on_foot(made: Proposal) -> Proposal:
+    """Return the chain for a unit on a shoe in the place of that for a vehicle.
+
+    Parameters
+    ----------
+    made : Proposal
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    DataError
+        The log has no accelerometers, or it does not begin with a stand.
+    """
+    if ACCEL[0] not in made.imu.columns:
+        raise DataError(
+            "it has no accelerometers, and a path is the integral of what they read",
+            file=source_of(made.imu),
+            quantity="accel",
+            remedy="record gyros and accelerometers",
+        )
+    rest = standing_time(made.imu)
+    if rest < LEAST:
+        raise DataError(
+            f"it does not stand where it begins: it moves after {rest:.2g} s, and roll and pitch "
+            "are found at a stand",
+            file=source_of(made.imu),
+            quantity="accel",
+            remedy="stand for five seconds before the first step; or begin where it stands: write "
+            "from_s under [log] of the file that init writes without --foot",
+        )
+    length = math.floor(10.0 * min(max(0.5 * rest, LEAST), LONGEST)) / 10.0
+    # Noise that shakes it is how a foot goes, and none of the sensor's. Whatever goes with rate and
+    # force is at its largest on a foot: a g-sensitivity of 0.1 deg/s/g turns a run by degrees.
+    named = made.table.get("sensors", {}).get("sensor")
+    sensors: dict[str, Any] = {}
+    states = dict(made.table.get("states", {}))
+    if named is not None:
+        known = ImuUncertainty.of_sensor(load_sensor(named))
+        names = states_that_are_stated(known)
+        sensors = {"sensor": named, "states": names}
+        drift = second_order(known)
+        if drift > max(known.accel_drift.triad) and "accel_drift" in names:
+            rounded = float(f"{drift / STANDARD_GRAVITY * 1e6:.2g}")
+            states["accel_drift"] = {"sd_ug": rounded, "correlation_time_s": BENT}
+    table = {
+        **made.table,
+        "sensors": sensors,
+        **({"states": states} if states else {}),
+        "coarse": {
+            "kind": "known_heading",
+            "heading_deg": 0.0,
+            "sd_deg": FROM_START,
+            "duration_s": max(length, LEAST),
+        },
+        "fine": {"kind": "none"},
+        "filter": {"kind": "error_state", "step_s": STEP},
+        "recorder": {"kind": "full"},
+        "aiding": {
+            **made.table.get("aiding", {}),
+            "stance": dict(STANCE),
+            "standing": dict(STANDING),
+        },
+    }
+    how = (
+        f"it stands for the first {rest:.3g} s: levelled by half of that. The heading is counted "
+        "from where the unit then points: north of the answer is there, unless you state another"
+    )
+    return replace(made, table=table, rest=rest, drives=False, how=how)

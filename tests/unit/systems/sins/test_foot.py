@@ -1,0 +1,265 @@
+"""A unit on a shoe: the file that is proposed, the recording, and walks with an exact truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from strapdown.config.alignment import LogTable
+from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
+from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.ellipsoids import WGS84
+from strapdown.estimation.stated_states import states_that_are_stated
+from strapdown.evaluation.truth_comparison import compare_with_truth
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats import csv
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.simulation import GAITS, Origin, simulate_imu, walk
+from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.draft import draft_navigation
+from strapdown.systems.sins.drive import run_batch, run_by_sample
+from strapdown.systems.sins.foot import STANCE, STANDING, STEP, standing_time
+from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.trajectory_source import make_motion
+
+RECORDING = "foot/SensorConnectData_32_LLIO.mat"
+HERE = {"lat_deg": 48.0, "lon_deg": 11.0, "alt_m": 500.0}
+
+
+@cache
+def walked(gait="walk", sensor="xsens-mti-1", seed=1, detector="shoe", rule="otsu", strides=20):
+    """A walk through the chain that `init navigate --foot` writes."""
+    known = ImuUncertainty.of_sensor(load_sensor(sensor))
+    motion = {"kind": "walking", "gait": gait, "strides": strides, "corner_each": 8, "stand_s": 6.0}
+    spec = navigation_spec(
+        {
+            "name": "walk",
+            "simulation": {
+                "motion": {**motion, **HERE, "roll_deg": 5.0, "pitch_deg": -15.0, "stairs": [5, 6]},
+                "rate_hz": 200.0,
+                "seed": seed,
+                "sensor": sensor,
+            },
+            "site": {**HERE, "position_sd_m": 0.01, "velocity_sd_m_per_s": 0.01},
+            "sensors": {"sensor": sensor, "states": states_that_are_stated(known)},
+            "coarse": {
+                "kind": "known_heading",
+                "heading_deg": 0.0,
+                "sd_deg": 0.1,
+                "duration_s": 3.0,
+            },
+            "fine": "none",
+            "filter": {"kind": "error_state", "step_s": STEP},
+            "recorder": "full",
+            "aiding": {
+                "stance": {**STANCE, "detector": detector, "threshold_rule": rule},
+                "standing": STANDING,
+            },
+        }
+    )
+    return spec, run_navigation(spec), make_motion(spec.simulation.motion, WGS84)
+
+
+def found_stances(result, motion):
+    """Share of the stances in which zero velocity was observed, and of the epochs in a swing."""
+    at = result.record.innovations["stance.velocity"].index.to_numpy()
+    begins, ends = np.array(motion.swings).T
+    edges = zip(np.append(0.0, ends), np.append(begins, motion.duration), strict=True)
+    hits = [((at > begin) & (at <= end + 1e-9)).any() for begin, end in edges if begin > 3.0]
+    return np.mean(hits), (~motion.stances(at - 1e-9)).mean()
+
+
+@pytest.mark.parametrize("gait", ["walk", "run", "shuffle"])
+@pytest.mark.parametrize(
+    ("detector", "rule"),
+    [
+        ("shoe", "otsu"),
+        ("shoe", "stated"),
+        ("rate_energy", "patience"),
+        ("force_variance", "otsu"),
+        ("force_magnitude", "otsu"),
+    ],
+)
+def test_stances_of_every_gait_are_found_and_no_swing(gait, detector, rule):
+    _, result, motion = walked(gait, detector=detector, rule=rule)
+    found, false = found_stances(result, motion)
+    assert found == 1.0
+    # A window of 25 ms that ends with a swing has begun in the stance.
+    assert false < 0.01
+    there = compare_with_truth(
+        result.record.trajectory,
+        result.record.sd.index,
+        result.record.covariance,
+        result.source.truth,
+    )
+    # Over some 8 to 35 m: 2 % of the way, and 0.15 m of the stances.
+    way = (
+        float(np.hypot(*np.diff(motion.kinematics(motion.footfalls).moved[:, :2].T)).sum()) * 6.4e6
+    )
+    assert np.hypot(*there.errors[-1, :2]) < 0.02 * way + 0.15
+    assert there.inside["horizontal"] > 0.9
+
+
+@pytest.mark.slow
+def test_bounds_of_many_walks_hold():
+    """Twelve seeds of a walk and of a run: what is claimed of place and heading at the end.
+
+    The true error of a stance is zero here and 2 cm/s is stated, so that bounds are wide: of 24
+    ellipses of 95 percent two outside are left to chance (p = 0.12), and 4 are not (p = 0.03).
+    """
+    squares, headings = [], []
+    for gait in ("walk", "run"):
+        for seed in range(1, 13):
+            _, result, _ = walked(gait, "icm-42688-p", seed)
+            there = compare_with_truth(
+                result.record.trajectory,
+                result.record.sd.index,
+                result.record.covariance,
+                result.source.truth,
+            )
+            e, P = there.errors[-1], there.covariance[-1]
+            squares.append(float(e[:2] @ np.linalg.solve(P[:2, :2], e[:2])))
+            headings.append(float(e[8] ** 2 / P[8, 8]))
+    assert (np.array(squares) > 5.99).sum() < 4
+    assert (np.array(headings) > 3.84).sum() < 4
+    # And they are of use: the mean square of the heading is not a tenth of what is claimed.
+    assert np.mean(headings) > 0.1
+
+
+def test_a_walk_by_sample_is_the_walk_at_once():
+    """To the last bit, with a threshold that finds itself."""
+    spec, whole, _ = walked(strides=4)
+    chain = make_chain(spec, uncertainty_of(spec))
+    imu = whole.source.imu
+    at_once = run_batch(chain, imu, {}, None)
+    by_sample = run_by_sample(chain, imu, {}, None)
+    for a, b in zip(
+        (at_once.record.trajectory, at_once.record.sd, at_once.record.sensors),
+        (by_sample.record.trajectory, by_sample.record.sd, by_sample.record.sensors),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(a.index, b.index)
+        np.testing.assert_array_equal(a.to_numpy(), b.to_numpy())
+    assert (
+        at_once.record.innovations["stance.velocity"].index
+        == by_sample.record.innovations["stance.velocity"].index
+    ).all()
+
+
+def log_of(path, stand=6.0):
+    motion = walk(GAITS["walk"], 3, Origin(48.0, 11.0, 500.0), stand=stand)
+    imu, _ = simulate_imu(motion, load_sensor("xsens-mti-1").draw(1), rate=200.0, seed=1)
+    names = {c: f"{c}_{'rad_per_s' if 'gyro' in c else 'm_per_s2'}" for c in imu.columns}
+    columns = {"time_s": imu.index.to_numpy()} | {n: imu[c].to_numpy() for c, n in names.items()}
+    csv.write(path, columns, {})
+    return imu
+
+
+def test_the_file_that_is_written_asks_for_the_latitude_alone(tmp_path):
+    imu = log_of(tmp_path / "walk.csv")
+    # The first swing begins after 6 s; its first 5 ms are no 30 deg/s.
+    assert standing_time(imu) == pytest.approx(5.82, abs=0.03)
+    draft = draft_navigation(
+        LogTable(path=str(tmp_path / "walk.csv")), folder=tmp_path, sensor="xsens-mti-1", foot=True
+    )
+    assert [one.key for one in draft.asked] == ["lat_deg"]
+    file = tmp_path / "foot.toml"
+    file.write_text(draft.text)
+    with pytest.raises(ConfigError, match="still open") as refused:
+        read_navigation_spec(file)
+    assert "latitude" in str(refused.value)
+    file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
+    spec = read_navigation_spec(file)
+    assert spec.aiding.stance.detector == "shoe"
+    assert spec.aiding.standing.kind == "zero_rate"
+    assert "g_sensitivity" in spec.sensors.states
+    result = run_navigation(spec)
+    assert result.record.innovations["stance.velocity"].shape[0] > 200
+
+
+@pytest.mark.parametrize(("sensor", "written"), [("mpu-9250", 1900.0), ("xsens-mti-1", None)])
+def test_a_start_by_bad_accelerometers_drifts_by_the_square_of_its_tilt(tmp_path, sensor, written):
+    """Of 60 mg, 3 % of gravity and 2 % across, all uniform: 36 mg, and sqrt(2) of its square."""
+    log_of(tmp_path / "walk.csv")
+    log = LogTable(path=str(tmp_path / "walk.csv"))
+    draft = draft_navigation(log, folder=tmp_path, sensor=sensor, foot=True)
+    file = tmp_path / "foot.toml"
+    file.write_text(draft.text.replace('lat_deg = "?"', "lat_deg = 48.0"))
+    stated = read_navigation_spec(file).states.accel_drift
+    assert (stated and stated.sd_ug) == written
+
+
+def test_a_range_that_a_walk_leaves_is_said_and_widens_its_bounds():
+    """400 deg/s of range, and 460 of the walk: 9 % of its samples are cut off."""
+    _, result, _ = walked("walk", "stim300")
+    (said,) = [one for one in result.findings if "saturated" in one.what]
+    assert said.quantity == "gyro_y" and said.row is not None and said.remedy
+    there = compare_with_truth(
+        result.record.trajectory,
+        result.record.sd.index,
+        result.record.covariance,
+        result.source.truth,
+    )
+    assert np.hypot(*there.errors[-1, :2]) < 0.5  # 5 m without
+    assert there.inside["horizontal"] > 0.95
+
+
+def test_a_run_whose_turns_are_cut_off_is_refused():
+    with pytest.raises(DataError, match="saturated") as refused:
+        walked("run", "stim300")
+    assert "gyro_y" in str(refused.value)
+
+
+def test_a_log_that_begins_on_the_move_is_refused(tmp_path):
+    log_of(tmp_path / "walk.csv", stand=0.3)
+    with pytest.raises(DataError, match="does not stand where it begins") as refused:
+        draft_navigation(LogTable(path=str(tmp_path / "walk.csv")), folder=tmp_path, foot=True)
+    assert refused.value.finding.remedy
+
+
+@pytest.fixture(scope="module")
+def proposed(recordings, tmp_path_factory):
+    """The recording with the file that is proposed for it, and its latitude put in."""
+    path = recordings(RECORDING)
+    folder = tmp_path_factory.mktemp("foot")
+    draft = draft_navigation(LogTable(path=str(path)), folder=folder, foot=True)
+    file = folder / "foot.toml"
+    text = draft.text.replace('lat_deg = "?"', "lat_deg = 41.0")
+    file.write_text(f'{text}\n[control_points]\npath = "{path}"\n')
+    return read_navigation_spec(file)
+
+
+@pytest.mark.parametrize(
+    "detector",
+    ["shoe", "rate_energy", "force_variance", "force_magnitude", "variance", "force_spread"],
+)
+@pytest.mark.parametrize("rule", ["stated", "otsu"])
+def test_the_recording_is_walked_to_its_control_points(proposed, detector, rule):
+    """What is asked is 2 % of 79.59 m; as it is proposed, and by every detector, a third of it."""
+    stance = proposed.aiding.stance.model_copy(
+        update={"detector": detector, "threshold_rule": rule}
+    )
+    spec = proposed.model_copy(
+        update={"aiding": proposed.aiding.model_copy(update={"stance": stance})}
+    )
+    found = run_navigation(spec).points
+    assert len(found.time) == 62
+    assert found.rms < 0.6
+    assert found.median < 0.4
+    assert found.largest < 1.2
+
+
+def test_the_other_order_of_north_and_east_does_not_fit(proposed):
+    """A path and its mirror image leave metres."""
+    from strapdown.evaluation.control_points import score_control_points
+
+    result = run_navigation(proposed)
+    points = result.source.points
+    swapped = points[["east", "north"]].set_axis(["north", "east"], axis=1)
+    swapped.attrs = dict(points.attrs)
+    assert score_control_points(result.record.trajectory, swapped).rms > 5.0
+    assert replace(result.points, given=1).rms < 0.6
