@@ -118,7 +118,13 @@ CASES = {
     "zero_velocity": Case(ZeroVelocity(name="rest"), rested, ("rest",)),
     "zero_rate": Case(ZeroRate(name="still"), rested, ("rest",)),
     "no_slip": Case(
-        NoSlip(name="wheels", lever_arm=AXLE, mounting_sd_deg=(5.0, 5.0), **ANGLES),
+        NoSlip(
+            name="wheels",
+            lever_arm=AXLE,
+            mounting_sd_deg=(5.0, 5.0),
+            compliance_sd_deg_per_g=(4.0, 2.0),
+            **ANGLES,
+        ),
         felt,
     ),
     "odometer": Case(

@@ -38,6 +38,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.damping import DAMPINGS
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.recorder import RECORDERS, FullRecorder
+from strapdown.navigation.smoother import SMOOTHERS
 from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
@@ -144,7 +145,15 @@ def in_random_pieces(chain, imu, told, recorder, seed):
 
 
 def assert_same(one, two):
-    a, b = one.record, two.record
+    assert_same_record(one.record, two.record)
+    if one.smoothed is not None:
+        assert_same_record(one.smoothed, two.smoothed)
+    for x, y in zip(one.aligned, two.aligned, strict=True):
+        np.testing.assert_array_equal(x.alignment.q_nb, y.alignment.q_nb)
+        np.testing.assert_array_equal(x.alignment.covariance, y.alignment.covariance)
+
+
+def assert_same_record(a, b):
     for name in ("trajectory", "sd", "sensors", "sensors_sd"):
         x, y = getattr(a, name), getattr(b, name)
         np.testing.assert_array_equal(x.index, y.index, err_msg=name)
@@ -157,9 +166,6 @@ def assert_same(one, two):
     assert a.events == b.events
     assert a.modes == b.modes
     assert dict(a.outages) == dict(b.outages)
-    for x, y in zip(one.aligned, two.aligned, strict=True):
-        np.testing.assert_array_equal(x.alignment.q_nb, y.alignment.q_nb)
-        np.testing.assert_array_equal(x.alignment.covariance, y.alignment.covariance)
 
 
 def assert_cuts(chain, imu, told, recorder=None, least=1):
@@ -220,6 +226,13 @@ def test_aids_together_with_an_estimated_time_offset():
     )
     told = {"rtk": fixes(), "old": fixes(seed=7), "wheel": tables()["odometer"]}
     assert_cuts(driving(navigation(aids=aids)), drive(), told)
+
+
+@pytest.mark.parametrize("name", SMOOTHERS)
+def test_smoothers(name):
+    navigator = replace(navigation(), smoother=SMOOTHERS[name]())
+    whole = assert_cuts(driving(navigator), drive(), of("gnss"))
+    assert whole.smoothed.sd["heading"].iloc[0] < whole.record.sd["heading"].iloc[0]
 
 
 @pytest.mark.parametrize("name", RECORDERS)
@@ -313,7 +326,8 @@ def test_a_long_gap_aligns_anew():
     kept.attrs = dict(imu.attrs)
     modes = (CoarseMode(way=COARSE_ALIGNMENTS["two_vector"](), until=Until(12.0)), Navigation())
     chain = standing(modes)
-    chain = replace(chain, intake=Intake(gaps=GapPolicy(beyond="align")))
+    smoothed = replace(chain.navigator, smoother=SMOOTHERS["rts"]())
+    chain = replace(chain, navigator=smoothed, intake=Intake(gaps=GapPolicy(beyond="align")))
     whole = assert_cuts(chain, kept, standing_fixes())
     assert [mode.name for mode in whole.record.modes] == [
         "coarse",

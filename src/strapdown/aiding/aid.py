@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -15,7 +16,7 @@ from strapdown.estimation.observation import Observation
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.estimation.update_rule import UpdateRule
 
-__all__ = ["Aid", "Epochs", "TableAid", "WatchingAid"]
+__all__ = ["Aid", "Epochs", "TableAid", "WatchingAid", "lasting"]
 
 Array = NDArray[np.float64]
 
@@ -59,6 +60,11 @@ class Aid(ABC):
     @property
     def wants_steady(self) -> bool:
         """Whether it looks at rate and force without the shaking: `View.steady`."""
+        return False
+
+    @property
+    def lasts(self) -> bool:
+        """Whether it states, and allows for, errors that last from one epoch to the next."""
         return False
 
     def states(self) -> tuple[SensorStates, ...]:
@@ -127,3 +133,8 @@ class WatchingAid(Aid):
         epochs : Epochs
             Where it observes: at the ends of some of these steps; and what it saw up to there.
         """
+
+
+def lasting(aids: Iterable[Aid]) -> tuple[str, ...]:
+    """Return the names of the aids that state that their errors last."""
+    return tuple(one.name for one in aids if one.lasts)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown._kernels import piecewise
 from strapdown.exceptions import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
@@ -262,9 +263,12 @@ def _best(
     change, lasting = change[used], (end - begin)[used]
     nodes, sums = _integrals(stamps, values, imu.attrs["sampling"] == "mean")
 
+    between, X = np.empty((len(at), 3)), np.empty((len(change), 4))
+    X[:, 3] = lasting
+
     def misfit(offset: float) -> float:
-        gone = np.diff(_between_nodes(nodes, sums, at - offset), axis=0)[used]
-        X = np.column_stack([gone, lasting])
+        piecewise.lines(nodes, sums, at - offset, between)
+        X[:, :3] = np.diff(between, axis=0)[used]
         # Of the normal equations, which keep digits enough to judge by, and are few.
         fit, *_ = np.linalg.lstsq(X.T @ X, X.T @ change, rcond=None)
         return float(np.square(change - X @ fit).sum())
@@ -301,14 +305,6 @@ def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]
     last = len(stamps) - 1
     kept = np.append(np.arange(0, last, each), last)
     return stamps[kept], sums[kept]
-
-
-def _between_nodes(nodes: Array, values: Array, time: Array) -> Array:
-    """Interpolate rows linearly, with one search for all columns."""
-    at = np.clip(np.searchsorted(nodes, time, side="right") - 1, 0, len(nodes) - 2)
-    share = (time - nodes[at]) / (nodes[at + 1] - nodes[at])
-    before = values[at]
-    return np.asarray(before + share[:, None] * (values[at + 1] - before))
 
 
 def _difference(time: Array, stamps: Array) -> tuple[str, str]:

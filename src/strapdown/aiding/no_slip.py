@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from strapdown._kernels.interval_sums import MEMORY, interval_sums
 from strapdown.aiding.aid import Epochs, WatchingAid
 from strapdown.aiding.checks import check_number, check_numbers
+from strapdown.aiding.correlated import longer_by
 from strapdown.aiding.point_velocity import point_velocity
 from strapdown.aiding.vehicle_axes import VehicleAxes
 from strapdown.aiding.view import View
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.sensor_blocks import unseen
 from strapdown.estimation.sensor_states import SensorStates
 
 __all__ = ["NoSlip"]
@@ -43,6 +45,10 @@ class NoSlip(WatchingAid):
     that of the errors times ``(1 + rho) / (1 - rho)``, ``rho = exp(-interval / correlation_time)``,
     so that a mean over many is as good as it is, whatever the `interval`.
 
+    Slip and dive are mostly no noise: tyres and springs yield by so much a g as long as load and
+    tyres are the same. With `compliance_sd_deg_per_g` that constant is estimated, and
+    `slip_deg_per_g` and `dive_deg_per_g` are of what is left.
+
     At rest it holds as well as on the move, and backwards as well as forwards.
 
     Attributes
@@ -62,6 +68,11 @@ class NoSlip(WatchingAid):
         Slip angle of the rear tyres by lateral force.
     dive_deg_per_g : float, deg/g
         Pitch of the body by longitudinal force.
+    compliance_sd_deg_per_g : tuple of float, deg/g
+        Of constants of the vehicle: above zero adds the states ``NAME.compliance``, by how much
+        the direction of travel turns to the right by force to the right (`slip`: below zero by
+        tyres alone; an arm that is x m too far forward adds ``x g / v²``), and down by force
+        forward (`dive`).
     correlation_time : float, s
     interval : float, s
         Between observations: they are at its multiples, or the first sample after.
@@ -81,6 +92,7 @@ class NoSlip(WatchingAid):
     vertical_sd: float = field(default=0.1, metadata={"unit": "m_per_s"})
     slip_deg_per_g: float = 4.0
     dive_deg_per_g: float = 2.0
+    compliance_sd_deg_per_g: tuple[float, float] = (0.0, 0.0)
     correlation_time: float = field(default=0.5, metadata={"unit": "s"})
     interval: float = 0.5
     largest_rate_deg_per_s: float = 45.0
@@ -93,6 +105,7 @@ class NoSlip(WatchingAid):
     def __post_init__(self) -> None:
         check_numbers(self, "lever_arm", 3)
         check_numbers(self, "mounting_sd_deg", 2, low=0.0)
+        check_numbers(self, "compliance_sd_deg_per_g", 2, low=0.0)
         for name in ("roll_deg", "pitch_deg", "yaw_deg"):
             check_number(self, name, low=-360.0, high=360.0)
         for name in ("lateral_sd", "vertical_sd", "interval"):
@@ -109,8 +122,14 @@ class NoSlip(WatchingAid):
         return VehicleAxes(angles, (0.0, *self.mounting_sd_deg))
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Return the states of the mounting, if it has a standard deviation."""
-        return self.axes.states(self.name)
+        """Return the states of mounting and compliance, where they have standard deviations."""
+        mounting = self.axes.states(self.name)
+        sds = dict(zip(YIELDING, self.compliance_sd_deg_per_g, strict=True))
+        if not any(sds.values()):
+            return mounting
+        labels = [label for label, sd in sds.items() if sd > 0.0]
+        block = f"{self.name}.compliance"
+        return (*mounting, unseen(block, labels, "rad/g", [math.radians(sds[x]) for x in labels]))
 
     def begin(self) -> Array:
         """Return nothing seen."""
@@ -123,6 +142,11 @@ class NoSlip(WatchingAid):
         count = interval_sums(time, rows, self.interval, memory, at, means)
         return memory, Epochs(time[at[:count]], means[:count])
 
+    @property
+    def lasts(self) -> bool:
+        """As `Aid.lasts`: where a correlation time is stated."""
+        return self.correlation_time > 0.0
+
     def observe(self, view: View, values: Array) -> list[Observation]:
         """Return the lateral and the vertical velocity, or nothing, as the limits say."""
         # About the third level axis, which is vertical.
@@ -132,24 +156,29 @@ class NoSlip(WatchingAid):
         axes = self.axes
         velocity, H = point_velocity(view, self.lever_arm)
         velocity, H = axes.of_vehicle(view, self.name, velocity, H)
-        C_vb = axes.now(view, self.name)
-        rate, force = C_vb @ values[:3], C_vb @ values[3:6]
+        rate = axes.now(view, self.name) @ values[:3]
+        force, of_force = axes.of_vehicle(view, self.name, values[3:6], np.zeros_like(H))
         if abs(rate[2]) > math.radians(self.largest_rate_deg_per_s):
             return []
-        lateral, vertical = np.radians([self.slip_deg_per_g, self.dive_deg_per_g]) * [
-            velocity[0] * force[1] / STANDARD_GRAVITY,
-            velocity[0] * force[0] / STANDARD_GRAVITY,
-        ]
-        sd = np.hypot([self.lateral_sd, self.vertical_sd], [lateral, vertical])
-        R = sd**2 * self._longer()
-        return [Observation(f"{self.name}.velocity", velocity[1:], H[1:], R, LABELS)]
+        # Slip goes with the force to the side, dive with that along.
+        load = force[[1, 0]] / STANDARD_GRAVITY
+        of_load = of_force[[1, 0]] / STANDARD_GRAVITY
+        yields = velocity[0] * load
+        z, dz = velocity[1:], H[1:]
+        block = f"{self.name}.compliance"
+        if view.has(block):
+            rows = [YIELDING.index(label) for label in view.labels(block)]
+            found = np.zeros(2)
+            found[rows] = view.estimate(block)
+            z = z - found * yields
+            dz = dz - found[:, None] * (load[:, None] * H[0] + velocity[0] * of_load)
+            dz[rows, view.place(block)] += np.diag(yields[rows])
+        left = np.radians([self.slip_deg_per_g, self.dive_deg_per_g]) * yields
+        sd = np.hypot([self.lateral_sd, self.vertical_sd], left)
+        R = sd**2 * longer_by(self.interval, self.correlation_time)
+        return [Observation(f"{self.name}.velocity", z, dz, R, LABELS)]
 
-    def _longer(self) -> float:
-        """By how much the variance of a mean of correlated errors exceeds that of others."""
-        if self.correlation_time == 0.0:
-            return 1.0
-        rho = math.exp(-self.interval / self.correlation_time)
-        return (1.0 + rho) / (1.0 - rho)
 
-
+#: What yields: tyres to the side, springs along.
+YIELDING = ("slip", "dive")
 LABELS = ("lateral, m/s", "vertical, m/s")

@@ -49,6 +49,8 @@ class View:
     steady : ndarray, (6,), optional
         Rate and force as fading means over some tenths of a second, as the sensors gave them, in
         the axes of the body of now; for an aid that wants them (`Aid.wants_steady`).
+    unobserved : float, s
+        Since anything was observed.
     """
 
     mechanization: Mechanization
@@ -61,6 +63,7 @@ class View:
     force: Array
     covariance_of: Callable[[], Array] | None = None
     steady: Array | None = None
+    unobserved: float = 0.0
 
     @cached_property
     def covariance(self) -> Array:

@@ -7,16 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
-from strapdown.tables.checks import (
-    as_array,
-    check_columns,
-    check_rows,
-    check_same_length,
-    check_time,
-    index_of,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import as_array, check_rows, check_same_length, checked_values
 from strapdown.tables.columns import EULER, QUATERNION
 
 
@@ -68,9 +59,5 @@ def check_attitude(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, or a quaternion's
         norm is not 1 within 1 %.
     """
-    source = source_of(table)
-    check_columns(table, QUATERNION + EULER, source)
-    check_time(index_of(table), source)
-    values = values_of(table, QUATERNION + EULER)
-    check_rows(values, QUATERNION + EULER, source)
+    values = checked_values(table, QUATERNION + EULER)
     rotation.conjugate(values[:, : len(QUATERNION)])

@@ -9,14 +9,11 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.exceptions import DataError
 from strapdown.tables.checks import (
     as_array,
-    check_columns,
-    check_positive_sd,
     check_rows,
-    check_time,
-    index_of,
+    checked_values,
+    each_row,
     joined,
     source_of,
-    values_of,
 )
 
 Array = NDArray[np.float64]
@@ -89,8 +86,8 @@ def barometer_table(
     DataError
         Shapes disagree, or as `check_barometer`.
     """
-    sd = np.full(np.size(time), height_sd) if np.ndim(height_sd) == 0 else height_sd
-    table = joined(time, BAROMETER, source, height=(height, None), height_sd=(sd, None))
+    blocks = {"height": (height, None), "height_sd": (each_row(height_sd, time), None)}
+    table = joined(time, BAROMETER, source, **blocks)
     check_barometer(table)
     return table
 
@@ -136,8 +133,7 @@ def barometer_from_pressure(
             quantity="pressure_pa",
             remedy=remedy,
         )
-    sd = np.full(len(p), pressure_sd_pa) if np.ndim(pressure_sd_pa) == 0 else pressure_sd_pa
-    spread = as_array(sd, None, "pressure_sd_pa", source)
+    spread = as_array(each_row(pressure_sd_pa, p), None, "pressure_sd_pa", source)
     return barometer_table(time, standard_height(p), -standard_slope(p) * spread, source)
 
 
@@ -154,18 +150,13 @@ def check_barometer(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a standard deviation is
         not above zero, or a height is none.
     """
-    source = source_of(table)
-    check_columns(table, BAROMETER, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, ["height"]), ["height"], source)
-    check_positive_sd(table, ["height_sd"], source)
-    height = values_of(table, ["height"])[:, 0]
+    height = checked_values(table, ["height"], ["height_sd"])[:, 0]
     beyond = np.flatnonzero((height < LOWEST) | (height > HIGHEST))
     if beyond.size:
         row = int(beyond[0])
         raise DataError(
             f"{height[row]:.6g} m is no height of a barometer",
-            file=source,
+            file=source_of(table),
             row=row + 1,
             quantity="height",
             remedy="these look like pressures in Pa: make the table with barometer_from_pressure"

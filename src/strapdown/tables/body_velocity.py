@@ -7,16 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.exceptions import DataError
-from strapdown.tables.checks import (
-    check_columns,
-    check_positive_sd,
-    check_rows,
-    check_time,
-    index_of,
-    joined,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import checked_values, each_row, joined, source_of
 
 BODY_VELOCITY = ["vx", "vy", "vz", "vx_sd", "vy_sd", "vz_sd"]
 
@@ -49,8 +40,8 @@ def body_velocity_table(
     DataError
         Shapes disagree, or as `check_body_velocity`.
     """
-    sd = np.tile(velocity_sd, (np.size(time), 1)) if np.ndim(velocity_sd) == 1 else velocity_sd
-    table = joined(time, BODY_VELOCITY, source, velocity=(velocity, 3), velocity_sd=(sd, 3))
+    blocks = {"velocity": (velocity, 3), "velocity_sd": (each_row(velocity_sd, time, 3), 3)}
+    table = joined(time, BODY_VELOCITY, source, **blocks)
     check_body_velocity(table)
     return table
 
@@ -68,18 +59,13 @@ def check_body_velocity(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a standard deviation is
         not above zero, or a velocity is beyond 400 m/s.
     """
-    source = source_of(table)
-    check_columns(table, BODY_VELOCITY, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, BODY_VELOCITY[:3]), BODY_VELOCITY[:3], source)
-    check_positive_sd(table, BODY_VELOCITY[3:], source)
-    velocity = values_of(table, BODY_VELOCITY[:3])
+    velocity = checked_values(table, BODY_VELOCITY[:3], BODY_VELOCITY[3:])
     beyond = np.argwhere(np.abs(velocity) > FASTEST)
     if len(beyond):
         row, column = (int(i) for i in beyond[0])
         raise DataError(
             f"{velocity[row, column]:.6g} m/s is faster than such an instrument measures",
-            file=source,
+            file=source_of(table),
             row=row + 1,
             quantity=BODY_VELOCITY[column],
             remedy="give m/s: mm/s are divided by 1000; drop rows that are no velocities",

@@ -67,6 +67,47 @@ def joined(
     return table
 
 
+def each_row(values: ArrayLike, time: ArrayLike, width: int | None = None) -> ArrayLike:
+    """Values of shape (n,), or (n, width), also where one row of them stands for all."""
+    one = () if width is None else (width,)
+    return np.full((np.size(time), *one), values) if np.shape(values) == one else values
+
+
+def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str] = ()) -> Array:
+    """Columns as floats, after a check of columns, stamps, values and standard deviations.
+
+    Raises
+    ------
+    DataError
+        A column is missing, time does not advance, a value is not finite, or a standard deviation
+        is not above zero.
+    """
+    source = source_of(table)
+    check_columns(table, [*columns, *sd], source)
+    check_time(index_of(table), source)
+    values = values_of(table, columns)
+    check_rows(values, columns, source)
+    if sd:
+        check_positive_sd(table, sd, source)
+    return values
+
+
+def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
+    """Latitudes are within the poles."""
+    beyond = np.flatnonzero(np.abs(lat) > 90.0)
+    if beyond.size:
+        row = int(beyond[0])
+        raise DataError(
+            f"a latitude of {lat[row]:.9g} deg is beyond the pole",
+            file=source,
+            row=row + 1,
+            quantity="lat",
+            remedy="latitude and longitude seem to be swapped: exchange the columns"
+            if np.all(np.abs(lon) <= 90.0)
+            else "give geodetic latitude in degrees, north positive, within -90 to 90",
+        )
+
+
 def check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
     """Every value is finite; else the first that is not is named."""
     # A sum is finite only where everything in it is; it needs no memory, and is several times
@@ -161,6 +202,12 @@ def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
         whole = table.to_numpy()
         if whole.dtype == np.float64:
             return np.ascontiguousarray(whole[:, [own.index(name) for name in wanted]])
+    if own != wanted and len(set(own)) == len(own):
+        # Column by column: choosing them at once costs more than it copies, on most tables.
+        out = np.empty((len(table), len(wanted)))
+        for k, name in enumerate(wanted):
+            out[:, k] = table[name].to_numpy(dtype=np.float64)
+        return out
     # A selection copies; a table made by the functions here needs none.
     there = table if own == wanted else table[wanted]
     return np.ascontiguousarray(there.to_numpy(dtype=np.float64))

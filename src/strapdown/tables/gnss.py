@@ -10,8 +10,10 @@ from strapdown.exceptions import DataError
 from strapdown.frames import place_difference
 from strapdown.tables.checks import (
     check_columns,
+    check_latitude,
     check_rows,
     check_time,
+    each_row,
     index_of,
     joined,
     source_of,
@@ -75,13 +77,12 @@ def gnss_table(
     DataError
         Shapes disagree, or as `check_gnss`.
     """
-    count = np.size(time)
     blocks = {
         "place": (place, 3),
         "velocity": (velocity, 3),
-        "position_sd": (_each_row(position_sd, count), 3),
-        "velocity_sd": (_each_row(velocity_sd, count), 3),
-        "quality": (np.ones(count) if quality is None else quality, None),
+        "position_sd": (each_row(position_sd, time, 3), 3),
+        "velocity_sd": (each_row(velocity_sd, time, 3), 3),
+        "quality": (np.ones(np.size(time)) if quality is None else quality, None),
     }
     table = joined(time, GNSS, source, **blocks)
     check_gnss(table)
@@ -108,7 +109,8 @@ def check_gnss(table: pd.DataFrame) -> None:
     check_time(index_of(table), source)
     plain = [*GEODETIC, *VELOCITY, "quality"]
     check_rows(values_of(table, plain), plain, source)
-    _check_latitude(table, source)
+    lat, lon = values_of(table, ["lat", "lon"]).T
+    check_latitude(lat, lon, source)
     _check_sd(table, source)
     quality = values_of(table, ["quality"])[:, 0]
     unknown = np.flatnonzero(~np.isin(quality, list(QUALITIES)))
@@ -123,27 +125,6 @@ def check_gnss(table: pd.DataFrame) -> None:
             "4 and 5 carrier phase",
         )
     _check_velocity_fits(table, source)
-
-
-def _each_row(sd: ArrayLike, count: int) -> ArrayLike:
-    """One triple stands for all rows."""
-    return np.tile(np.asarray(sd), (count, 1)) if np.shape(sd) == (3,) else sd
-
-
-def _check_latitude(table: pd.DataFrame, source: str | None) -> None:
-    lat, lon = values_of(table, ["lat", "lon"]).T
-    beyond = np.flatnonzero(np.abs(lat) > 90.0)
-    if beyond.size:
-        row = int(beyond[0])
-        raise DataError(
-            f"a latitude of {lat[row]:.9g} deg is beyond the pole",
-            file=source,
-            row=row + 1,
-            quantity="lat",
-            remedy="latitude and longitude seem to be swapped: exchange the columns"
-            if np.all(np.abs(lon) <= 90.0)
-            else "give geodetic latitude in degrees, north positive, within -90 to 90",
-        )
 
 
 def _check_sd(table: pd.DataFrame, source: str | None) -> None:

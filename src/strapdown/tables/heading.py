@@ -9,16 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.exceptions import DataError
-from strapdown.tables.checks import (
-    check_columns,
-    check_positive_sd,
-    check_rows,
-    check_time,
-    index_of,
-    joined,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import checked_values, each_row, joined, source_of, values_of
 
 HEADING = ["heading", "heading_sd"]
 
@@ -54,8 +45,8 @@ def heading_table(
     DataError
         Shapes disagree, or as `check_heading`.
     """
-    sd = np.full(np.size(time), heading_sd) if np.ndim(heading_sd) == 0 else heading_sd
-    table = joined(time, HEADING, source, heading=(heading, None), heading_sd=(sd, None))
+    blocks = {"heading": (heading, None), "heading_sd": (each_row(heading_sd, time), None)}
+    table = joined(time, HEADING, source, **blocks)
     check_heading(table)
     return table
 
@@ -74,12 +65,9 @@ def check_heading(table: pd.DataFrame) -> None:
         not above zero or finite beyond 110 deg, a heading is beyond a turn, or all are within a
         turn in rad, and leap by one.
     """
+    heading = checked_values(table, ["heading"], ["heading_sd"])[:, 0]
+    sd = values_of(table, ["heading_sd"])[:, 0]
     source = source_of(table)
-    check_columns(table, HEADING, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, ["heading"]), ["heading"], source)
-    check_positive_sd(table, ["heading_sd"], source)
-    heading, sd = values_of(table, HEADING).T
     beyond = np.flatnonzero(np.abs(heading) > 360.0)
     if beyond.size:
         row = int(beyond[0])

@@ -6,16 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.tables.checks import (
-    check_columns,
-    check_rows,
-    check_steps,
-    check_time,
-    index_of,
-    joined,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import check_steps, checked_values, joined, source_of
 from strapdown.tables.columns import DTHETA, THETA
 
 INCREMENTS = ["dt", *THETA, *DTHETA]
@@ -65,8 +56,5 @@ def check_increments(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a step is not
         positive, or a step begins before the one before it has ended.
     """
-    source = source_of(table)
-    check_columns(table, INCREMENTS, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, INCREMENTS), INCREMENTS, source)
-    check_steps(table, source)
+    checked_values(table, INCREMENTS)
+    check_steps(table, source_of(table))

@@ -5,16 +5,7 @@ from __future__ import annotations
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.tables.checks import (
-    check_columns,
-    check_rows,
-    check_steps,
-    check_time,
-    index_of,
-    joined,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import check_steps, checked_values, joined, source_of
 from strapdown.tables.columns import DR, DV, PHI
 
 MOTION = ["dt", *PHI, *DV, *DR]
@@ -77,8 +68,5 @@ def check_motion_increments(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a step is not
         positive, or a step begins before the one before it has ended.
     """
-    source = source_of(table)
-    check_columns(table, MOTION, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, MOTION), MOTION, source)
-    check_steps(table, source)
+    checked_values(table, MOTION)
+    check_steps(table, source_of(table))

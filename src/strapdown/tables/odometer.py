@@ -11,16 +11,14 @@ from numpy.typing import ArrayLike
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.tables.checks import (
     as_array,
-    check_columns,
-    check_positive_sd,
     check_rows,
     check_same_length,
     check_time,
-    index_of,
+    checked_values,
+    each_row,
     is_number,
     joined,
     source_of,
-    values_of,
 )
 
 ODOMETER = ["speed", "speed_sd"]
@@ -54,8 +52,8 @@ def odometer_table(
     DataError
         Shapes disagree, or as `check_odometer`.
     """
-    sd = np.full(np.size(time), speed_sd) if np.ndim(speed_sd) == 0 else speed_sd
-    table = joined(time, ODOMETER, source, speed=(speed, None), speed_sd=(sd, None))
+    blocks = {"speed": (speed, None), "speed_sd": (each_row(speed_sd, time), None)}
+    table = joined(time, ODOMETER, source, **blocks)
     check_odometer(table)
     return table
 
@@ -133,18 +131,13 @@ def check_odometer(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, a standard deviation is
         not above zero, or a speed is beyond 100 m/s.
     """
-    source = source_of(table)
-    check_columns(table, ODOMETER, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, ["speed"]), ["speed"], source)
-    check_positive_sd(table, ["speed_sd"], source)
-    speed = values_of(table, ["speed"])[:, 0]
+    speed = checked_values(table, ["speed"], ["speed_sd"])[:, 0]
     beyond = np.flatnonzero(np.abs(speed) > FASTEST)
     if beyond.size:
         row = int(beyond[0])
         raise DataError(
             f"{speed[row]:.6g} m/s is faster than a wheel rolls",
-            file=source,
+            file=source_of(table),
             row=row + 1,
             quantity="speed",
             remedy="this looks like km/h: divide by 3.6"

@@ -6,17 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError
 from strapdown.rotation import within_half_turn
-from strapdown.tables.checks import (
-    check_columns,
-    check_rows,
-    check_time,
-    index_of,
-    joined,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import check_latitude, checked_values, joined, source_of
 from strapdown.tables.columns import EULER, GEODETIC, VELOCITY
 
 Array = NDArray[np.float64]
@@ -93,21 +84,5 @@ def check_trajectory(table: pd.DataFrame) -> None:
         A column is missing, a value is not finite, time does not advance, or a latitude is
         beyond 90 deg.
     """
-    source = source_of(table)
-    check_columns(table, TRAJECTORY, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, TRAJECTORY), TRAJECTORY, source)
-    lat, lon = values_of(table, ["lat", "lon"]).T
-    beyond = np.flatnonzero(np.abs(lat) > 90.0)
-    if beyond.size:
-        row = int(beyond[0])
-        swapped = bool(np.all(np.abs(lon) <= 90.0))
-        raise DataError(
-            f"a latitude of {lat[row]:.9g} deg is beyond the pole",
-            file=source,
-            row=row + 1,
-            quantity="lat",
-            remedy="latitude and longitude seem to be swapped: exchange the columns"
-            if swapped
-            else "give geodetic latitude in degrees, north positive, within -90 to 90",
-        )
+    lat, lon = checked_values(table, TRAJECTORY)[:, :2].T
+    check_latitude(lat, lon, source_of(table))

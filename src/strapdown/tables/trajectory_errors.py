@@ -7,15 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.exceptions import DataError
-from strapdown.tables.checks import (
-    check_columns,
-    check_rows,
-    check_time,
-    index_of,
-    joined,
-    source_of,
-    values_of,
-)
+from strapdown.tables.checks import checked_values, joined, values_of
 from strapdown.tables.columns import EULER, NED, VELOCITY
 
 TRAJECTORY_ERROR = [*NED, *VELOCITY, *EULER]
@@ -71,10 +63,7 @@ def check_trajectory_error(table: pd.DataFrame) -> None:
     DataError
         A column is missing, a value is not finite, or time does not advance.
     """
-    source = source_of(table)
-    check_columns(table, TRAJECTORY_ERROR, source)
-    check_time(index_of(table), source)
-    check_rows(values_of(table, TRAJECTORY_ERROR), TRAJECTORY_ERROR, source)
+    checked_values(table, TRAJECTORY_ERROR)
 
 
 def check_trajectory_sd(table: pd.DataFrame) -> None:
