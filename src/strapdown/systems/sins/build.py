@@ -14,7 +14,7 @@ from strapdown.config.navigation import (
     NavigationSpec,
     StartTable,
 )
-from strapdown.config.navigation_checks import given_of, make_aids, make_filter
+from strapdown.config.navigation_modules import given_of, make_aids, make_filter
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.nav_state import NavState
@@ -25,6 +25,7 @@ from strapdown.systems.sins.gaps import GapPolicy
 from strapdown.systems.sins.intake import Intake
 from strapdown.systems.sins.known_start import KnownStart
 from strapdown.systems.sins.modes import CoarseMode, Command, FineMode, Mode, Navigation, Until
+from strapdown.systems.sins.saturated import ends_of
 
 __all__ = ["make_chain"]
 
@@ -57,6 +58,7 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
         aids,
         options.mark_interval,
         make_choice(spec.damping, SLOTS["damping"], given),
+        make_choice(spec.smoother, SLOTS["smoother"], given),
     )
     prefilter = None
     if spec.prefilter.kind != "none":
@@ -71,7 +73,11 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> Chain:
         velocity_sd = _three(spec.site.velocity_sd_m_per_s)
     return Chain(
         navigator=navigator,
-        intake=Intake(prefilter=prefilter, gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond)),
+        intake=Intake(
+            prefilter=prefilter,
+            gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond),
+            ends=ends_of(sensors),
+        ),
         modes=_modes(spec),
         start=None if spec.start is None else _known(spec.start),
         sensors=sensors,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +18,14 @@ from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["channel_findings"]
+__all__ = ["channel_findings", "saturated_findings"]
 
 #: Faults after which a channel tells nothing, and the share of a record that may be without it.
 SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
+#: Turns that are cut off so often are lost: a linear filter does not know what it has missed.
+MOST_SATURATED = 0.15
+#: Of the largest reading of a saturated stretch, what is at the end of the range, too.
+AT_END = 0.999
 #: So many times as noisy as the data sheet are gyros in deg/s that are taken for rad/s, roughly.
 DEGREES = (57.3 / 2.0, 57.3 * 2.0)
 #: A usual reading so near to gravity in another unit is that.
@@ -50,24 +55,30 @@ def channel_findings(
     Raises
     ------
     DataError
-        A channel reads nothing over half of the record, gyros are in degrees, accelerometers in
-        another unit, or gravity is not where the stated attitude has it.
+        A channel reads nothing over half of the record, or is at the end of its range over 15 %
+        of it, gyros are in degrees, accelerometers in another unit, or gravity is not where the
+        stated attitude has it.
     """
     _refuse_unit(imu)
     _refuse_gravity(imu, start)
     if len(imu) < LEAST_SAMPLES:
         return ()
     _refuse_degrees(imu, sensors)
-    faults = check_imu_channels(imu, sensors).faults
+    return _told(imu, check_imu_channels(imu, sensors).faults)
+
+
+def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
+    """Of each channel and kind of fault the longest stretch."""
     worst: dict[tuple[str, str], ChannelFault] = {}
     lost: dict[tuple[str, str], int] = {}
     for fault in faults:
         key = (fault.channel, fault.kind)
-        lost[key] = lost.get(key, 0) + fault.last - fault.first + 1
+        lost[key] = lost.get(key, 0) + _without(imu, fault)
         if key not in worst or fault.last - fault.first > worst[key].last - worst[key].first:
             worst[key] = fault
     for (channel, kind), count in lost.items():
-        if kind in SILENT and count > MOST * len(imu):
+        most = MOST_SATURATED if kind == "saturated" else MOST
+        if kind in SILENT and count > most * len(imu):
             said = worst[channel, kind].finding
             raise DataError(
                 f"{said.what}: nothing can be navigated without it",
@@ -77,6 +88,38 @@ def channel_findings(
                 remedy=said.remedy,
             )
     return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
+
+
+def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
+    """Return what is at the end of its range: of each channel the longest stretch.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table, body axes.
+    sensors : ImuUncertainty
+
+    Returns
+    -------
+    tuple of Finding
+
+    Raises
+    ------
+    DataError
+        A channel is there over 15 % of the record.
+    """
+    if len(imu) < LEAST_SAMPLES:
+        return ()
+    faults = check_imu_channels(imu, sensors).faults
+    return _told(imu, [one for one in faults if one.kind == "saturated"])
+
+
+def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
+    """Samples that tell nothing: of a stretch that is saturated now and then, those at the end."""
+    if fault.kind != "saturated":
+        return fault.last - fault.first + 1
+    values = imu[fault.channel].to_numpy(dtype=np.float64)[fault.first : fault.last + 1]
+    return int(np.count_nonzero(np.abs(values) >= AT_END * fault.size))
 
 
 def _counted(finding: Finding, lost: int, samples: int) -> Finding:

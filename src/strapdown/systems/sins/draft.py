@@ -15,9 +15,11 @@ from strapdown.config.slots import SLOTS, Slot, options_of
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.stated_states import STATED_STATES
 from strapdown.exceptions import Finding
+from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.systems.alignment_draft import listed_kinds, toml_value
 from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, string
+from strapdown.systems.sins.foot import HERE, STILL, on_foot
 from strapdown.systems.sins.proposal import Proposal, propose
 from strapdown.tables.checks import index_of
 
@@ -58,6 +60,7 @@ def draft_navigation(
     axes: str | None = None,
     gnss: Path | None = None,
     sensor: str | None = None,
+    foot: bool = False,
 ) -> NavigationDraft:
     """Write the file of a run of navigation over a log.
 
@@ -69,6 +72,8 @@ def draft_navigation(
         Where the file will stand: other files are named from there.
     axes, gnss, sensor
         As `propose`.
+    foot : bool
+        Whether it is of a unit on a shoe: zero velocity at its stances (`on_foot`).
 
     Returns
     -------
@@ -80,6 +85,7 @@ def draft_navigation(
         A file cannot be read; the message names file, row and remedy.
     """
     made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
+    made = on_foot(made) if foot else made
     page = Page()
     page.say(
         f"Navigation over {made.recording.name}: place, velocity and attitude, and how well each "
@@ -87,7 +93,7 @@ def draft_navigation(
         "Each table is a place in the chain, and kind says what stands there; keys that begin "
         "with # show the defaults. Then: strapdown navigate on this file.",
     )
-    found = [*_log(page, made, folder), *_where(page, made)]
+    found = [*_log(page, made, folder), *_where(page, made, foot)]
     _axes(page, axes)
     found += _sensors(page, made)
     _stage(page, "prefilter", {})
@@ -95,10 +101,10 @@ def draft_navigation(
     page.say(f"Alignment: {made.how}.")
     for name in ("coarse", "fine"):
         _stage(page, name, made.table[name])
-    for name in ("mechanization", "filter", "damping", "recorder"):
-        _stage(page, name, {})
-    found += _aids(page, made, folder)
-    _rest(page)
+    for name in ("mechanization", "filter", "damping", "smoother", "recorder"):
+        _stage(page, name, made.table.get(name, {}))
+    found += _aids(page, made, folder, foot)
+    _rest(page, foot)
     return NavigationDraft(
         page.text, tuple(found), tuple(page.asked), tuple(page.to_check), made.findings
     )
@@ -113,7 +119,7 @@ def _log(page: Page, made: Proposal, folder: Path) -> list[str]:
         if key == "path":
             page.key("path", string(_from(Path(value), folder)), "from the folder of this file")
         elif value not in (False, {}):
-            page.key(key, toml_value(value) or "")
+            page.key(key, _inline(value))
     page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
     return [f"{made.recording.name}: {span}"]
 
@@ -125,7 +131,7 @@ def _from(path: Path, folder: Path) -> str:
         return path.absolute().as_posix()
 
 
-def _where(page: Page, made: Proposal) -> list[str]:
+def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
     said = made.table.get("site")
     where = "Where the body stands while it is aligned."
     if said is not None:
@@ -142,6 +148,18 @@ def _where(page: Page, made: Proposal) -> list[str]:
             "lon_deg, alt_m, v_ned_m_per_s, roll_deg, pitch_deg, heading_deg and position_sd_m, "
             "velocity_sd_m_per_s, tilt_sd_deg, heading_sd_deg.",
         )
+        return []
+    if foot:
+        page.table(
+            "[site]",
+            "Where it begins: gravity and the Earth's rate go by the latitude, to a degree. Places "
+            "are counted from there.",
+        )
+        page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive; to a degree")
+        page.key("lon_deg", "0.0", "assumed: it changes nothing but the labels of a map")
+        page.key("alt_m", "0.0", "assumed: height over the ellipsoid")
+        page.key("position_sd_m", repr(HERE), "bounds are of the path from here on")
+        page.key("velocity_sd_m_per_s", repr(STILL))
         return []
     page.table("[site]", where)
     page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive")
@@ -189,6 +207,9 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
         "biases, drifts, and what is stated of scale factors and misalignments, if not given",
     )
+    chosen = made.table.get("sensors", {}).get("states")
+    if chosen is not None:
+        page.key("states", toml_value(chosen) or "")
     for triad in ("gyro", "accel"):
         stated = made.table.get("sensors", {}).get(triad)
         if stated is None:
@@ -200,6 +221,14 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
         told.append(f"{triad}s shake far beyond the data sheet: {key} {list(value)}")
+    for block, stated in made.table.get("states", {}).items():
+        page.table(
+            f"[states.{block}]",
+            "As a start whose tilt is hardly known wants it: once the tilt is found, gravity along "
+            "the body is another by its square, and a linear filter does not carry that over.",
+        )
+        for key, value in stated.items():
+            page.key(key, toml_value(value) or "")
     return told
 
 
@@ -261,13 +290,24 @@ def _inline(value: Any) -> str:
 #: For a vehicle that drives, ready to be used.
 WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
 
+#: Of a unit on a shoe.
+ON_FOOT = (
+    "stance: zero velocity at each stance, the heart of it. It bounds velocity, roll and pitch, "
+    "and with them two of the gyros' biases; of heading and place it tells nothing: the heading "
+    "drifts by the bias of the gyro that is upright, and the error of place grows with the way. "
+    "More time standing at the start, ten seconds, tells that bias.",
+    'threshold_rule = "stated" keeps the threshold, in standard deviations of the two keys below '
+    "it; otsu finds it from stances and swings as they come. pivot_m: height of the unit over the "
+    "ground.",
+)
+
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north",
     "sd_deg": "how well it is known",
 }
 
 
-def _aids(page: Page, made: Proposal, folder: Path) -> list[str]:
+def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
     slot = SLOTS["aiding"]
     page.blank()
     page.say(
@@ -275,7 +315,9 @@ def _aids(page: Page, made: Proposal, folder: Path) -> list[str]:
         "Kinds:",
         *listed_kinds(slot, False),
     )
-    if made.gnss is None:
+    if foot:
+        page.say(*ON_FOOT)
+    elif made.gnss is None:
         page.say(
             "None is given here: height goes away by e in 570 s without one. [aiding.gnss] and "
             "path = …, from the folder of this file",
@@ -283,8 +325,17 @@ def _aids(page: Page, made: Proposal, folder: Path) -> list[str]:
     for name, aid in made.table.get("aiding", {}).items():
         page.table(f"[aiding.{name}]")
         page.key("kind", string(aid["kind"]))
-        page.key("path", string(_from(Path(aid["path"]), folder)))
-        _options(page, slot.entries[aid["kind"]], _with_remarks(page, aid))
+        if "path" in aid:
+            page.key("path", string(_from(Path(aid["path"]), folder)))
+            _with_remarks(page)
+        if "position_sd_m" in aid:
+            page.key(
+                "position_sd_m",
+                repr(aid["position_sd_m"]),
+                f"assumed: the fixes do not state it; {POSITION_SDS}",
+                check=f"how well each fix knows its place, m: {POSITION_SDS}",
+            )
+        _options(page, slot.entries[aid["kind"]], aid)
     if made.drives:
         page.say(
             "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. How "
@@ -294,23 +345,24 @@ def _aids(page: Page, made: Proposal, folder: Path) -> list[str]:
         for line in WHEELS:
             page.say(line)
     page.say(*_other(slot, OTHER_AIDS))
+    if foot:
+        return [f"it stands for the first {made.rest:.3g} s"]
     if made.gnss is None:
         return []
     time, own = index_of(made.gnss), index_of(made.imu)
     within = int(((time >= own[0]) & (time <= own[-1])).sum())
     told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
-    if made.rest > 0.0:
+    if made.rest >= 1.0:
         told.append(f"it stands for the first {made.rest:.4g} s, by the fixes")
     return told
 
 
-def _with_remarks(page: Page, aid: Mapping[str, Any]) -> Mapping[str, Any]:
+def _with_remarks(page: Page) -> None:
     page.say(
         "lever_arm_m: of the antenna from the inertial sensors, forward, right, down; zero is "
         "assumed: measure it. time_offset_sd_s above zero: stamps may be off by it, and by how "
         "much is estimated."
     )
-    return aid
 
 
 def _other(slot: Slot, kinds: Sequence[str]) -> list[str]:
@@ -321,8 +373,13 @@ def _other(slot: Slot, kinds: Sequence[str]) -> list[str]:
     ]
 
 
-def _rest(page: Page) -> None:
+def _rest(page: Page, foot: bool) -> None:
     page.table("[output]", "Forms of the trajectory: csv, parquet, kml, geojson, nav, tum.")
     page.key("files", '["csv", "kml", "geojson"]')
     page.blank()
     page.say("[truth] and path = …: a reference trajectory, to hold the answer beside")
+    if foot:
+        page.say(
+            "[control_points] and path = …: a table of time, north, east of places that it was at, "
+            "in any level frame; an origin and a heading are fitted"
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -37,10 +38,13 @@ class ChainRun:
     record : NavigationRecord
     aligned : tuple of Aligned
         What each mode of alignment found.
+    smoothed : NavigationRecord or None
+        The same as seen from its end, where the navigator has a smoother.
     """
 
     record: NavigationRecord
     aligned: tuple[Aligned, ...]
+    smoothed: NavigationRecord | None = None
 
 
 class Recording:
@@ -54,6 +58,8 @@ class Recording:
     """
 
     def __init__(self, chain: Chain, recorder: Recorder | None = None) -> None:
+        smoother = chain.navigator.smoother
+        self._smoothing = None if smoother is None else smoother.begin(chain.navigator)
         self._tape = (recorder or FullRecorder()).begin(chain.navigator)
         self._aligned: list[Aligned] = []
         self._events: list[Event] = []
@@ -64,6 +70,8 @@ class Recording:
         """Take a piece."""
         for navigation in piece.navigation:
             self._tape.take(navigation)
+            if self._smoothing is not None:
+                self._smoothing.take(navigation)
         self._aligned += piece.aligned
         self._events += piece.events
         self._modes += piece.modes
@@ -78,7 +86,8 @@ class Recording:
             Name for messages.
         """
         names = dict.fromkeys(name for name, _ in self._outages)
-        record = self._tape.record(
+        record = partial(
+            self._tape.record,
             source,
             events=tuple(sorted(self._events, key=lambda one: one.time)),
             modes=tuple(self._modes),
@@ -86,7 +95,8 @@ class Recording:
                 name: tuple(span for of, span in self._outages if of == name) for name in names
             },
         )
-        return ChainRun(record, tuple(self._aligned))
+        smoothed = None if self._smoothing is None else record(smoothing=self._smoothing)
+        return ChainRun(record(), tuple(self._aligned), smoothed)
 
 
 def run_batch(
@@ -207,7 +217,7 @@ def pieces_by_sample(
     for k in range(len(time)):
         for name, table in tables.items():
             upto = time[k] + ahead + SAME_INSTANT
-            first, end = told[name], int(np.searchsorted(stamps[name], upto, side="right"))
+            first, end = told[name], int(stamps[name].searchsorted(upto, side="right"))
             if end > first:
                 rows = table.iloc[first:end]
                 rows.attrs = dict(table.attrs)

@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 # Stamps are decimal fractions that were rounded: an instant is come to within this, s.
 INSTANT = 1e-7
+# An attitude that is known so well must stay so for as long, s, until fixes tell the biases.
+AHEAD = 3.0
 #: Columns of a step as it is kept.
 TIME, VALUES, ROWS = 0, slice(1, 7), slice(7, 17)
 
@@ -55,6 +57,11 @@ class Going:
         """Go over what the samples of a piece made."""
         for hole in steps.holes:
             self._found(hole)
+        gaps = {hole.begin for hole in steps.holes}
+        cut_off = [hole for hole in steps.cut_off if hole.begin not in gaps]
+        if cut_off:
+            both = sorted((*self._state.holes, *cut_off), key=lambda hole: hole.begin)
+            self._state = replace(self._state, holes=tuple(both))
         kept = np.empty((len(steps.time) + (steps.opening is not None), 17))
         if steps.opening is not None:
             kept[0, TIME], kept[0, VALUES] = steps.opening
@@ -91,7 +98,8 @@ class Going:
                 f"the samples end at {state.time:.9g} s in mode {mode}, before navigation began",
                 file=state.intake.source,
                 quantity="time",
-                remedy="give more samples, or end the alignment earlier",
+                remedy="give more samples, or end the alignment earlier: a greater "
+                "until_heading_sd_deg or until_tilt_sd_deg, or a shorter duration_s, in its table",
             )
         self._navigation.append(self._chain.navigator.finish(state.navigator))
         self._modes.append(Span(mode, state.begun, state.time))
@@ -232,8 +240,9 @@ class Going:
         except (DataError, DivergenceError):
             # Not yet; the longest duration says it.
             return
-        roll, pitch, heading = found.alignment.sd_deg.tolist()
+        roll, pitch, heading = found.alignment.sd_deg_after(AHEAD).tolist()
         if mode.until.met(heading, max(roll, pitch)):
+            roll, pitch, heading = found.alignment.sd_deg.tolist()
             words = f"heading known to {heading:.3g}°, level to {max(roll, pitch):.3g}°"
             self._aligned_to(found, state.mode + 1, words)
 

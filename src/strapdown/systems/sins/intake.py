@@ -14,6 +14,7 @@ from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.prefilter.prefilter import CHANNELS, Prefilter
 from strapdown.systems.sins.filtering import Filtering, FilteringState
 from strapdown.systems.sins.gaps import GapPolicy, Hole, hole_between
+from strapdown.systems.sins.saturated import RangeEnds, RangeState
 
 __all__ = ["Intake", "IntakeState", "Steps"]
 
@@ -43,6 +44,8 @@ class Steps:
         Stamp and values of the sample at which the first step begins, once.
     holes : tuple of Hole
         That were found; steps over them may still be to come.
+    cut_off : tuple of Hole
+        Steps with a sensor at the end of its range; they may be to come, too.
     """
 
     time: Array
@@ -50,6 +53,7 @@ class Steps:
     rows: Array
     opening: tuple[float, Array] | None
     holes: tuple[Hole, ...]
+    cut_off: tuple[Hole, ...] = ()
 
 
 def _no_time() -> Array:
@@ -87,6 +91,8 @@ class IntakeState:
         The first sample, until it is known who makes the increments.
     waiting_time, waiting : ndarray
         Samples that no step has ended at yet.
+    ranges : RangeState
+        Which sensors are at the end of their range.
     """
 
     sampling: str
@@ -101,6 +107,7 @@ class IntakeState:
     first: tuple[float, Array] | None = None
     waiting_time: Array = field(default_factory=_no_time)
     waiting: Array = field(default_factory=_no_values)
+    ranges: RangeState = field(default_factory=RangeState)
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +123,8 @@ class Intake:
     stream : IncrementStream, optional
         Linear for samples as they come, cubic after a pre-filter, if not given.
     gaps : GapPolicy
+    ends : RangeEnds, optional
+        Of the sensors, in the axes of the body.
     """
 
     gyro_axes: Array | None = None
@@ -123,6 +132,7 @@ class Intake:
     prefilter: Prefilter | None = None
     stream: IncrementStream | None = None
     gaps: GapPolicy = field(default_factory=GapPolicy)
+    ends: RangeEnds | None = None
 
     @property
     def increments(self) -> IncrementStream:
@@ -177,7 +187,9 @@ class Intake:
         values = self._turned(values)
         known, tail = state.tail.count, state.tail
         if len(time):
-            tail = tail.and_then(np.column_stack([time, values]))
+            both = np.empty((len(time), 7))
+            both[:, 0], both[:, 1:] = time, values
+            tail = tail.and_then(both)
             state = replace(state, count=state.count + len(time), newest=float(time[-1]), tail=tail)
         if not state.usual:
             if tail.count < FIRST and not last:
@@ -185,10 +197,15 @@ class Intake:
             known = 0
             time, values = tail.rows[:, 0].copy(), tail.rows[:, 1:].copy()
             state = self._judged(state, time[:FIRST])
-        holes: tuple[Hole, ...] = ()
+        found = _NOTHING
         if len(time):
             state, holes = self._holes(state, known)
-        return self._stepped(state, time, values, holes, last)
+            cut_off: tuple[Hole, ...] = ()
+            if self.ends is not None:
+                ranges, cut_off = self.ends.advance(state.ranges, time, values)
+                state = replace(state, ranges=ranges)
+            found = replace(_NOTHING, holes=holes, cut_off=cut_off)
+        return self._stepped(state, time, values, found, last)
 
     def _turned(self, values: Array) -> Array:
         out = values.copy()
@@ -229,7 +246,7 @@ class Intake:
             sides = (float(time[k]), float(time[k + 1]))
             found.append(hole_between(rows[first : k + 1, 1:], sides, rows[k + 1, 1:]))
         # Half of it at least is given back at a time: what is kept is seldom copied.
-        past = int(np.searchsorted(time, time[-1] - BEFORE))
+        past = int(time.searchsorted(time[-1] - BEFORE))
         if 2 * past > state.tail.count and state.tail.count > FIRST:
             state = replace(state, tail=state.tail.without_first(past))
         return state, tuple(found)
@@ -239,10 +256,10 @@ class Intake:
         state: IntakeState,
         time: Array,
         values: Array,
-        holes: tuple[Hole, ...],
+        found: Steps,
         last: bool,
     ) -> tuple[IntakeState, Steps]:
-        """Make the increments."""
+        """Make the increments; to them comes what was found of the samples."""
         if self.prefilter is not None:
             before = state.filtering
             assert before is not None
@@ -254,12 +271,12 @@ class Intake:
             state = replace(state, filtering=filtering)
             time, values = out.time, out.values
             if not len(time) and (state.stream is None or not last):
-                return state, replace(_NOTHING, holes=holes)
+                return state, found
             if len(out.rows):
                 # Rows that a pre-filter makes begin with the first sample.
                 opening = state.first
                 state = replace(state, own=True, first=None)
-                return state, Steps(time, values, out.rows, opening, holes)
+                return state, Steps(time, values, out.rows, opening, found.holes, found.cut_off)
             if state.stream is None:
                 begun = self.increments.begin(self.sampling(state))
                 state = replace(state, stream=begun, first=None)
@@ -276,7 +293,7 @@ class Intake:
         state = replace(
             state, stream=stream, waiting_time=time[n:].copy(), waiting=values[n:].copy()
         )
-        return state, Steps(ends, values[:n], rows, opening, holes)
+        return state, Steps(ends, values[:n], rows, opening, found.holes, found.cut_off)
 
 
 _NOTHING = Steps(_no_time(), _no_values(), np.empty((0, 10)), None, ())

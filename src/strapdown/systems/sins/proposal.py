@@ -18,6 +18,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Recording, StatedStart
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -40,6 +41,9 @@ NOISE_KEYS = (
 )
 #: Below it a vehicle stands, above the other its course can be seen, m/s.
 STANDS, DRIVES = 0.5, 3.0
+#: Beyond so many times its standard deviation no way is apparent only: of a hundred thousand pairs
+#: of places at rest four are, exp(-APPARENT**2 / 2).
+APPARENT = 4.5
 #: A gyro bias that leaves north to be found, and the rest that it takes.
 NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
 #: Coarse alignment of a rest takes no more than this of it, s.
@@ -50,11 +54,16 @@ WELL = 3.0
 #: scale this one cannot reject for ever. Errors that last make innovations small: they are no sign
 #: of a receiver that is better than it says.
 RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
+#: Of fixes that do not say how well they know their places: a code receiver without corrections.
+CODE_RECEIVER = GnssOptions(unstated_position_sd=5.0)
 #: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
 OFFSET_SD = 0.2
 #: What the motion tells of clocks is taken where it is so many standard deviations, and a delay
 #: where it is at least so long, s; an offset is left to the filter to find to this, s.
 SURE, LEAST_DELAY, LEAST_OFFSET_SD = 4.0, 0.01, 0.05
+#: Stamps that are off are of another clock, and two quartz clocks run apart: by 50 ppm, which is
+#: what a walk of so many s/√s does in the 400 s in which nothing may tell their offset.
+APART = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +143,7 @@ def propose(
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
     if gnss is not None:
-        fixes, shifted = on_clock_of(read_gnss(gnss), recording.imu)
+        fixes, shifted = on_clock_of(read_gnss(gnss, CODE_RECEIVER), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
     scatter = _scatter(imu)
     # An engine shakes one axis more than another; the quietest one tells of the sensor.
@@ -159,6 +168,7 @@ def propose(
                 "path": str(gnss),
                 "lever_arm_m": (0.0, 0.0, 0.0),
                 "update_rule": RULE,
+                **_taken(fixes),
                 **_clock(fixes, imu, drives),
             }
         }
@@ -234,6 +244,11 @@ def _nearest(noise: tuple[float, ...]) -> str:
     return best
 
 
+def _taken(fixes: pd.DataFrame) -> dict[str, float]:
+    sd = fixes.attrs.get("position_sd_taken")
+    return {} if sd is None else {"position_sd_m": sd}
+
+
 def _place(start: StatedStart | None) -> tuple[float, float, float] | None:
     return None if start is None else (start.lat_deg, start.lon_deg, start.alt)
 
@@ -247,25 +262,40 @@ def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]
     within = (at >= time[0]) & (at <= time[-1])
     if within.sum() < 2:
         return 0.0, False
-    at, speed = at[within], _speed(fixes)[within]
-    moving = np.flatnonzero(speed > STANDS)
-    rest = float(at[moving[0]] - time[0]) if moving.size else float(time[-1] - time[0])
-    return max(rest, 0.0), bool((speed > DRIVES).any())
+    begins, fastest = _moving(fixes[within])
+    rest = float((at[within][begins] if begins is not None else time[-1]) - time[0])
+    return max(rest, 0.0), fastest > DRIVES
 
 
-def _speed(fixes: pd.DataFrame) -> Array:
-    """Speed over ground at each fix; of places where the receiver measures none."""
+def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
+    """Where it first does not stand, and the greatest speed over ground that is sure.
+
+    Of places where the receiver measures no speed: the way between two of them less what their
+    errors make of it, over 1, 2, 4 … steps, since one step may be shorter than the errors.
+    """
     measured = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
-    speed = np.linalg.norm(values_of(fixes, VELOCITY_COLUMNS)[:, :2], axis=1)
+    speed = np.linalg.norm(values_of(fixes, VELOCITY_COLUMNS)[:, :2], axis=1)[measured]
+    moving = np.flatnonzero(measured)[speed > STANDS]
+    begins = int(moving[0]) if moving.size else None
+    fastest = float(speed.max(initial=0.0))
     if measured.all():
-        return np.asarray(speed)
+        return begins, fastest
+    time = index_of(fixes)
     lat, lon, _ = np.radians(values_of(fixes, GEODETIC)).T
-    north = np.diff(lat) * 6.37e6
-    east = np.diff(lon) * 6.37e6 * np.cos(lat[:-1])
     sd = values_of(fixes, POSITION_SD)[:, :2].max(axis=1)
-    way = np.maximum(np.hypot(north, east) - 3.0 * sd[1:], 0.0)
-    along = np.concatenate([[0.0], way / np.diff(index_of(fixes))])
-    return np.where(measured, speed, along)
+    steps = 1
+    while steps < len(time):
+        north = (lat[steps:] - lat[:-steps]) * 6.37e6
+        east = (lon[steps:] - lon[:-steps]) * 6.37e6 * np.cos(lat[steps:])
+        blur = APPARENT * np.hypot(sd[steps:], sd[:-steps])
+        least = (np.hypot(north, east) - blur) / (time[steps:] - time[:-steps])
+        fastest = max(fastest, float(least.max()))
+        moving = np.flatnonzero(least > STANDS)
+        # What a shorter way has shown already, a longer one shows with some of the rest before it.
+        if moving.size and (begins is None or moving[0] + steps <= begins):
+            begins = int(moving[0])
+        steps *= 2
+    return begins, fastest
 
 
 def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, float]:
@@ -277,7 +307,10 @@ def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, fl
     if found is None:
         return out | ({"time_offset_sd_s": OFFSET_SD} if drives else {})
     sd = max(2.0 * found.sd, LEAST_OFFSET_SD)
-    return out | {"time_offset_s": round(found.offset, 3), "time_offset_sd_s": round(sd, 3)}
+    out |= {"time_offset_s": round(found.offset, 3), "time_offset_sd_s": round(sd, 3)}
+    if abs(found.offset) > SURE * found.sd:
+        out["time_offset_drift_s_per_sqrt_s"] = APART
+    return out
 
 
 def _alignment(

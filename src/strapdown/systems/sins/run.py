@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_checks import given_of, uncertainty_of
+from strapdown.config.navigation_modules import given_of, uncertainty_of
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
+from strapdown.evaluation.control_points import score_control_points
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.evaluation.trajectory_summary import DifferenceSummary, summarise_differences
 from strapdown.navigation.recorder import Recorder
@@ -22,12 +23,13 @@ from strapdown.systems.attitude_source import input_files
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
-from strapdown.systems.sins.channels import channel_findings
+from strapdown.systems.sins.channels import channel_findings, saturated_findings
 from strapdown.systems.sins.drive import ChainRun, run_batch
 from strapdown.systems.sins.file_rows import in_file, said_of_file
 from strapdown.systems.sins.readiness import look_through
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.source import NavigationSource, read_navigation_source
+from strapdown.systems.sins.trust import trust_of
 from strapdown.systems.sins.withholding import score_withholding
 
 __all__ = ["Drive", "run_navigation"]
@@ -87,8 +89,12 @@ def run_navigation(
     tables = (source.imu, *source.tables.values())
     with said_of_file(*tables):
         looked = look_through(spec, source.imu, source.tables)
-        # What is simulated has the errors that it was told to have.
-        channels = channel_findings(source.imu, sensors, spec.start) if spec.log is not None else ()
+        # What is simulated has the errors that it was told to have; but how it moves may be more
+        # than its sensors read.
+        if spec.log is None:
+            channels = saturated_findings(source.imu, sensors)
+        else:
+            channels = channel_findings(source.imu, sensors, spec.start)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     chain = make_chain(spec, sensors)
     recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
@@ -100,11 +106,29 @@ def run_navigation(
     with said_of_file(*tables):
         run = drive(chain, source.imu, source.tables, recorder, told)
     progress("comparing", ENDED)
-    differences, errors = _against_truth(run.record.trajectory, source, spec)
+    told_by = run.smoothed or run.record
+    differences, errors = _against_truth(told_by.trajectory, source, spec)
+    forward_differences = None
+    if run.smoothed is not None:
+        forward_differences, _ = _against_truth(run.record.trajectory, source, spec)
+    points = None
+    if source.points is not None:
+        points = score_control_points(
+            told_by.trajectory, source.points, find_ellipsoid(spec.ellipsoid)
+        )
     withheld = score_withholding(
         spec,
         chain,
         source,
+        run.record,
+        lambda stage, share: progress(stage, ENDED + 0.02 * share),
+    )
+    trust = trust_of(
+        spec,
+        chain,
+        sensors,
+        source.imu,
+        source.tables,
         run.record,
         lambda stage, share: progress(stage, ENDED + 0.02 * share),
     )
@@ -125,10 +149,14 @@ def run_navigation(
         sensors=sensors,
         coarse=None if coarse is None else coarse.alignment,
         fine=None if fine is None else fine.fine,
-        record=run.record,
+        record=told_by,
+        forward=None if run.smoothed is None else run.record,
         differences=differences,
         errors=errors,
+        forward_differences=forward_differences,
+        points=points,
         withheld=withheld,
+        trust=trust,
         inputs=(*files, *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )

@@ -14,6 +14,7 @@ from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.control_points import read_control_points
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.results import InputFiles, Reading
@@ -47,6 +48,8 @@ class NavigationSource:
         Trajectory table: of the simulation, or the reference that is given.
     truth_name : str
         In words, as they stand after "error against".
+    points : DataFrame or None
+        Control points (`read_control_points`), on the clock of the samples.
     start : StatedStart or None
         What the file says of its place and attitude.
     readings : tuple of Reading
@@ -60,6 +63,7 @@ class NavigationSource:
     tables: Mapping[str, pd.DataFrame]
     truth: pd.DataFrame | None
     truth_name: str
+    points: pd.DataFrame | None
     start: StatedStart | None
     readings: tuple[Reading, ...]
     inputs: tuple[InputFiles, ...]
@@ -96,6 +100,12 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         truth = read_trajectory(spec.truth.path)
         findings += truth.attrs["findings"]
         inputs.append(input_files("truth", spec.truth.path, (Path(spec.truth.path),)))
+    points = None
+    if spec.control_points is not None:
+        given = spec.control_points
+        points = read_control_points(given.path, given.columns)
+        findings += points.attrs["findings"]
+        inputs.append(input_files("control-points", given.path, (Path(given.path),)))
     inputs += sensor_file(spec.sensors.sensor)
     if spec.log is None and spec.simulation is None:
         raise ConfigError(
@@ -104,10 +114,13 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
             remedy="run it with --live, or give a record: [log] and path = …",
         )
     if spec.log is None:
-        return _simulated(spec, tables, truth, inputs, findings)
+        return _simulated(spec, tables, truth, points, inputs, findings)
     recording, imu, of_log = body_record(spec.log, spec.axes)
     for name, table in tables.items():
         tables[name], shifted = on_clock_of(table, recording.imu)
+        findings += [] if shifted is None else [shifted]
+    if points is not None:
+        points, shifted = on_clock_of(points, recording.imu)
         findings += [] if shifted is None else [shifted]
     return NavigationSource(
         name=recording.name,
@@ -116,6 +129,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         tables=tables,
         truth=truth,
         truth_name="" if spec.truth is None else Path(spec.truth.path).name,
+        points=points,
         start=recording.start,
         readings=recording.readings,
         inputs=(input_files("log", spec.log.path, recording.files), *inputs),
@@ -127,6 +141,7 @@ def _simulated(
     spec: NavigationSpec,
     tables: Mapping[str, pd.DataFrame],
     truth: pd.DataFrame | None,
+    points: pd.DataFrame | None,
     inputs: list[InputFiles],
     findings: list[Finding],
 ) -> NavigationSource:
@@ -160,6 +175,7 @@ def _simulated(
         tables={**tables, **made},
         truth=exact if truth is None else truth,
         truth_name="the exact truth",
+        points=points,
         start=None,
         readings=(),
         inputs=tuple(inputs),

@@ -1,0 +1,313 @@
+"""Whether a heading can be trusted, second by second: a traffic light.
+
+Green is a promise: the heading is within the limit that was asked for. It is given where two
+reckonings say so that do not share what was assumed at the start: the run by its own bound, and a
+witness that began with no heading at all (`systems.sins.heading_witness`) by its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.constants import TWO_SIDED_95
+from strapdown.exceptions import ConfigError
+from strapdown.navigation.record import NavigationRecord
+
+__all__ = ["COLOURS", "REASONS", "HeadingLight", "LightSpan", "heading_light", "recent_scatter"]
+
+Array = NDArray[np.float64]
+
+COLOURS = ("green", "amber", "red")
+GREEN, AMBER, RED = range(3)
+#: Why it is not green, by its code.
+REASONS: dict[str, str] = {
+    "": "two reckonings agree that it is within the limit",
+    "assumed": "its own bound is good, but rests on what it began with or on one aid alone",
+    "faint": "a second reckoning does not know it well enough yet to bear it out",
+    "wide": "its own bound is beyond the limit",
+    "scatter": "observations scatter more than they should",
+    "apart": "a reckoning that began without a heading says otherwise",
+    "unknown": "it is hardly known",
+}
+#: Two-sided quantile of 99 of 100 normal numbers: beyond it nothing is by chance, and within it a
+#: witness bounds an error.
+SURE = 2.5758293035489004
+#: Scatter of innovations over the last seconds, by what was expected: beyond the first nothing is
+#: green, beyond the second everything is red.
+FAR_OFF, REFUTED = 2.0, 3.0
+#: What a witness told holds for so long, s; the run's own growth since counts so many times.
+CARRIED, GROWS = 60.0, 2.0
+#: Over which it is judged, s, and fewest components that tell.
+RECENT, FEWEST = 30.0, 8
+#: Labels of components that tell nothing of a heading.
+VERTICAL = ("down", "VD", "height")
+#: One innovation counts no more than so many of its standard deviations, and so many if it was
+#: rejected: half of them are as much as what refutes a run.
+CLIP, REJECTED = 4.0, 3.0
+
+
+class Heard(Protocol):
+    """What a witness said: see `systems.sins.heading_witness.Evidence`."""
+
+    @property
+    def since(self) -> float: ...
+    @property
+    def time(self) -> Array: ...
+    @property
+    def difference(self) -> Array: ...
+    @property
+    def sd(self) -> Array: ...
+
+
+@dataclass(frozen=True)
+class LightSpan:
+    """Seconds in a row of one colour for one reason.
+
+    Attributes
+    ----------
+    begin, end : float, s
+    colour : str
+    reason : str
+        A key of `REASONS`.
+    """
+
+    begin: float
+    end: float
+    colour: str
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class HeadingLight:
+    """A light for each second.
+
+    Attributes
+    ----------
+    table : DataFrame
+        By time in s, the seconds of the run: ``light`` (0 green, 1 amber, 2 red), ``reason`` (a key
+        of `REASONS`), ``bound`` (1.96 standard deviations of the run, deg), ``difference`` (run
+        less witness, deg), ``witness_sd`` (deg), ``witnessed`` (`SURE` standard deviations of the
+        witness and the difference, deg), ``carried`` (that, or an earlier one with what was added
+        since, deg: what green goes by), ``witness_since`` (s), ``scatter`` (of the innovations, by
+        what was expected).
+    green, red : float, deg
+        Limits.
+    """
+
+    table: pd.DataFrame
+    green: float
+    red: float
+
+    def share(self, colour: str) -> float:
+        """Share of the seconds that are of a colour."""
+        light = self.table["light"].to_numpy()
+        return float(np.mean(light == COLOURS.index(colour))) if len(light) else 0.0
+
+    @property
+    def spans(self) -> tuple[LightSpan, ...]:
+        """Seconds in a row of one colour for one reason, in the order of time."""
+        time = self.table.index.to_numpy(dtype=np.float64)
+        if not len(time):
+            return ()
+        keys = list(zip(self.table["light"].tolist(), self.table["reason"].tolist(), strict=True))
+        starts = [k for k in range(len(keys)) if k == 0 or keys[k] != keys[k - 1]]
+        ends = [*(time[k] for k in starts[1:]), float(time[-1]) + 1.0]
+        return tuple(
+            LightSpan(float(time[k]), float(end), COLOURS[keys[k][0]], keys[k][1])
+            for k, end in zip(starts, ends, strict=True)
+        )
+
+
+def heading_light(
+    record: NavigationRecord,
+    evidence: Sequence[Heard],
+    scatter: Array | None = None,
+    *,
+    green: float = 3.0,
+    red: float = 10.0,
+) -> HeadingLight:
+    """Return the light of each second of a run.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+    evidence : sequence of Heard
+        What witnesses said; none where nothing can tell a heading by itself.
+    scatter : ndarray, (n,), optional
+        Of `recent_scatter` at the seconds of the run.
+    green, red : float, deg
+        Green promises an error below the first; beyond the second a bound is red.
+
+    Returns
+    -------
+    HeadingLight
+
+    Raises
+    ------
+    ConfigError
+        The limits are none.
+
+    Notes
+    -----
+    The error e of the run is its difference d from a witness, which is known, and the error of the
+    witness: ``|e| < |d| + 2.58 sd`` but for one of a hundred cases at most. That rests on nothing
+    that the run was told of its heading. Where a witness told it a while ago, what was added since
+    goes on top, for a minute at most: twice 2.58 times the root of all growth of the run's own
+    variance since then, of which no update takes anything off. The run is contradicted where d is
+    beyond 2.58 standard deviations of both, and beyond half of the limit.
+    """
+    if not 0.0 < green <= red:
+        raise ConfigError(
+            f"green below {green} deg and red beyond {red} deg are no limits of a heading",
+            quantity="trust",
+            remedy="give heading_limit_deg above 0, and heading_red_deg no less than that",
+        )
+    seconds = seconds_of(record)
+    count = len(seconds)
+    marks = record.sd.index.to_numpy(dtype=np.float64)
+    sd = record.sd["heading"].to_numpy(dtype=np.float64)
+    # A bound grows to the next mark: the larger one of those beside a second.
+    after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
+    before = np.clip(after - 1, 0, None)
+    own = np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))
+    best = _best(seconds, evidence)
+    difference, witness, since = best
+    witnessed = np.abs(difference) + SURE * witness
+    spread = np.ones(count) if scatter is None else scatter
+    bound = TWO_SIDED_95 * own
+    with np.errstate(invalid="ignore"):
+        apart = (np.abs(difference) > SURE * np.hypot(witness, own)) & (
+            np.abs(difference) > 0.5 * green
+        )
+    apart |= _contradicted(seconds, evidence, own, green)
+    carried = _carried(seconds, witnessed, own, apart)
+    light = np.full(count, AMBER)
+    reason = np.full(count, "assumed", dtype=object)
+    wide = ~(bound <= green)
+    reason[wide] = "wide"
+    good = ~wide & (carried <= green)
+    light[good], reason[good] = GREEN, ""
+    loose = ~wide & ~good & np.isfinite(witness) & (SURE * witness <= red)
+    reason[loose] = "faint"
+    off = spread > FAR_OFF
+    light[off & (light == GREEN)] = AMBER
+    reason[off] = "scatter"
+    light[spread > REFUTED] = RED
+    light[apart], reason[apart] = RED, "apart"
+    unknown = ~(bound <= red)
+    light[unknown], reason[unknown] = RED, "unknown"
+    table = pd.DataFrame(
+        {
+            "light": light,
+            "reason": reason,
+            "bound": bound,
+            "difference": difference,
+            "witness_sd": witness,
+            "witnessed": witnessed,
+            "carried": carried,
+            "witness_since": since,
+            "scatter": spread,
+        },
+        index=pd.Index(seconds, name="time"),
+    )
+    return HeadingLight(table, green, red)
+
+
+def seconds_of(record: NavigationRecord) -> Array:
+    """Whole seconds within a run."""
+    time = record.trajectory.index
+    return np.arange(np.ceil(float(time[0])), np.floor(float(time[-1])) + 1.0)
+
+
+def recent_scatter(record: NavigationRecord) -> Array:
+    """How much more than expected observations scattered lately, at each second of a run.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+
+    Returns
+    -------
+    ndarray, (n,)
+        Of the worst observation: root mean square of the normalised innovations of the last half
+        minute, each no more than four; 1 is expected, and stands where nothing was observed.
+    """
+    seconds = seconds_of(record)
+    worst = np.ones(len(seconds))
+    for table in record.innovations.values():
+        labels = [c for c in table.columns if str(c).startswith("nu ")]
+        labels = [c for c in labels if not str(c)[3:].startswith(VERTICAL)]
+        if not labels:
+            continue
+        nu = table[labels].to_numpy(dtype=np.float64)
+        s = table[[f"s {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.where(s > 0.0, nu / np.sqrt(s), np.nan)
+        weight = table[[f"weight {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
+        told = np.isfinite(u)
+        # What was rejected did no harm, unless it is much.
+        lost = told & (weight <= 0.0)
+        u = np.where(lost, REJECTED, np.clip(u, -CLIP, CLIP))
+        square = np.where(told, np.where(told, u, 0.0) ** 2, 0.0)
+        total = np.concatenate([[0.0], np.cumsum(square.sum(axis=1))])
+        count = np.concatenate([[0], np.cumsum(told.sum(axis=1))])
+        time = table.index.to_numpy(dtype=np.float64)
+        upto = np.searchsorted(time, seconds + 1e-6, side="right")
+        since = np.searchsorted(time, seconds - RECENT, side="right")
+        many = count[upto] - count[since]
+        mean = (total[upto] - total[since]) / np.maximum(many, 1)
+        worst = np.where(many >= FEWEST, np.maximum(worst, np.sqrt(mean)), worst)
+    return worst
+
+
+def _best(seconds: Array, evidence: Sequence[Heard]) -> tuple[Array, Array, Array]:
+    """Difference, standard deviation and begin of the witness that bounds each second best."""
+    difference, sd, since = (np.full(len(seconds), np.nan) for _ in range(3))
+    least = np.full(len(seconds), np.inf)
+    for one in evidence:
+        at = np.searchsorted(seconds, one.time - 1e-6)
+        inside = at < len(seconds)
+        at, d, s = at[inside], one.difference[inside], one.sd[inside]
+        better = np.abs(d) + SURE * s < least[at]
+        at = at[better]
+        difference[at], sd[at], since[at] = d[better], s[better], one.since
+        least[at] = (np.abs(d) + SURE * s)[better]
+    return difference, sd, since
+
+
+def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.bool_]) -> Array:
+    """What witnesses bound now, or did a while ago with what was added since."""
+    out = np.where(np.isfinite(witnessed), witnessed, np.inf)
+    grown = np.maximum(np.diff(own**2, prepend=own[:1] ** 2), 0.0)
+    told, added, since = math.inf, 0.0, -math.inf
+    for k, now in enumerate(seconds.tolist()):
+        added += float(grown[k])
+        if apart[k]:
+            told = math.inf
+            continue
+        held = told + GROWS * SURE * math.sqrt(added) if now - since <= CARRIED else math.inf
+        if out[k] <= held:
+            told, added, since = float(out[k]), 0.0, now
+        else:
+            out[k] = held
+    return out
+
+
+def _contradicted(
+    seconds: Array, evidence: Sequence[Heard], own: Array, green: float
+) -> NDArray[np.bool_]:
+    """Seconds at which any witness that knows its heading contradicts the run."""
+    out = np.zeros(len(seconds), dtype=np.bool_)
+    for one in evidence:
+        at = np.searchsorted(seconds, one.time - 1e-6)
+        inside = at < len(seconds)
+        at, d, s = at[inside], np.abs(one.difference[inside]), one.sd[inside]
+        out[at[(d > SURE * np.hypot(s, own[at])) & (d > 0.5 * green)]] = True
+    return out

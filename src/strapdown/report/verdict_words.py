@@ -1,0 +1,249 @@
+"""What a verdict says, in sentences; terminal and page say the same."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from strapdown.evaluation.heading_light import REASONS, LightSpan
+from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.first_inconsistency import Inconsistency
+from strapdown.report.alignment_values import instant
+from strapdown.report.crash_values import GAP, plain
+from strapdown.report.navigation_values import (
+    duration_words,
+    half,
+    length_words,
+    share_words,
+)
+from strapdown.systems.sins.result import NavigationResult
+from strapdown.systems.sins.trust import Advice, Trust
+
+__all__ = [
+    "advice_words",
+    "answer",
+    "degrees_words",
+    "first_words",
+    "heading_words",
+    "kind_words",
+    "place_words",
+    "promise",
+    "repeated_words",
+    "span_words",
+    "terminal_lines",
+]
+
+_KINDS = {
+    "change": "changes within the run",
+    "understated": "scatters more than stated",
+    "bias": "is off by a constant",
+    "correlated": "follows itself from epoch to epoch",
+    "gross": "has gross errors",
+}
+
+
+def answer(result: NavigationResult) -> str:
+    """Return the one answer that a verdict begins with."""
+    return f"{place_words(result)} {heading_words(result.trust)}"
+
+
+def place_words(result: NavigationResult) -> str:
+    """How far the place can be trusted."""
+    bounds = plane_bound(result.record.covariance)
+    end, worst = float(bounds[-1]), int(np.argmax(bounds))
+    most = float(bounds[worst])
+    # Of a run that ends as badly as it ever was, one number is enough.
+    same = most <= 1.1 * end
+    sized = f"{length_words(end)} at the end" + (
+        "" if same else f" and to {length_words(most)} at its worst ({_at(result, worst)})"
+    )
+    first = result.trust.against_bounds
+    if not result.trust.consistency:
+        return (
+            f"The place is known to {sized}, 95{GAP}%, if the sensors are as they were stated to "
+            "be: nothing was observed that could bear it out."
+        )
+    if first is None:
+        return f"You can trust the place to {sized}, 95{GAP}%."
+    return (
+        f"By its own bounds the place is known to {sized}, 95{GAP}%, but not all that was "
+        f"observed bears them out: {first.name} {_KINDS[first.kind]}."
+    )
+
+
+def heading_words(trust: Trust) -> str:
+    """How much of the time the heading can be trusted, and whether at the end."""
+    light = trust.light
+    if not len(light.table):
+        return "The run is too short to judge its heading."
+    shares = [(c, light.share(c)) for c in ("green", "amber", "red")]
+    said = ", ".join(f"{c} {share_words(s)}" for c, s in shares if s > 0.0)
+    last = light.spans[-1]
+    now = "at the end it is " + (
+        "green." if last.colour == "green" else f"{last.colour}: {REASONS[last.reason]}."
+    )
+    if trust.unwitnessed:
+        now += f" Nothing could bear it out: {trust.unwitnessed}."
+    return f"Heading: {said} of the time; {now}"
+
+
+def promise(trust: Trust) -> tuple[tuple[str, str], ...]:
+    """What each colour means, in plain words and numbers."""
+    green, red = plain(trust.light.green, 1), plain(trust.light.red, 1)
+    return (
+        (
+            "Green",
+            f"the heading is within {green}°. Two reckonings say so that share no assumption of "
+            f"it: the run's own bound of 95{GAP}% is below {green}°, and a second reckoning, "
+            "which began with no heading at all and was told fixes alone, puts the run within "
+            f"{green}° with 99{GAP}% (now, or within the last minute with what the gyros may have "
+            "added since); and what was observed scatters as it should.",
+        ),
+        (
+            "Amber",
+            f"it may be good, but nothing bears it out: its own bound is below {green}° and rests "
+            "on the start, on an alignment or on one aid; or that bound is beyond "
+            f"{green}°; or observations scatter more than twice as much as they should.",
+        ),
+        (
+            "Red",
+            f"do not use it: its bound is beyond {red}°, the second reckoning contradicts it, or "
+            "observations scatter more than three times as much as they should.",
+        ),
+    )
+
+
+def span_words(span: LightSpan) -> str:
+    """A stretch of one colour, in words."""
+    return (
+        f"{instant(span.begin)} to {instant(span.end)} ({duration_words(span.end - span.begin)}): "
+        f"{REASONS[span.reason]}"
+    )
+
+
+def advice_words(advice: Advice) -> str:
+    """What would have helped then."""
+    if not advice.options:
+        return (
+            "no motion can tell it without fixes of a satellite receiver; with them, or with two "
+            "antennas, it would be known"
+        )
+    best, sd = advice.options[0]
+    text = (
+        f"{best.what} with fixes would bring its standard deviation from "
+        f"{degrees_words(advice.sd)} to {degrees_words(sd)}"
+    )
+    others = [f"{one.what} to {degrees_words(after)}" for one, after in advice.options[1:]]
+    return text + (f"; {', '.join(others)}" if others else "")
+
+
+def kind_words(one: Inconsistency) -> str:
+    """What is wrong with it, in a few words."""
+    return _KINDS[one.kind]
+
+
+def first_words(trust: Trust) -> str:
+    """The first measurement that is not as expected, as a sentence."""
+    one = trust.first
+    if not trust.consistency:
+        return "Nothing was observed, and so nothing could speak against the run."
+    if one is None:
+        return (
+            "Everything that was observed is as it was expected to be, or off by too little to "
+            "matter."
+        )
+    when = (
+        f"from the first epoch on, at {instant(one.since)}"
+        if one.throughout
+        else f"at {instant(one.since)}"
+    )
+    where = one.component.partition(",")[0]
+    return (
+        f"The first that does not agree is {one.name}, component {where}, {when}: {one.what}. "
+        f"{one.meaning[:1].upper()}{one.meaning[1:]}."
+    )
+
+
+def repeated_words(result: NavigationResult) -> str:
+    """What came of the run without it."""
+    trust = result.trust
+    repeated = trust.repeated
+    if repeated is None:
+        if trust.first is None:
+            return ""
+        return "It was not repeated without it: repeat is false in [trust]."
+    if repeated.record is None or repeated.differences is None:
+        return f"Repeated {repeated.without}, the run fails: {repeated.failed}"
+    table = repeated.differences
+    place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
+    turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
+    before, after = len(trust.inconsistencies), len(repeated.left)
+    rest = (
+        "everything that is left is then consistent"
+        if not after
+        else f"of {before} {_plural('doubt', before)} {after} {_plural('remains', after, 'remain')}"
+        if after < before
+        else "what is left is no more consistent than before"
+    )
+    beyond = _beyond(
+        table.index.to_numpy(dtype=np.float64),
+        place,
+        repeated.record.sd.index.to_numpy(dtype=np.float64),
+        plane_bound(repeated.record.covariance),
+    )
+    bound = half(result.filtered.sd["heading"].iloc[-1])
+    usual, most, last = (length_words(float(x)) for x in (np.median(place), max(place), place[-1]))
+    turned = [degrees_words(float(x)) for x in (np.median(turn), max(turn), turn[-1])]
+    return (
+        f"Repeated {repeated.without}, the place differs by {usual} in the middle and {most} at "
+        f"most ({beyond}), at the end by {last}; the heading by {turned[0]} in the middle and "
+        f"{turned[1]} at most, at the end by {turned[2]} where its bound is "
+        f"{degrees_words(bound)}; {rest}."
+    )
+
+
+def terminal_lines(result: NavigationResult) -> list[tuple[str, str]]:
+    """Two to four lines for the terminal, each with its style."""
+    trust = result.trust
+    lines = [(answer(result), _style(trust))]
+    if trust.first is not None:
+        first = trust.first
+        since = "throughout" if first.throughout else f"first at {instant(first.since)}"
+        lines.append((f"First doubt: {first.name} {kind_words(first)}, {since}.", "yellow"))
+        said = repeated_words(result)
+        if said:
+            lines.append((said, ""))
+    elif trust.advice and trust.light.spans[-1].colour != "green":
+        lines.append((f"For the heading: {advice_words(trust.advice[-1])}.", ""))
+    return lines
+
+
+def _style(trust: Trust) -> str:
+    spans = trust.light.spans
+    last = spans[-1].colour if spans else "red"
+    return {"green": "green", "amber": "yellow", "red": "red"}[last]
+
+
+def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.ndarray) -> str:
+    # Two runs of which one knows more are apart by no more than the other is off (Kalman).
+    share = float(np.mean(apart > np.interp(time, marks, bound)))
+    if share == 0.0:
+        return f"always within the repeated run's bound of 95{GAP}%"
+    return f"beyond the repeated run's bound of 95{GAP}% for {share_words(share)} of the time"
+
+
+def _at(result: NavigationResult, mark: int) -> str:
+    return f"at {instant(float(result.record.sd.index[mark]))}"
+
+
+def degrees_words(value: float) -> str:
+    """An angle with two digits or three: ``12.4°``, ``0.049°``."""
+    if not math.isfinite(value):
+        return "unknown"
+    places = 0 if value >= 20.0 else 1 if value >= 2.0 else 2 if value >= 0.1 else 3
+    return f"{plain(value, places)}°"
+
+
+def _plural(word: str, count: int, many: str | None = None) -> str:
+    return word if count == 1 else many or f"{word}s"

@@ -1,0 +1,258 @@
+"""How far a run of navigation can be trusted: its heading, its innovations, and the first doubt."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.aiding.aid import lasting
+from strapdown.aiding.gnss import Gnss
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation_modules import make_filter
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.evaluation.heading_light import (
+    HeadingLight,
+    LightSpan,
+    heading_light,
+    recent_scatter,
+)
+from strapdown.exceptions import StrapdownError
+from strapdown.nav_state import NavState
+from strapdown.navigation.consistency import ObservationConsistency, consistency_of_all
+from strapdown.navigation.first_inconsistency import Inconsistency, inconsistencies
+from strapdown.navigation.record import NavigationRecord
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.systems.progress import Progress
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.heading_witness import Evidence, hear_witnesses
+from strapdown.systems.sins.manoeuvre import Manoeuvre, manoeuvres_from, sd_after
+from strapdown.systems.sins.repeat_without import Repeated, repeat_without
+from strapdown.systems.sins.witness_source import Witnesses, witnesses_of
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["Advice", "Trust", "trust_of"]
+
+Array = NDArray[np.float64]
+
+#: Spans that advice is given for, and how long one must be for it, s.
+MOST_ADVISED, LEAST_ADVISED = 4, 5.0
+#: Between states from which a witness can begin, s.
+LONGEST_STEP = 0.25
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What would have helped at an instant at which the heading was not to be trusted.
+
+    Attributes
+    ----------
+    span : LightSpan
+    time : float, s
+        Its last second.
+    sd : float, deg
+        Of the heading then, without what was assumed of it.
+    options : tuple of (Manoeuvre, float)
+        Each with the standard deviation after it, deg; the best first. Empty where no fixes of a
+        receiver could observe one.
+    """
+
+    span: LightSpan
+    time: float
+    sd: float
+    options: tuple[tuple[Manoeuvre, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Trust:
+    """How far a run can be trusted.
+
+    Attributes
+    ----------
+    light : HeadingLight
+    unwitnessed : str
+        Why nothing could tell a heading by itself, in words; empty where something could.
+    advice : tuple of Advice
+        Of the longest spans that are not green.
+    consistency : mapping of str to ObservationConsistency
+        By name of the observation.
+    inconsistencies : tuple of Inconsistency
+        The first in time first.
+    repeated : Repeated or None
+        The run without the first of them.
+    """
+
+    light: HeadingLight
+    unwitnessed: str
+    advice: tuple[Advice, ...]
+    consistency: Mapping[str, ObservationConsistency]
+    inconsistencies: tuple[Inconsistency, ...]
+    repeated: Repeated | None
+
+    @property
+    def first(self) -> Inconsistency | None:
+        """The first that is not as expected."""
+        return self.inconsistencies[0] if self.inconsistencies else None
+
+    @property
+    def against_bounds(self) -> Inconsistency | None:
+        """The first but for gross errors: these alone are none of the filter's."""
+        return next((one for one in self.inconsistencies if one.kind != "gross"), None)
+
+
+def trust_of(
+    spec: NavigationSpec,
+    chain: Chain,
+    sensors: ImuUncertainty,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame],
+    record: NavigationRecord,
+    progress: Progress,
+) -> Trust:
+    """Judge a run.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+    chain : Chain
+        That was run.
+    sensors : ImuUncertainty
+    imu : DataFrame
+    tables : mapping of str to DataFrame
+        By name of the aid.
+    record : NavigationRecord
+        What came of it.
+    progress : callable
+        Told a stage, and the share of it that is done.
+
+    Returns
+    -------
+    Trust
+    """
+    asked = spec.trust
+    progress("judging the heading", 0.0)
+    consistency = consistency_of_all(record.innovations)
+    evidence: list[Evidence] = []
+    made, why = None, _unable(record)
+    try:
+        if not why:
+            made = witnesses_of(make_filter(spec, sensors), chain, imu, tables, record, consistency)
+            why = "" if made is not None else "it took no fixes of a satellite receiver"
+        if made is not None:
+            evidence = hear_witnesses(made, record, asked.heading_limit_deg / 3.0)
+    except StrapdownError as error:
+        # Where a second reckoning is not possible, the first one stands without it.
+        made, evidence, why = None, [], f"a second reckoning was not possible ({error})"
+    light = heading_light(
+        record,
+        evidence,
+        recent_scatter(record),
+        green=asked.heading_limit_deg,
+        red=asked.heading_red_deg,
+    )
+    found = inconsistencies(consistency, record.innovations, lasting(chain.navigator.aids))
+    repeated = None
+    if found and asked.repeat:
+        stage = f"again, without {found[0].aid} where it is not consistent"
+        progress(stage, 0.3)
+        repeated = repeat_without(
+            chain,
+            imu,
+            tables,
+            record,
+            found,
+            find_ellipsoid(spec.ellipsoid),
+            lambda _, share: progress(stage, 0.3 + 0.7 * share),
+        )
+    return Trust(
+        light=light,
+        unwitnessed=why,
+        advice=_advice(light, evidence, made, record),
+        consistency=consistency,
+        inconsistencies=found,
+        repeated=repeated,
+    )
+
+
+def _unable(record: NavigationRecord) -> str:
+    """Why witnesses cannot be begun from a record."""
+    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    if len(time) < 2 or float(np.median(np.diff(time))) > LONGEST_STEP:
+        return "the recorder keeps fewer than four states a second"
+    return ""
+
+
+def _advice(
+    light: HeadingLight,
+    evidence: list[Evidence],
+    made: Witnesses | None,
+    record: NavigationRecord,
+) -> tuple[Advice, ...]:
+    """What would help, for the longest spans that are not green."""
+    spans = [s for s in light.spans if s.colour != "green" and s.end - s.begin >= LEAST_ADVISED]
+    longest = sorted(spans, key=lambda s: s.begin - s.end)[:MOST_ADVISED]
+    out = []
+    for span in sorted(longest, key=lambda s: s.begin):
+        time = span.end - 1.0
+        if made is None:
+            out.append(Advice(span, time, math.nan, ()))
+            continue
+        out.append(_advised(span, time, evidence, made, record))
+    return tuple(out)
+
+
+def _advised(
+    span: LightSpan,
+    time: float,
+    evidence: list[Evidence],
+    made: Witnesses,
+    record: NavigationRecord,
+) -> Advice:
+    told = [(e, int(np.searchsorted(e.time, time))) for e in evidence]
+    told = [(e, k) for e, k in told if k < len(e.time) and e.time[k] == time]
+    start = _state(record, time)
+    if not told:
+        return Advice(span, time, math.nan, ())
+    best, at = min(told, key=lambda pair: pair[0].sd[pair[1]])
+    filter_ = made.navigator.filter
+    mark = max(int(np.searchsorted(index_of(record.sd), time + 1e-6)) - 1, 0)
+    names = list(filter_.model.layout.labels())[9:]
+    sd = record.sensors_sd[names].iloc[mark].to_numpy(dtype=np.float64)
+    P = np.diag(np.concatenate([np.zeros(9), np.square(sd)]))
+    # By the factor that its innovations scatter more than it expected.
+    P[:9, :9] = best.covariance[at] * best.scale[at] ** 2
+    aid = made.navigator.aids[0]
+    assert isinstance(aid, Gnss)
+    table = made.tables[aid.name]
+    place = _typical(table, POSITION_SD, aid.position_sd_factor) if aid.use_position else None
+    speed = _typical(table, VELOCITY_SD, aid.velocity_sd_factor) if aid.use_velocity else None
+    steps = np.diff(index_of(table))
+    interval = float(np.clip(np.median(steps), 0.2, 2.0)) if steps.size else 1.0
+    options = [
+        (one, sd_after(filter_, start, P, one, place, speed, interval))
+        for one in manoeuvres_from(float(np.hypot(*start.v_n[:2])))
+    ]
+    options.sort(key=lambda pair: pair[1])
+    return Advice(span, time, float(best.sd[at]), tuple(options))
+
+
+def _typical(table: pd.DataFrame, columns: list[str], factor: float) -> Array | None:
+    """Standard deviations of the middle row; None where it has none."""
+    sd = values_of(table, columns)
+    sd = sd[np.isfinite(sd).all(axis=1) & (sd > 0.0).all(axis=1)]
+    return np.asarray(factor * np.median(sd, axis=0)) if len(sd) else None
+
+
+def _state(record: NavigationRecord, time: float) -> NavState:
+    row = record.trajectory.iloc[int(np.searchsorted(record.trajectory.index, time - 1e-6))]
+    lat, lon, alt = (float(row[c]) for c in GEODETIC)
+    roll, pitch, heading = (float(row[c]) for c in EULER)
+    v_n = row[VELOCITY].to_numpy(dtype=np.float64)
+    return NavState.from_degrees(
+        lat, lon, alt, v_n=v_n, roll_deg=roll, pitch_deg=pitch, heading_deg=heading
+    )

@@ -1,0 +1,138 @@
+"""The light of a heading: what makes it green, and what keeps it from that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from strapdown.evaluation.heading_light import (
+    CARRIED,
+    GROWS,
+    SURE,
+    heading_light,
+    recent_scatter,
+)
+from strapdown.exceptions import ConfigError
+from strapdown.navigation.record import NavigationRecord
+
+SECONDS = 200
+
+
+@dataclass
+class Heard:
+    since: float
+    time: np.ndarray
+    difference: np.ndarray
+    sd: np.ndarray
+
+
+def record_of(heading_sd, innovations=None):
+    time = pd.Index(np.arange(SECONDS + 1.0), name="time")
+    sd = pd.DataFrame({"heading": np.broadcast_to(heading_sd, len(time))}, index=time)
+    nothing = pd.DataFrame(index=time)
+    return NavigationRecord(
+        trajectory=nothing,
+        sd=sd,
+        covariance=np.zeros((len(time), 9, 9)),
+        sensors=nothing,
+        sensors_sd=nothing,
+        units={},
+        innovations=innovations or {},
+    )
+
+
+def heard(difference, sd, begin=0, end=SECONDS):
+    time = np.arange(begin + 1.0, end + 1.0)
+    return Heard(
+        float(begin), time, np.full(len(time), float(difference)), np.full(len(time), float(sd))
+    )
+
+
+def innovations(u, weight=1.0):
+    time = pd.Index(np.arange(float(len(u))), name="time")
+    return {
+        "rtk.position": pd.DataFrame(
+            {"nu north, m": u, "s north, m": 1.0, "weight north, m": weight}, index=time
+        )
+    }
+
+
+def test_a_good_bound_without_a_witness_is_amber():
+    light = heading_light(record_of(0.1), [])
+    assert light.share("amber") == 1.0
+    assert set(light.table["reason"]) == {"assumed"}
+
+
+def test_green_begins_where_a_witness_bounds_the_error_below_the_limit():
+    # 2.58 x 1.0 deg and a difference of 0.4 deg are 2.98 deg; with 0.5 they are beyond 3 deg.
+    assert heading_light(record_of(0.1), [heard(0.4, 1.0)]).share("green") > 0.99
+    assert heading_light(record_of(0.1), [heard(0.5, 1.0)]).share("green") == 0.0
+
+
+def test_the_run_itself_must_say_so_too():
+    light = heading_light(record_of(2.0), [heard(0.0, 0.1)])
+    assert light.share("green") == 0.0
+    assert set(light.table["reason"]) == {"wide"}
+    assert heading_light(record_of(6.0), [heard(0.0, 0.1)]).share("red") == 1.0
+
+
+def test_a_witness_that_contradicts_makes_it_red():
+    light = heading_light(record_of(0.3), [heard(5.0, 1.0)])
+    assert light.share("red") > 0.99
+    assert light.spans[-1].reason == "apart"
+    # One that knows nothing contradicts nothing.
+    assert heading_light(record_of(0.3), [heard(5.0, 10.0)]).share("red") == 0.0
+
+
+def test_what_a_witness_told_holds_for_a_minute_and_grows():
+    # The variance of the run grows by 0.01 deg² each second from 100 s on.
+    sd = np.sqrt(0.01 + 0.01 * np.maximum(np.arange(SECONDS + 1.0) - 100.0, 0.0))
+    table = heading_light(record_of(sd), [heard(0.0, 0.2, end=100)]).table
+    for after in (10, 40):
+        expected = SURE * 0.2 + GROWS * SURE * np.sqrt(0.01 * after)
+        assert table["carried"].loc[100.0 + after] == pytest.approx(expected, rel=1e-9)
+    assert np.isinf(table["carried"].loc[100.0 + CARRIED + 1.0])
+    # 3 deg are reached where 0.515 + 5.15 x sqrt(0.01 t) = 3: after 23 s.
+    assert table["light"].loc[123.0] == 0
+    assert table["light"].loc[124.0] == 1
+
+
+def test_an_update_takes_nothing_off_what_was_added():
+    sd = np.where(np.arange(SECONDS + 1) % 2, 0.3, 0.1)
+    table = heading_light(record_of(sd), [heard(0.0, 0.2, end=100)]).table
+    assert (np.diff(table["carried"].loc[101.0:160.0]) >= 0.0).all()
+
+
+def test_scatter_takes_green_away_and_single_outliers_do_not():
+    rng = np.random.default_rng(4)
+    u = rng.standard_normal(SECONDS)
+    spoilt = u.copy()
+    spoilt[[40, 90, 140]] = 50.0
+    good, outlying, wide = (record_of(0.1, innovations(x)) for x in (u, spoilt, 3.5 * u))
+    witness = [heard(0.0, 0.2)]
+    for one, least, most in ((good, 0.99, 1.0), (outlying, 0.99, 1.0), (wide, 0.0, 0.1)):
+        share = heading_light(one, witness, recent_scatter(one)).share("green")
+        assert least <= share <= most
+
+
+def test_observations_that_are_mostly_rejected_are_no_agreement():
+    u = np.random.default_rng(5).standard_normal(SECONDS)
+    weight = np.where(np.arange(SECONDS) % 4 < 3, 0.0, 1.0)
+    scatter = recent_scatter(record_of(0.1, innovations(u, weight)))
+    # Three of four count as three standard deviations each: sqrt(0.75 x 9 + 0.25) = 2.65.
+    assert scatter[60:].min() > 2.0
+
+
+def test_spans_cover_the_run():
+    light = heading_light(record_of(0.1), [heard(0.0, 0.1, 50, 60)])
+    assert light.spans[0].begin == 0.0
+    assert light.spans[-1].end == SECONDS + 1.0
+    assert all(a.end == b.begin for a, b in zip(light.spans, light.spans[1:], strict=False))
+
+
+def test_limits_must_be_in_order():
+    with pytest.raises(ConfigError, match="no limits of a heading"):
+        heading_light(record_of(0.1), [], green=5.0, red=3.0)
