@@ -1,0 +1,191 @@
+"""``strapdown coast``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+EPILOG = (
+    "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
+    "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
+)
+_WHAT, _START, _RUN, _OUT = (
+    "How it moves, of a sensor",
+    "What is known at the start, of a sensor",
+    "Where, of a run of navigation",
+    "What to write",
+)
+
+
+def coast(
+    source: Annotated[
+        str,
+        typer.Argument(
+            metavar="SENSOR|BUNDLE",
+            help="A sensor of the catalogue (strapdown modules) or a .toml file of your own; or a "
+            "folder that strapdown navigate wrote, or the file of such a run, whose receivers are "
+            "then taken away.",
+        ),
+    ],
+    outage: Annotated[
+        float, typer.Option(metavar="S", help="How long nothing aids it (60).")
+    ] = 60.0,
+    speed: Annotated[
+        float | None,
+        typer.Option(metavar="M/S", help="It goes so fast (0: it stands).", rich_help_panel=_WHAT),
+    ] = None,
+    to_speed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M/S", help="To which it comes over the outage.", rich_help_panel=_WHAT
+        ),
+    ] = None,
+    turn_rate: Annotated[
+        float | None,
+        typer.Option(metavar="DEG/S", help="It turns, to the right.", rich_help_panel=_WHAT),
+    ] = None,
+    heading: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Where it goes (45).", rich_help_panel=_WHAT),
+    ] = None,
+    lat: Annotated[
+        float | None,
+        typer.Option(metavar="DEG", help="Latitude (45).", rich_help_panel=_WHAT),
+    ] = None,
+    keep: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with",
+            metavar="AID",
+            help="An aid that stays, with options after a colon: no_slip, odometer, "
+            "zero_velocity, zero_rate:sd_deg_per_s=0.1; again for another.",
+            rich_help_panel=_WHAT,
+        ),
+    ] = None,
+    aided: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="So long a drive with fixes before it (600); 0: what an alignment leaves.",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    fix_sd: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M", help="Of these fixes, one a second (1.5).", rich_help_panel=_START
+        ),
+    ] = None,
+    position_sd: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            help="In place of what that leaves, each axis; so the following.",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    velocity_sd: Annotated[
+        float | None, typer.Option(metavar="M/S", help="Each axis.", rich_help_panel=_START)
+    ] = None,
+    tilt_sd: Annotated[
+        float | None, typer.Option(metavar="DEG", help="Roll and pitch.", rich_help_panel=_START)
+    ] = None,
+    heading_sd: Annotated[
+        float | None, typer.Option(metavar="DEG", help="Heading.", rich_help_panel=_START)
+    ] = None,
+    gyro_bias_sd: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG/H", help="What is left of the gyro biases.", rich_help_panel=_START
+        ),
+    ] = None,
+    accel_bias_sd: Annotated[
+        float | None,
+        typer.Option(
+            metavar="UG",
+            help="What is left of the accelerometer biases, millionths of g.",
+            rich_help_panel=_START,
+        ),
+    ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="The outage begins at this stamp of the log; even places, if not given.",
+            rich_help_panel=_RUN,
+        ),
+    ] = None,
+    places: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_RUN),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder to make (SOURCE-coast).", rich_help_panel=_OUT),
+    ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
+    ] = False,
+    json: Annotated[
+        bool,
+        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
+    ] = False,
+    quiet: Annotated[
+        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
+    ] = False,
+) -> None:
+    """Foretell how far it drifts when its aids are away, and what makes the drift.
+
+    Of a sensor the answer is by its data sheet, along a motion that is stated. Of a run of
+    navigation the filter's own state is taken, and the drifts that came are laid over the forecast.
+    """
+    from strapdown.bundle import check_destination, write_timing
+    from strapdown.cli.coast_options import coast_of_flags
+    from strapdown.cli.coast_tables import print_coast
+    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.report.coast import read_coasting_run, write_coast
+    from strapdown.systems.coasting.run import run_coast
+
+    folder = out or Path(f"{Path(source).resolve().stem}-coast")
+    check_destination(folder, force)
+    with progress(quiet or json) as show:
+        report = Stopwatch(show)
+        navigation, file = read_coasting_run(source)
+        spec = coast_of_flags(
+            source,
+            outage,
+            navigation is not None,
+            motion={
+                "speed_m_per_s": speed,
+                "to_speed_m_per_s": to_speed,
+                "turn_rate_deg_per_s": turn_rate,
+                "heading_deg": heading,
+                "lat_deg": lat,
+            },
+            start={
+                "aided_s": aided,
+                "fix_position_sd_m": fix_sd,
+                "position_sd_m": position_sd,
+                "velocity_sd_m_per_s": velocity_sd,
+                "tilt_sd_deg": tilt_sd,
+                "heading_sd_deg": heading_sd,
+                "gyro_bias_sd_deg_per_h": gyro_bias_sd,
+                "accel_bias_sd_ug": accel_bias_sd,
+            },
+            keep=keep or [],
+            run={"at_s": at, "places": places},
+        )
+        result = run_coast(spec, navigation, file, report)
+        seal = write_coast(result, folder, force=force, progress=report)
+        report.stop()
+        write_timing(seal, report.seconds)
+    if json:
+        typer.echo((seal.path / "coast.json").read_text(encoding="utf-8"), nl=False)
+        return
+    if quiet:
+        return
+    print_coast(result)
+    print_findings(result.findings)
+    print_seal(seal, "report.html")

@@ -1,0 +1,212 @@
+"""A forecast of coasting as files: page, JSON, cone, sealed in a bundle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from strapdown.bundle import (
+    Seal,
+    check_destination,
+    read_manifest,
+    resolved,
+    to_json,
+    unsealed_changes,
+)
+from strapdown.config.coast import coast_spec
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
+from strapdown.config.toml_file import read_toml
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.report.coast_document import coast_document
+from strapdown.report.coast_json import coast_json, write_coast_tables
+from strapdown.report.document_data import draw_stills
+from strapdown.report.document_files import write_drawings, write_text
+from strapdown.report.document_html import document_page
+from strapdown.report.report_bundle import report_bundle
+from strapdown.sensors.catalogue import SENSORS
+from strapdown.systems.coasting.run import CoastResult, run_coast
+from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
+
+__all__ = ["coast", "read_coasting_run", "rerun_coast", "write_coast"]
+
+
+def coast(
+    source: str | Path,
+    out: str | Path,
+    *,
+    outage: float = 60.0,
+    force: bool = False,
+    progress: Progress = silent,
+    **options: Any,
+) -> Seal:
+    """Foretell how far a sensor, or a run of navigation, drifts in an outage; write a bundle.
+
+    Parameters
+    ----------
+    source : str or Path
+        A sensor of the catalogue or its file; or a run of navigation: its folder or its
+        configuration.
+    out : str or Path
+        Folder to make.
+    outage : float, s
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+    **options
+        Tables and keys of `config.coast.CoastSpec`: ``motion={"speed_m_per_s": 15.0}``,
+        ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``, ``places``, ``at_s``.
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        There is no such sensor, or an option cannot be.
+    DataError
+        The run of navigation has no record any more.
+    """
+    check_destination(Path(out), force)
+    navigation, file = read_coasting_run(source)
+    sensor = str(source) if navigation is None else None
+    spec = coast_spec({"outage_s": float(outage), "sensor": sensor, **options})
+    result = run_coast(spec, navigation, file, progress)
+    return write_coast(result, out, force=force, progress=progress)
+
+
+def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
+    """Return the run of navigation that a source names; nothing of a sensor.
+
+    Parameters
+    ----------
+    source : str or Path
+        A folder that ``strapdown navigate`` wrote, the configuration of a run, or a sensor.
+
+    Returns
+    -------
+    spec : NavigationSpec or None
+    file : Path or None
+        Its configuration, where it is a file.
+
+    Raises
+    ------
+    DataError
+        The folder is of another command, or what it read is not there any more, or has changed.
+    """
+    path = Path(source)
+    if str(source).lower() in SENSORS:
+        return None, None
+    if path.is_dir():
+        return _of_bundle(path)
+    if path.suffix.lower() == ".toml" and path.is_file():
+        table = read_toml(path, "a sensor, or a run of navigation, is tables of keys").table
+        if {"log", "simulation", "live"} & set(table):
+            return read_navigation_spec(path), path
+    elif path.is_file():
+        raise ConfigError(
+            "it is a log, and not a run of navigation",
+            file=path.name,
+            quantity="SENSOR|BUNDLE",
+            remedy="navigate first (strapdown navigate), and give the folder that it wrote; or "
+            "write the file of a run (strapdown init navigate), and give that",
+        )
+    return None, None
+
+
+def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
+    root = path.absolute()
+    manifest = read_manifest(root)
+    if manifest["command"] != "navigate":
+        raise DataError(
+            f"it is a folder of 'strapdown {manifest['command']}', and no run of navigation",
+            file=path.name,
+            quantity="SENSOR|BUNDLE",
+            remedy="name a folder that strapdown navigate wrote, or a sensor of the catalogue",
+        )
+    for item in manifest["inputs"]:
+        if not (root / item["name"]).is_file():
+            raise DataError(
+                f"what it was made of is not there any more: {item['name']}",
+                file=path.name,
+                remedy="put it back where it was, or navigate again; a sensor alone needs no "
+                "record: strapdown coast SENSOR",
+            )
+    changed = [
+        c
+        for c in unsealed_changes(root, manifest)
+        if any(c.startswith(item["name"]) for item in manifest["inputs"])
+    ]
+    if changed:
+        raise DataError(
+            f"what it was made of has changed since: {changed[0]}",
+            file=path.name,
+            remedy="navigate again, and give the new folder",
+        )
+    configuration = resolved(manifest["configuration"], root)
+    file = configuration.get("file_path")
+    spec = navigation_spec(configuration["navigation"])
+    return spec, None if file is None else Path(file)
+
+
+def rerun_coast(configuration: dict[str, Any], out: Path) -> Seal:
+    """Run a sealed forecast again from its configuration."""
+    table = configuration.get("navigation")
+    navigation = None if table is None else navigation_spec(table)
+    path = configuration.get("file_path")
+    result = run_coast(
+        coast_spec(configuration["coast"]), navigation, None if path is None else Path(path)
+    )
+    return write_coast(result, out, name=str(configuration["name"]))
+
+
+@one_thread()
+def write_coast(
+    result: CoastResult,
+    out: str | Path,
+    *,
+    name: str | None = None,
+    force: bool = False,
+    progress: Progress = silent,
+) -> Seal:
+    """Write a forecast of coasting as a sealed bundle.
+
+    Parameters
+    ----------
+    result : CoastResult
+    out : str or Path
+        Folder to make.
+    name : str, optional
+        Of the folder, as the report names it; that of `out`, if not given.
+    force : bool
+        Replace a bundle that is there.
+    progress : callable, optional
+
+    Returns
+    -------
+    Seal
+
+    Raises
+    ------
+    ConfigError
+        `out` exists and may not be replaced.
+    """
+    name = Path(out).absolute().name if name is None else name
+    beside = {} if result.navigation is None else {"navigation": result.navigation}
+    seals: list[Seal] = []
+    with report_bundle(
+        result, out, "coast", key="coast", name=name, force=force, seals=seals, beside=beside
+    ) as folder:
+        progress("writing the tables", 0.78)
+        write_text(folder / "coast.json", to_json(coast_json(result)))
+        write_coast_tables(result, folder)
+        progress("drawing the figures", 0.8)
+        document = coast_document(result, name)
+        stills = draw_stills(document)
+        write_drawings(document, stills, folder / "figures")
+        progress("writing the page", 0.95)
+        write_text(folder / "report.html", document_page(document, stills=stills))
+    return seals[0]

@@ -1,0 +1,255 @@
+"""What a forecast of coasting says in words: its answer, what limits it, and what would help."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.report.crash_values import GAP, KMH, plain
+from strapdown.report.document import KeyFigure
+from strapdown.report.navigation_values import (
+    duration_words,
+    half,
+    length_words,
+    share_words,
+    shown_unit,
+)
+from strapdown.systems.coasting.forecast import Share
+from strapdown.systems.coasting.run import CoastResult
+
+__all__ = [
+    "aids_name",
+    "at_start",
+    "end_bound",
+    "headline",
+    "inside_words",
+    "key_figures",
+    "motion_words",
+    "outage_words",
+    "remedy",
+    "source_words",
+    "start_words",
+]
+
+_WORDS = {
+    "position": "position at the start",
+    "velocity": "velocity at the start",
+    "tilt": "tilt at the start",
+    "heading": "heading at the start",
+    "gyro_noise": "gyro white noise",
+    "accel_noise": "accelerometer white noise",
+    "gyro_bias": "gyro bias at the start",
+    "accel_bias": "accelerometer bias at the start",
+    "gyro_instability": "gyro bias instability",
+    "accel_instability": "accelerometer bias instability",
+    "gyro_scale": "gyro scale factor",
+    "accel_scale": "accelerometer scale factor",
+    "gyro_misalignment": "gyro misalignment",
+    "accel_misalignment": "accelerometer misalignment",
+    "g_sensitivity": "gyro g-sensitivity",
+}
+_REMEDIES = {
+    "position": "the drift is hardly more than what the fixes left open: better fixes would help",
+    "velocity": "velocities by Doppler, or more fixes, before the outage would help; so would an "
+    "odometer that stays",
+    "tilt": "a drive with turns and changes of speed, or a standstill, shortly before the outage "
+    "tells tilts from accelerometer biases; a less biased accelerometer would help more",
+    "heading": "turns or changes of speed before the outage make the heading known; a second "
+    "antenna or a better gyro would help more",
+    "gyro_noise": "no calibration takes white noise off: a gyro with less angle random walk would "
+    "help, or an aid that stays",
+    "accel_noise": "no calibration takes white noise off: an accelerometer with less of it would "
+    "help, or an aid that stays",
+    "gyro_bias": "a standstill before the outage tells the gyro biases; else a gyro whose bias is "
+    "steadier would help",
+    "accel_bias": "turns and changes of speed before the outage tell accelerometer biases from "
+    "tilts; else an accelerometer whose bias is smaller would help",
+    "gyro_instability": "the bias changes within the outage, which nothing before it can tell: a "
+    "gyro whose bias is steadier would help",
+    "accel_instability": "the bias changes within the outage, which nothing before it can tell: "
+    "an accelerometer whose bias is steadier would help",
+    "gyro_scale": "turns to both sides before the outage, or a calibration, would tell it",
+    "accel_scale": "changes of speed before the outage, or a calibration, would tell it",
+    "gyro_misalignment": "a calibration of the axes would take it off",
+    "accel_misalignment": "a calibration of the axes would take it off",
+    "g_sensitivity": "a calibration of the gyros under tilt would take it off",
+}
+aids_name = "noise of the aids that stay"
+
+
+def source_words(name: str) -> str:
+    """Name of a source of drift in words."""
+    aid, dot, own = name.rpartition(".")
+    if dot:
+        return f"{aid}: {own.replace('_', ' ')}"
+    return _WORDS.get(name, name.replace("_", " "))
+
+
+def at_start(share: Share, result: CoastResult) -> str:
+    """How large a source is where the outage begins, with its unit."""
+    name = share.source.name
+    triad = result.sensors.gyro if name.startswith("gyro") else result.sensors.accel
+    if name.endswith("_noise"):
+        density = float(np.max(triad.axis("noise_density")))
+        if name.startswith("gyro"):
+            return f"{_three(density * DEG_PER_HOUR / 60.0)}{GAP}deg/√h"
+        return f"{_three(density * MICRO_G)}{GAP}µg/√Hz"
+    if name.endswith("_instability"):
+        gyro = name.startswith("gyro")
+        drift = result.sensors.gyro_drift if gyro else result.sensors.accel_drift
+        size = max(drift.triad)
+        if not size or math.isinf(drift.correlation_time):
+            return "–"
+        factor, unit = shown_unit("rad/s" if gyro else "m/s²", size)
+        return f"{_three(factor * size)}{GAP}{unit} over {duration_words(drift.correlation_time)}"
+    if not share.sd.size:
+        return "–"
+    low, high = float(share.sd.min()), float(share.sd.max())
+    factor, unit = shown_unit(share.source.unit, high)
+    if high <= 1.2 * low:
+        return f"{_three(factor * high)}{GAP}{unit}"
+    return f"{_three(factor * low)} to {_three(factor * high)}{GAP}{unit}"
+
+
+def _three(value: float) -> str:
+    """A number of three digits."""
+    if value == 0.0 or not math.isfinite(value):
+        return "0"
+    return plain(value, min(6, max(0, 2 - math.floor(math.log10(abs(value))))))
+
+
+def end_bound(result: CoastResult) -> float:
+    """Bound of 95 % at the end of the outage, m: of all that were tried, if they were."""
+    bound = result.forecast.bound if result.recorded is None else result.recorded.bound
+    return float(bound[-1])
+
+
+def motion_words(result: CoastResult) -> str:
+    """How it moves, in words."""
+    if result.navigation is not None:
+        return "along its own trajectory"
+    asked = result.spec.motion
+    speed, to = asked.speed_m_per_s, asked.to_speed_m_per_s
+    if to is not None and to != speed:
+        return f"from {_speed(speed)} to {_speed(to)}"
+    if not speed:
+        return "standing"
+    if asked.turn_rate_deg_per_s:
+        side = "right" if asked.turn_rate_deg_per_s > 0.0 else "left"
+        rate = plain(abs(asked.turn_rate_deg_per_s), 1)
+        return f"at {_speed(speed)}, turning {side} with {rate}{GAP}deg/s"
+    return f"straight on at {_speed(speed)}"
+
+
+def _speed(value: float) -> str:
+    return f"{value:g}{GAP}m/s ({plain(KMH * value, 0)}{GAP}km/h)"
+
+
+def start_words(result: CoastResult) -> str:
+    """What is known where it begins, and where from."""
+    if result.recorded is not None:
+        return "what its filter knew at each outage, with all that binds its errors"
+    start, begin = result.spec.start, result.forecast.begin
+    stated = [
+        name.partition("_sd_")[0].replace("_", " ")
+        for name in type(start).model_fields
+        if "_sd_" in name and not name.startswith("fix") and getattr(start, name) is not None
+    ]
+    if not begin:
+        text = "what an alignment leaves, and the data sheet"
+    else:
+        text = (
+            f"what a filter knows after {duration_words(begin)} of driving with fixes of "
+            f"{start.fix_position_sd_m:g}{GAP}m and {start.fix_velocity_sd_m_per_s:g}{GAP}m/s "
+            "each second"
+        )
+    return text if not stated else f"{text}; stated: {', '.join(stated)}"
+
+
+def outage_words(result: CoastResult) -> str:
+    """How long the outage is: ``60 s``."""
+    seconds = result.spec.outage_s
+    return f"{seconds:g}{GAP}s" if seconds < 600.0 else duration_words(seconds)
+
+
+def headline(result: CoastResult) -> str:
+    """The answer in a sentence."""
+    outage = outage_words(result)
+    said = (
+        f"after {outage} {motion_words(result)}, 95 % are within {length_words(end_bound(result))}"
+    )
+    if result.stays:
+        said += f", with {', '.join(result.stays)}"
+    return f"{result.name}: {said}"
+
+
+def remedy(result: CoastResult) -> str:
+    """What is the most of it, and what would help."""
+    found = result.forecast
+    whole = float(found.variance("horizontal")[-1])
+    first = found.shares[0]
+    share = first.variance["horizontal"][-1] / whole
+    if found.aids and float(found.aids["horizontal"][-1]) / whole > share:
+        share = float(found.aids["horizontal"][-1]) / whole
+        return (
+            f"The largest share, {share_words(share)} of the variance, is {aids_name}: what they "
+            "say is what limits it."
+        )
+    words = _REMEDIES.get(first.source.name, "what states it better would help")
+    return (
+        f"The largest share, {share_words(float(share))} of the variance, is "
+        f"{source_words(first.source.name)} ({at_start(first, result)}): {words}."
+    )
+
+
+def inside_words(result: CoastResult) -> str:
+    """How many of the actual drifts were as foretold; empty where none is known."""
+    drifts = [] if result.recorded is None else [d for d in result.recorded.drifts if d.time.size]
+    if not drifts:
+        return ""
+    fixes = np.concatenate([d.inside for d in drifts])
+    ends = [bool(d.inside[-1]) for d in drifts]
+    middle = float(np.median([d.horizontal[-1] for d in drifts]))
+    worst = max(float(d.horizontal[-1]) for d in drifts)
+    return (
+        f"Tried at {len(drifts)} {'places' if len(drifts) > 1 else 'place'}: the drift at the end "
+        f"was {length_words(middle)} in the median and {length_words(worst)} at worst; "
+        f"{sum(ends)} of {len(ends)} ends and {share_words(float(fixes.mean()))} of "
+        f"{len(fixes)} fixes are within their 95 %."
+    )
+
+
+def key_figures(result: CoastResult) -> tuple[KeyFigure, ...]:
+    """The numbers that matter."""
+    found = result.forecast
+    said = "95 % at the end"
+
+    def sd(quantity: str) -> float:
+        whole = found if result.recorded is None else result.recorded
+        variance = (
+            found.variance(quantity)[-1]
+            if whole is found
+            else result.recorded.variance[quantity][-1]  # type: ignore[union-attr]
+        )
+        return math.sqrt(max(float(variance), 0.0))
+
+    figures = [
+        KeyFigure("Horizontal", length_words(end_bound(result)), said),
+        KeyFigure("Along the way", f"±{GAP}{length_words(half(sd('along')))}", said),
+        KeyFigure("Across it", f"±{GAP}{length_words(half(sd('across')))}", said),
+        KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
+        KeyFigure("Heading", f"±{GAP}{_three(math.degrees(half(sd('heading'))))}°", said),
+    ]
+    drifts = [] if result.recorded is None else [d for d in result.recorded.drifts if d.time.size]
+    if drifts:
+        fixes = np.concatenate([d.inside for d in drifts])
+        figures.append(
+            KeyFigure(
+                "Inside 95 %",
+                share_words(float(fixes.mean())),
+                f"of {len(fixes)} fixes in {len(drifts)} outages",
+            )
+        )
+    return tuple(figures)

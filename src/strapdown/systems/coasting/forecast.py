@@ -1,0 +1,243 @@
+"""A drift foretold: the filter's own covariance over an outage, and what each source adds to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.engine import SAME_INSTANT
+from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.piece import NavigationPiece
+from strapdown.navigation.recorder import record_of
+from strapdown.systems.coasting.sources import Source, physical, scaled, sources_of
+from strapdown.systems.progress import Progress, silent
+
+__all__ = [
+    "QUANTITIES",
+    "Forecast",
+    "Go",
+    "Share",
+    "courses",
+    "forecast",
+    "variances",
+]
+
+Array = NDArray[np.float64]
+
+#: Goes over the samples of an outage with a navigator from a state.
+Go = Callable[[Navigator, NavigatorState], Sequence[NavigationPiece]]
+
+#: What is foretold, with its unit.
+QUANTITIES = {
+    "horizontal": "m",
+    "along": "m",
+    "across": "m",
+    "vertical": "m",
+    "speed": "m/s",
+    "heading": "rad",
+}
+#: By how much a source is made larger and smaller. Without aids a variance is quadratic in it, and
+#: any part is exact; with aids weights change with it, and what is left is of its second power.
+LINEAR_PART, AIDED_PART = 0.5, 0.02
+#: Instants of a forecast.
+INSTANTS = 240
+# A body that is slower has no course, m/s.
+STANDS = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """What one source adds.
+
+    Attributes
+    ----------
+    source : Source
+    sd : ndarray, (k,)
+        Of its errors where the outage begins, in SI; empty for white noise.
+    variance : mapping of str to ndarray, (n,)
+        By quantity: its part of the variance. All of them, with what the aids add, are the whole.
+        Where errors of the start are bound to each other, as tilt and accelerometer bias are, each
+        has half of what they make together, which may be negative: they cancel.
+    alone : mapping of str to ndarray, (n,)
+        By quantity: the standard deviation, were there nothing else; not a number where aids stay,
+        which then would do otherwise.
+    """
+
+    source: Source
+    sd: Array
+    variance: dict[str, Array]
+    alone: dict[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """A drift foretold.
+
+    Attributes
+    ----------
+    begin : float, s
+        Of the outage, on the clock of the samples.
+    time : ndarray, (n,), s
+        Since then.
+    trajectory : DataFrame
+        Trajectory table of the motion over the outage, by time since its begin.
+    covariance : ndarray, (n, 9, 9)
+        Displacement m, velocity m/s, rotation rad, north-east-down.
+    course : ndarray, (n,), rad
+        Of the velocity; of the heading, where it stands.
+    shares : tuple of Share
+        The largest at the end first.
+    aids : mapping of str to ndarray, (n,)
+        By quantity: what of the variance is from the noise of the aids that stay; empty without.
+    """
+
+    begin: float
+    time: Array
+    trajectory: pd.DataFrame
+    covariance: Array
+    course: Array
+    shares: tuple[Share, ...]
+    aids: dict[str, Array]
+
+    def variance(self, quantity: str) -> Array:
+        """Variance of a quantity, (n,); of the plane, the sum of its two."""
+        return variances(self.covariance, self.course)[quantity]
+
+    def sd(self, quantity: str) -> Array:
+        """Standard deviation of a quantity, (n,)."""
+        return np.sqrt(np.maximum(self.variance(quantity), 0.0))
+
+    @property
+    def bound(self) -> Array:
+        """Longer half axis of the ellipse that holds 95 % of the places, (n,), m."""
+        return plane_bound(self.covariance)
+
+
+def variances(P: Array, course: Array) -> dict[str, Array]:
+    """Return the variances of what is foretold.
+
+    Parameters
+    ----------
+    P : ndarray, (n, 9, 9)
+        In north-east-down; any symmetric matrices, as what one source adds.
+    course : ndarray, (n,), rad
+
+    Returns
+    -------
+    dict of str to ndarray, (n,)
+        By `QUANTITIES`; ``along`` and ``across`` the course, ``speed`` of the horizontal velocity.
+    """
+    c, s = np.cos(course), np.sin(course)
+    nn, ee, ne = P[:, 0, 0], P[:, 1, 1], P[:, 0, 1]
+    return {
+        "horizontal": nn + ee,
+        "along": c * c * nn + 2.0 * c * s * ne + s * s * ee,
+        "across": s * s * nn - 2.0 * c * s * ne + c * c * ee,
+        "vertical": P[:, 2, 2],
+        "speed": P[:, 3, 3] + P[:, 4, 4],
+        "heading": P[:, 8, 8],
+    }
+
+
+def forecast(
+    navigator: Navigator,
+    state: NavigatorState,
+    go: Go,
+    outage: float,
+    *,
+    aided: bool,
+    progress: Progress = silent,
+) -> Forecast:
+    """Run the filter over an outage, and once more with each source larger and smaller.
+
+    The variance at any instant is homogeneous of the second degree in the sizes of all sources, the
+    noise of the aids that stay among them: so half of its derivatives by the logarithms of these
+    sizes add up to it (Euler). Each is taken by a central difference of the filter's own runs.
+
+    Parameters
+    ----------
+    navigator : Navigator
+        Without what is away.
+    state : NavigatorState
+        Where the outage begins.
+    go : callable
+        Goes over the samples of the outage; the same for every run.
+    outage : float, s
+    aided : bool
+        Whether aids stay.
+    progress : callable, optional
+
+    Returns
+    -------
+    Forecast
+    """
+    interval = max(outage / INSTANTS, navigator.filter.step)
+    navigator = replace(navigator, mark_interval=interval)
+    begin = state.time
+    start = _start(navigator, state)
+    record = record_of(navigator, go(navigator, state), "outage")
+    time = np.concatenate([[0.0], record.sd.index.to_numpy(dtype=np.float64) - begin])
+    P = np.concatenate([start[None], record.covariance])
+    trajectory = record.trajectory
+    course = courses(trajectory, time + begin)
+    part = AIDED_PART if aided else LINEAR_PART
+    whole = variances(P, course)
+    known = physical(navigator, state)
+    shares = []
+    sources = sources_of(navigator.filter.model)
+    for number, source in enumerate(sources):
+        progress(f"budget: {source.name.replace('_', ' ')}", number / len(sources))
+        more, less = (
+            _as_it_would_be(*scaled(navigator, state, source, f), go, time + begin, course)
+            for f in (1.0 + part, 1.0 - part)
+        )
+        own = {q: (more[q] - less[q]) / (4.0 * part) for q in whole}
+        curved = {q: (more[q] + less[q] - 2.0 * whole[q]) / (2.0 * part**2) for q in whole}
+        none = np.full(len(time), math.nan)
+        alone = {q: none if aided else np.sqrt(np.maximum(v, 0.0)) for q, v in curved.items()}
+        shares.append(Share(source, source.sd(known), own, alone))
+    shares.sort(key=lambda one: -one.variance["horizontal"][-1])
+    left = {q: v - np.sum([one.variance[q] for one in shares], axis=0) for q, v in whole.items()}
+    trajectory.index = trajectory.index - begin
+    return Forecast(begin, time, trajectory, P, course, tuple(shares), left if aided else {})
+
+
+def _as_it_would_be(
+    navigator: Navigator, state: NavigatorState, go: Go, at: Array, course: Array
+) -> dict[str, Array]:
+    """Variances over a run, by quantity, at the instants of another.
+
+    They are the same, unless an aid that stays looks at what is known before it observes.
+    """
+    marks = [(mark.time, mark.covariance) for piece in go(navigator, state) for mark in piece.marks]
+    time = np.array([state.time, *(t for t, _ in marks)])
+    P = np.array([_start(navigator, state), *(P for _, P in marks)])
+    if time.shape != at.shape or np.abs(time - at).max() > SAME_INSTANT:
+        P = np.array([[np.interp(at, time, P[:, i, j]) for j in range(9)] for i in range(9)])
+        P = P.transpose(2, 0, 1)
+    return variances(P, course)
+
+
+def _start(navigator: Navigator, state: NavigatorState) -> Array:
+    """Covariance of the state where an outage begins, (9, 9), in north-east-down."""
+    row = state.engine.filter.row
+    turn = np.kron(np.eye(3), navigator.filter.mechanization.level_from_ned(row))
+    P = physical(navigator, state)[:9, :9]
+    return np.asarray(turn.T @ P @ turn)
+
+
+def courses(trajectory: pd.DataFrame, at: Array) -> Array:
+    """Direction of the way at instants, rad: of the heading, where it stands."""
+    time = trajectory.index.to_numpy(dtype=np.float64)
+    near = np.clip(np.searchsorted(time, at), 0, len(time) - 1)
+    north, east, heading = (
+        trajectory[c].to_numpy(dtype=np.float64)[near] for c in ("VN", "VE", "heading")
+    )
+    way = np.where(np.hypot(north, east) > STANDS, np.arctan2(east, north), np.radians(heading))
+    return np.asarray(way, dtype=np.float64)

@@ -1,0 +1,283 @@
+"""A run of navigation that coasts: outages of its receivers, foretold and as they were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.config.coast import CoastSpec
+from strapdown.config.navigation import NavigationSpec, aids_of
+from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
+from strapdown.evaluation.withheld import WithheldScore, blinded, score_of, spans_to_withhold
+from strapdown.exceptions import ConfigError
+from strapdown.navigation.navigator import Navigator, NavigatorState
+from strapdown.navigation.piece import NavigationPiece
+from strapdown.navigation.record import Span
+from strapdown.navigation.recorder import record_of
+from strapdown.systems.coasting.forecast import (
+    QUANTITIES,
+    Forecast,
+    courses,
+    forecast,
+    variances,
+)
+from strapdown.systems.progress import Progress, silent
+from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.chain import Chain, ChainState
+from strapdown.systems.sins.source import NavigationSource
+from strapdown.systems.sins.withholding import SETTLED, WithheldRun, withheld_runs
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["Drift", "RecordedCoast", "coast_of_run"]
+
+Array = NDArray[np.float64]
+
+#: Of the record that is taken at a time until navigation begins, s.
+CHUNK = 2.0
+#: Instants of a cone.
+INSTANTS = 120
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """What was foretold for one outage, and what came.
+
+    Attributes
+    ----------
+    span : Span
+    variance : mapping of str to ndarray, (m,)
+        By quantity, foretold, on the cone's instants.
+    bound : ndarray, (m,), m
+        Of the horizontal place, 95 %.
+    time : ndarray, (n,), s
+        Of the fixes that were kept back, since the begin.
+    along, across, down : ndarray, (n,), m
+        Computed less fix; along and across the way.
+    inside : ndarray of bool, (n,)
+        Whether it is within the ellipse of 95 %, the noise of the fix with it.
+    """
+
+    span: Span
+    variance: dict[str, Array]
+    bound: Array
+    time: Array
+    along: Array
+    across: Array
+    down: Array
+    inside: NDArray[np.bool_]
+
+    @property
+    def horizontal(self) -> Array:
+        """Length of the horizontal drift, (n,), m."""
+        return np.asarray(np.hypot(self.along, self.across))
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedCoast:
+    """What came of the outages of a run.
+
+    Attributes
+    ----------
+    forecast : Forecast
+        Of the outage whose bound at its end is the middle one.
+    time : ndarray, (m,), s
+        Instants of the cone, since the begin of an outage.
+    variance : mapping of str to ndarray, (m,)
+        By quantity: the mean over the outages.
+    bound : ndarray, (m,), m
+        The root of the mean square of their bounds of 95 %.
+    drifts : tuple of Drift
+        In the order of their begins; without fixes where the run has no receiver.
+    stays : tuple of str
+        Names of the aids that stayed.
+    """
+
+    forecast: Forecast
+    time: Array
+    variance: dict[str, Array]
+    bound: Array
+    drifts: tuple[Drift, ...]
+    stays: tuple[str, ...]
+
+
+def coast_of_run(
+    spec: CoastSpec,
+    navigation: NavigationSpec,
+    source: NavigationSource,
+    progress: Progress = silent,
+) -> RecordedCoast:
+    """Navigate over a record, and take its receivers away at even places.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+    navigation : NavigationSpec
+    source : NavigationSource
+    progress : callable, optional
+
+    Returns
+    -------
+    RecordedCoast
+
+    Raises
+    ------
+    ConfigError
+        The outage does not fit into the run, begins outside of it, or is where it aligns anew.
+    DataError
+        Navigation never begins.
+    """
+    chain = make_chain(navigation, uncertainty_of(navigation))
+    # What comes after an outage tells nothing of it while it lasts.
+    chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
+    receivers = [name for name, aid in aids_of(navigation).items() if aid.kind == "gnss"]
+    stays = tuple(name for name in aids_of(navigation) if name not in receivers)
+    time, values = index_of(source.imu), values_of(source.imu, [*GYRO, *ACCEL])
+    state = chain.begin(source.imu.attrs["sampling"], source.name)
+    for aid, table in source.tables.items():
+        state = chain.tell(state, aid, table)
+    begun, at = state, 0
+    while begun.navigator is None and at < len(time):
+        state = begun
+        progress("aligning", 0.1)
+        first, at = at, int(np.searchsorted(time, time[at] + CHUNK, side="right"))
+        begun, _ = chain.advance(state, time[first:at], values[first:at], at == len(time))
+    ends = [float(index_of(source.tables[name])[-1]) for name in receivers]
+    spans = _spans(spec, source, float(begun.time), min([float(time[-1]), *ends]), receivers)
+    blind = chain
+    for name in receivers:
+        blind = replace(blind, navigator=blinded(blind.navigator, name))
+    runs: list[tuple[WithheldRun, Drift]] = []
+    grid = np.linspace(0.0, spec.outage_s, INSTANTS + 1)
+    scored = receivers[0] if receivers else None
+    for number, run in enumerate(withheld_runs(chain, blind, begun, time[at:], values[at:], spans)):
+        progress(f"outage {number + 1} of {len(spans)}", 0.1 + 0.4 * number / len(spans))
+        runs.append((run, _drift(blind.navigator, run, spans[run.number], scored, grid)))
+    order = sorted(range(len(runs)), key=lambda k: float(runs[k][1].bound[-1]))
+    middle, _ = runs[order[len(order) // 2]]
+    rows = slice(at + middle.rows.start, at + middle.rows.stop)
+    foretold = _foretold(
+        chain,
+        middle.state,
+        (time[rows], values[rows]),
+        receivers,
+        spec.outage_s,
+        bool(stays),
+        lambda stage, share: progress(stage, 0.5 + 0.25 * share),
+    )
+    drifts = tuple(drift for _, drift in runs)
+    return RecordedCoast(
+        forecast=foretold,
+        time=grid,
+        variance={q: np.mean([d.variance[q] for d in drifts], axis=0) for q in QUANTITIES},
+        bound=np.sqrt(np.mean([d.bound**2 for d in drifts], axis=0)),
+        drifts=drifts,
+        stays=stays,
+    )
+
+
+def _spans(
+    spec: CoastSpec, source: NavigationSource, begun: float, end: float, receivers: list[str]
+) -> tuple[Span, ...]:
+    """The outages, on the clock of the samples."""
+    first = begun + SETTLED
+    room = end - first
+    if spec.at_s is not None:
+        if not first - SETTLED <= spec.at_s <= end - spec.outage_s:
+            raise ConfigError(
+                f"an outage of {spec.outage_s:g} s from {spec.at_s:.9g} s on is not within the "
+                f"run: navigation goes from {begun:.9g} s, and its fixes to {end:.9g} s",
+                file=source.name,
+                quantity="--at",
+                remedy=f"begin between {begun:.9g} and {end - spec.outage_s:.9g} s"
+                if end - spec.outage_s > begun
+                else "give a shorter --outage",
+            )
+        return (Span("outage", spec.at_s, spec.at_s + spec.outage_s),)
+    if room < spec.outage_s:
+        raise ConfigError(
+            f"an outage of {spec.outage_s:g} s is longer than the {max(room, 0.0):.4g} s of the "
+            f"run: its navigation, settled from {first:.9g} s on, ends at {end:.9g} s",
+            file=source.name,
+            quantity="--outage",
+            remedy=f"give at most {room:.4g} s"
+            if room > 1.0
+            else "use a longer record: a filter needs half a minute to settle",
+        )
+    places = spec.places if receivers else 1
+    return spans_to_withhold(first, end, spec.outage_s, places)
+
+
+def _drift(
+    navigator: Navigator, run: WithheldRun, span: Span, scored: str | None, grid: Array
+) -> Drift:
+    """What was foretold for an outage, and what came."""
+    if run.state.navigator is None or run.through.navigator is None:
+        raise _aligns_anew(span.begin, span.end)
+    record = record_of(navigator, run.pieces)
+    marks = record.sd.index.to_numpy(dtype=np.float64)
+    course = courses(record.trajectory, marks)
+    on_grid = grid + span.begin
+    variance = {
+        q: np.interp(on_grid, marks, v) for q, v in variances(record.covariance, course).items()
+    }
+    bound = np.interp(on_grid, marks, plane_bound(record.covariance))
+    if scored is None:
+        none = np.empty(0)
+        return Drift(span, variance, bound, none, none, none, none, np.empty(0, dtype=np.bool_))
+    score: WithheldScore = score_of(run.pieces, scored, span)
+    way = courses(record.trajectory, score.time)
+    c, s = np.cos(way), np.sin(way)
+    north, east, down = score.error.T
+    return Drift(
+        span,
+        variance,
+        bound,
+        score.time - span.begin,
+        c * north + s * east,
+        -s * north + c * east,
+        down,
+        score.distance <= PLANE_95,
+    )
+
+
+def _aligns_anew(begin: float, end: float) -> ConfigError:
+    return ConfigError(
+        f"from {begin:.9g} to {end:.9g} s it does not navigate alone: after a gap it aligns anew",
+        quantity="--at",
+        remedy="begin the outage elsewhere with --at, or bridge the gap (coast_s in [gaps])",
+    )
+
+
+def _foretold(
+    chain: Chain,
+    state: ChainState,
+    samples: tuple[Array, Array],
+    receivers: list[str],
+    outage: float,
+    aided: bool,
+    progress: Progress,
+) -> Forecast:
+    """The forecast from a state of a run over the samples that follow it."""
+    begin = state.navigator
+    assert begin is not None
+    # What a receiver would tell is not even looked at.
+    queues = {
+        name: replace(queue, time=queue.time[:0], values=queue.values[:0])
+        if name in receivers
+        else queue
+        for name, queue in begin.queues.items()
+    }
+
+    def go(navigator: Navigator, start: NavigatorState) -> tuple[NavigationPiece, ...]:
+        one = replace(chain, navigator=navigator)
+        end, piece = one.advance(replace(state, navigator=start), *samples)
+        if end.navigator is None:
+            raise _aligns_anew(state.time, end.time)
+        return (*piece.navigation, navigator.finish(end.navigator))
+
+    start = replace(begin, queues=queues)
+    return forecast(chain.navigator, start, go, outage, aided=aided, progress=progress)

@@ -1,0 +1,123 @@
+"""A forecast of coasting, from its specification to everything that a report tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from strapdown.config.coast import CoastSpec
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.exceptions import ConfigError, Finding
+from strapdown.results import InputFiles
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.systems.attitude_source import input_files, sensor_file
+from strapdown.systems.coasting.forecast import Forecast
+from strapdown.systems.coasting.recorded import RecordedCoast, coast_of_run
+from strapdown.systems.coasting.stated import forecast_of_sensor, sensor_of
+from strapdown.systems.one_thread import one_thread
+from strapdown.systems.progress import Progress, silent
+from strapdown.systems.sins.source import read_navigation_source
+
+__all__ = ["CoastResult", "run_coast"]
+
+
+@dataclass(frozen=True, eq=False)
+class CoastResult:
+    """Everything that came of a forecast.
+
+    Attributes
+    ----------
+    spec : CoastSpec
+    navigation : NavigationSpec or None
+        The run that coasts; None of a sensor along a stated motion.
+    name, what : str
+        The sensor or the record, in words.
+    sensors : ImuUncertainty
+    forecast : Forecast
+    recorded : RecordedCoast or None
+    stays : tuple of str
+        Aids that stay.
+    inputs : tuple of InputFiles
+    findings : tuple of Finding
+    """
+
+    spec: CoastSpec
+    navigation: NavigationSpec | None
+    name: str
+    what: str
+    sensors: ImuUncertainty
+    forecast: Forecast
+    recorded: RecordedCoast | None
+    stays: tuple[str, ...]
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+
+
+@one_thread()
+def run_coast(
+    spec: CoastSpec,
+    navigation: NavigationSpec | None = None,
+    file: Path | None = None,
+    progress: Progress = silent,
+) -> CoastResult:
+    """Foretell how far it drifts in an outage; of a run of navigation, try it, too.
+
+    Parameters
+    ----------
+    spec : CoastSpec
+        With absolute paths.
+    navigation : NavigationSpec, optional
+        The run whose receivers are taken away; without one, a sensor along a stated motion.
+    file : Path, optional
+        Where the run was read from: an input, too.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    CoastResult
+
+    Raises
+    ------
+    ConfigError
+        Nothing says which sensor, the motion cannot be, or the outage does not fit into the run.
+    DataError
+        The record of the run cannot be read.
+    """
+    if navigation is None:
+        if spec.sensor is None:
+            raise ConfigError(
+                "nothing says which sensor", quantity="sensor", remedy="name one of the catalogue"
+            )
+        sensors = sensor_of(spec.sensor)
+        sensor = load_sensor(spec.sensor)
+        return CoastResult(
+            spec,
+            None,
+            sensor.name,
+            sensor.title,
+            sensors,
+            forecast_of_sensor(spec, sensors, progress),
+            None,
+            tuple(type(spec.aiding).model_fields),
+            sensor_file(spec.sensor),
+            (),
+        )
+    progress("reading", 0.02)
+    source = read_navigation_source(navigation)
+    recorded = coast_of_run(spec, navigation, source, progress)
+    files = () if file is None else (input_files("configuration", str(file), (file,)),)
+    return CoastResult(
+        spec,
+        navigation,
+        source.name,
+        source.what,
+        uncertainty_of(navigation),
+        recorded.forecast,
+        recorded,
+        recorded.stays,
+        (*files, *source.inputs),
+        tuple(source.findings),
+    )
