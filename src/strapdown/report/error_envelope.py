@@ -8,13 +8,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.evaluation.plane_bound import PLANE_95
+
 Array = NDArray[np.float64]
 
-__all__ = ["PLANE_95", "ellipse", "envelope", "hull"]
+__all__ = ["ellipse", "envelope", "hull"]
 
-#: Half axes of the ellipse that holds 95 % of a normal error in a plane, over the standard
-#: deviations along them: the root of the chi-square of two degrees of freedom, -2 ln 0.05.
-PLANE_95 = math.sqrt(-2.0 * math.log(0.05))
 _CORNERS = 28
 
 

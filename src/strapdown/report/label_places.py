@@ -48,14 +48,14 @@ def place_labels(
     others = np.asarray(obstacles, dtype=np.float64).reshape(-1, 2)
     points = np.column_stack([np.asarray(x, float), np.asarray(y, float)])
     unit = _on_axes(np.vstack([points, others]))
-    dots = [_around(p) for p in unit]
+    dots = np.hstack([unit - 0.5 * _POINT, unit + 0.5 * _POINT])
     taken: list[Array] = []
     chosen: dict[int, tuple[int, int]] = {}
     for k in sorted(range(len(labels)), key=lambda j: (-len(labels[j]), j)):
         boxes = [_box(unit[k], place, len(labels[k])) for place in PLACES]
         covered = [
             4.0 * sum(_overlap(box, other) for other in taken)
-            + sum(_overlap(box, dot) for j, dot in enumerate(dots) if j != k)
+            + sum(_overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
             + _outside(box)
             # Near is better where nothing is covered anyway.
             + 1e-7 * number
@@ -76,8 +76,11 @@ def _on_axes(points: Array) -> Array:
     return unit
 
 
-def _around(point: Array) -> Array:
-    return np.concatenate([point - 0.5 * _POINT, point + 0.5 * _POINT])
+def _touched(box: Array, others: Array) -> list[int]:
+    """Which of many boxes, (n, 4), share an area with one."""
+    apart = np.minimum(others[:, 2:], box[2:]) <= np.maximum(others[:, :2], box[:2])
+    touched: list[int] = np.flatnonzero(~apart.any(axis=1)).tolist()
+    return touched
 
 
 def _box(point: Array, place: tuple[int, int], characters: int) -> Array:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from strapdown.report.chart import Chart, Line, Panel, steady_range, strip_range
@@ -49,14 +48,13 @@ _STYLE: Any = {
     "axes.axisbelow": True,
     "text.parse_math": False,
 }
-_WIDTH, _PAPER_WIDTH = 9.0, 6.7  # inches
-_PAPER = {"font.size": 8, "axes.linewidth": 0.6, "xtick.major.width": 0.6, "ytick.major.width": 0.6}
+_WIDTH = 9.0  # inches
 _DPI = 160
 _MARK = 7.0  # points, of the names of marks and levels
 _TITLE, _CAPTION = 90, 155  # characters a line
 
 
-def draw(chart: Chart, path: Path, *, caption: bool = False, paper: bool = False) -> None:
+def draw(chart: Chart, path: Path, *, caption: bool = False) -> None:
     """Draw a chart into an SVG or a PNG file, as its ending says.
 
     Parameters
@@ -65,11 +63,9 @@ def draw(chart: Chart, path: Path, *, caption: bool = False, paper: bool = False
     path : Path
     caption : bool
         Whether the caption stands in the picture: where no page says it.
-    paper : bool
-        Whether the picture is for the column of a printed page, which says the title itself.
     """
-    with _own_style(_PAPER if paper else {}):
-        figure = _figure(chart, caption, paper)
+    with _own_style():
+        figure = _figure(chart, caption)
         if path.suffix == ".png":
             figure.savefig(path, format="png", dpi=_DPI, metadata={"Software": None})
         else:
@@ -93,7 +89,7 @@ def notebook_figure(chart: Chart) -> Figure:
 
 
 @contextmanager
-def _own_style(more: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
+def _own_style() -> Iterator[None]:
     """Not the style of whoever runs it: the picture belongs to the seal."""
     import matplotlib as mpl
 
@@ -101,11 +97,11 @@ def _own_style(more: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]
         # A letter that the font lacks, in a name of the user's, is a box.
         warnings.filterwarnings("ignore", "Glyph .* missing from font")
         mpl.rcdefaults()
-        mpl.rcParams.update(_STYLE | dict(more))
+        mpl.rcParams.update(_STYLE)
         yield
 
 
-def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
+def _figure(chart: Chart, caption: bool = False) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -129,9 +125,7 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
                 return
             super().draw(renderer)
 
-    width = _PAPER_WIDTH if paper else _WIDTH
-    height = _paper_height(chart) if paper else _height(chart)
-    figure = Picture(figsize=(width, height), layout=RoundedLayout())
+    figure = Picture(figsize=(_WIDTH, _height(chart)), layout=RoundedLayout())
     FigureCanvasAgg(figure)
     axes = _axes(chart, figure)
     for panel, axis in zip(chart.panels, axes, strict=True):
@@ -141,20 +135,15 @@ def _figure(chart: Chart, caption: bool = False, paper: bool = False) -> Figure:
             axis.set_xlabel(chart.x_label)
     timed = [a for p, a in zip(chart.panels, axes, strict=True) if not p.x_label]
     if timed:
-        _label_marks(chart, timed[0], width)
-    if not paper:
-        figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
+        _label_marks(chart, timed[0])
+    figure.suptitle(fill(chart.title, _TITLE), x=0.01, ha="left", fontweight="bold")
     entries: dict[str, Any] = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if entries or caption:
         widest = max(map(len, entries), default=0)
-        columns = max(1, min(6, (96 if paper else 110) // (widest + 7)))
-        if paper:
-            # Panels do not give way to a long legend.
-            more = 0.15 * (-(-len(entries) // columns) - 1)
-            figure.set_size_inches(width, height + max(0.0, more))
+        columns = max(1, min(6, 110 // (widest + 7)))
         legend = figure.legend(
             list(entries.values()),
             list(entries),
@@ -199,18 +188,7 @@ def _height(chart: Chart) -> float:
     return 1.4 + 2.0 * sum(panel.height for panel in chart.panels) + (len(chart.panels) == 1)
 
 
-def _paper_height(chart: Chart) -> float:
-    """Of a chart in a column of print: two of three panels, with what is said, fill a page."""
-    if min(len(panel.categories) for panel in chart.panels):
-        return 0.8 + 0.19 * max(len(panel.categories) for panel in chart.panels)
-    if chart.beside:
-        return 3.2
-    titles = 0.18 * sum(bool(panel.title) for panel in chart.panels)
-    alone = 0.6 * (len(chart.panels) == 1)
-    return 0.85 + 0.95 * sum(panel.height for panel in chart.panels) + titles + alone
-
-
-def _label_marks(chart: Chart, axis: Axes, width: float) -> None:
+def _label_marks(chart: Chart, axis: Axes) -> None:
     """Name the marks above the first axes, one above the other where they are close."""
     from matplotlib.transforms import blended_transform_factory
 
@@ -219,7 +197,7 @@ def _label_marks(chart: Chart, axis: Axes, width: float) -> None:
     shares = axis.transLimits.transform(
         axis.transScale.transform([(mark.x, 1.0) for mark in chart.marks])
     )[:, 0]
-    letter = 0.56 * _MARK / (72.0 * 0.87 * width)
+    letter = 0.56 * _MARK / (72.0 * 0.87 * _WIDTH)
     rows = label_rows(shares.tolist(), [mark.label for mark in chart.marks], letter)
     across = blended_transform_factory(axis.transData, axis.transAxes)
     for mark, share, row in zip(chart.marks, shares.tolist(), rows, strict=True):

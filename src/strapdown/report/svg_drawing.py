@@ -154,6 +154,42 @@ class Drawing:
         )
         self._parts.append(f"<circle {at}{inside}{_stroke(colour, width, dash)}/>")
 
+    def curve(
+        self, points: Array, colour: str = INK, width: float = 1.0, dash: str = "solid"
+    ) -> None:
+        """Draw a line of many points, (n, 2), all finite, to a tenth of a pixel."""
+        if len(points) < 2:
+            return
+        self._parts.append(
+            f'<polyline points="{_tenths(points)}" fill="none"{_stroke(colour, width, dash)}/>'
+        )
+
+    def area(self, points: Array, fill: str, opacity: float = 1.0) -> None:
+        """Fill an outline of many points, (n, 2), all finite, to a tenth of a pixel."""
+        if len(points) < 3:
+            return
+        more = f' fill-opacity="{number(opacity)}"' if opacity < 1.0 else ""
+        self._parts.append(f'<polygon points="{_tenths(points)}" fill="{fill}"{more}/>')
+
+    def points(
+        self, at: Array, outline: Array, radius: float, colour: str, *, hollow: bool = False
+    ) -> None:
+        """Draw one shape at many points, (n, 2): an outline (k, 2) of radius one, or a circle."""
+        if not len(at) or not radius > 0.0:
+            return
+        size = number(radius)
+        if len(outline):
+            steps = np.diff(radius * outline, axis=0)
+            begin = at + radius * outline[0]
+            turn = "l" + " ".join(f"{number(x)},{number(y)}" for x, y in steps.tolist()) + "z"
+        else:
+            begin = at - np.array([radius, 0.0])
+            half = f"a{size},{size} 0 1,0 {{}}{number(2.0 * radius)},0"
+            turn = half.format("") + half.format("-") + "z"
+        path = "".join(f"M{place}{turn}" for place in _tenths(begin).split(" "))
+        look = f'fill="none"{_stroke(colour, 1.2, "")}' if hollow else f'fill="{colour}"'
+        self._parts.append(f'<path d="{path}" {look}/>')
+
     def arrow(
         self,
         tail: Sequence[float],
@@ -288,6 +324,11 @@ def _stroke(colour: str | None, width: float, dash: str) -> str:
     if dash in _DASHES:
         text += f' stroke-dasharray="{_DASHES[dash]}"'
     return text
+
+
+def _tenths(points: Array) -> str:
+    """Write many points at once."""
+    return " ".join(["%.1f,%.1f"] * len(points)) % tuple(points.ravel().tolist())
 
 
 def _clean(text: str) -> str:
