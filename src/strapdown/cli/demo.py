@@ -4,55 +4,99 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from strapdown.systems.progress import Progress
+
 EPILOG = "Example: strapdown demo --out demo"
-_TURNS = "mpu6050_turns"
+_PAGE = "index.html"
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the results go.")] = Path("demo"),
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder to make (demo).", show_default=False)
+    ] = Path("demo"),
     force: Annotated[bool, typer.Option("--force", help="Replace results that are there.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
 ) -> None:
-    """Show the main jobs: a scenario with exact truth, a crash, and a real recording.
+    """Show what all of it answers, in one page: attitude, a crash, navigation.
 
-    The recording is looked for in the folder that STRAPDOWN_DATA names, by default
-    ../shared/data.
+    Runs on built-in data; recordings are shown, too, where they are in the folder that
+    STRAPDOWN_DATA names, by default ../shared/data.
     """
-    from strapdown.cli.attitude import attitude
-    from strapdown.cli.console import console
-    from strapdown.cli.crash import crash
-    from strapdown.cli.simulate import simulate
+    from strapdown.cli.console import console, progress
+    from strapdown.cli.demo_runs import demo_runs
+    from strapdown.report.demo_page import demo_page, shown_answer, shown_truth
 
+    data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data"))
+    runs = demo_runs(out, data)
+    there = [run for run in runs if run.needs is None or (data / run.needs).is_dir()]
+    absent = [run for run in runs if run not in there]
+    missing = (
+        "All of this is simulated. Three public recordings stand here, too, where STRAPDOWN_DATA "
+        f"names the folder that has them ({', '.join(str(run.needs) for run in absent)}); "
+        "docs/start.md says what they are."
+        if absent
+        else None
+    )
+    _check(out, [name for run in there for name in run.folders], force)
+    # What it says is of the results before.
+    (out / _PAGE).unlink(missing_ok=True)
     page = console()
-    page.print(
-        "A turn through a pitch near 90°, where one algorithm fails and another was never right.\n",
-        style="italic",
-    )
-    attitude(["alexiev-fig4"], rate=100.0, out=out / "alexiev-fig4", force=force)
-    page.print(
-        "\nA car against a pole, as two cheap recorders have it: their records, and the report.\n",
-        style="italic",
-    )
-    records = out / "crash-pole-records"
-    simulate("pole", out=records, force=force, quiet=True)
-    crash(records / "case.toml", out=out / "crash-pole", force=force)
-    page.print(f"The records and the truth are in {records}.")
-    data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data")) / _TURNS
-    turn = data / "rotate-360ccw-around-z-pointing-up"
-    if not turn.is_dir():
-        page.print(f"\nNo recording at {data}: set STRAPDOWN_DATA to see a real turn, too.")
+    whole = sum(run.takes for run in there)
+    done = 0.0
+    for run in there:
+        shown = run.shown
+        with progress(quiet) as show:
+            run.make(out, force, _part_of(show, shown.title, done / whole, run.takes / whole))
+        done += run.takes
+        if quiet:
+            continue
+        page.print(f"{shown.part}  {shown.title}", style="bold")
+        page.print(f"   {shown_answer(out / shown.slug)}")
+        truth = shown_truth(
+            out / shown.slug, None if shown.records is None else out / shown.records
+        )
+        if truth:
+            page.print(f"   {truth}", style="green")
+    _write_whole(out / _PAGE, demo_page([run.shown for run in there], out, missing))
+    if quiet:
         return
-    page.print(
-        "\nA cheap sensor, turned twice about the vertical by hand: the end is the start.\n",
-        style="italic",
-    )
-    attitude(
-        [str(turn)],
-        reference=["end 2 turns about up since start"],
-        gyro_bias=str(data / "unmoved-10min"),
-        out=out / "turn-about-z",
-        force=force,
-    )
+    if missing:
+        console(err=True).print(f"note: {missing}")
+    page.print(f"\nOpen  {out / _PAGE}")
+
+
+def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress:
+    """Progress of one run as a part of the whole."""
+    return lambda stage, done: show(f"{title}: {stage}", begin + share * done)
+
+
+def _check(out: Path, names: list[str], force: bool) -> None:
+    """Refuse before the first run what a later one would be refused for."""
+    from strapdown.bundle import check_destination
+    from strapdown.exceptions import ConfigError
+
+    for name in (*names, _PAGE):
+        if "." not in name:
+            check_destination(out / name, force)
+        elif (out / name).exists() and not force:
+            raise ConfigError(
+                "it exists already",
+                file=str(out / name),
+                quantity="--out",
+                remedy="name another folder with --out, or replace this one with --force",
+            )
+
+
+def _write_whole(path: Path, text: str) -> None:
+    """Write a file that is there whole or not at all."""
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8", newline="\n")
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)

@@ -1,0 +1,226 @@
+"""The first page of a demonstration: what several runs answered, each with its picture."""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from strapdown.report.crash_values import plain
+from strapdown.report.page import render
+
+__all__ = ["Shown", "demo_page", "shown_answer", "shown_truth"]
+
+_MS_TO_KMH = 3.6
+_SMALL_DEG = 1e-3
+# Narrower than this many of its units, a letter of a picture cannot be read.
+_LEAST_SHARE = 0.55
+_SIZE = re.compile(r"<svg[^>]*?viewBox=\"[\d.\-]+ [\d.\-]+ ([\d.]+) [\d.]+\"", re.S)
+
+
+@dataclass(frozen=True)
+class Shown:
+    """One run on the page.
+
+    Attributes
+    ----------
+    part : str
+        A, B or C: which of the three systems.
+    slug : str
+        Its folder beside the page.
+    title : str
+    question : str
+    command : str
+        What makes it again, as typed beside the page's own folder.
+    figures : tuple of str
+        Figures of the bundle, without their ending.
+    pages : tuple of (file, words)
+        What to open.
+    records : str, optional
+        Folder of the records with the truth, of a simulated crash.
+    """
+
+    part: str
+    slug: str
+    title: str
+    question: str
+    command: str
+    figures: tuple[str, ...]
+    pages: tuple[tuple[str, str], ...] = (("report.html", "The report"),)
+    records: str | None = None
+
+
+def shown_answer(bundle: Path) -> str:
+    """What a bundle answers, in one sentence or two.
+
+    Parameters
+    ----------
+    bundle : Path
+        Of `attitude`, `crash`, `navigate` or `coast`.
+
+    Returns
+    -------
+    str
+    """
+    kind, told = _told(bundle)
+    if kind == "attitude":
+        return str(told["answer"]["sentence"] if told["answer"] else told["headline"])
+    if kind == "crash":
+        return str(told["headline"])
+    if kind == "coast":
+        answer = str(told["answer"]).removeprefix(f"{told['name']}: ")
+        return f"{answer[:1].upper()}{answer[1:]}."
+    return str(_json(bundle / "verdict.json")["answer"])
+
+
+def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
+    """What is known beside a bundle's answer, and how far that is from it.
+
+    Parameters
+    ----------
+    bundle : Path
+    records : Path, optional
+        Of a simulated crash.
+
+    Returns
+    -------
+    str or None
+        None where nothing is known.
+    """
+    kind, told = _told(bundle)
+    if kind == "attitude":
+        return _attitude_truth(told)
+    if kind == "crash":
+        return None if records is None else _crash_truth(_json(records / "scenario.json"))
+    if kind == "coast":
+        return str(told["tried"]) if told["tried"] else None
+    return _navigation_truth(told)
+
+
+def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) -> str:
+    """Lay out the page.
+
+    Parameters
+    ----------
+    shown : sequence of Shown
+        Their bundles stand in `folder`.
+    folder : Path
+    missing : str, optional
+        What could not be shown, and why.
+
+    Returns
+    -------
+    str
+        HTML that needs no network; the same for the same bundles.
+    """
+    runs = [
+        {
+            "part": run.part,
+            "slug": run.slug,
+            "title": run.title,
+            "question": run.question,
+            "command": run.command,
+            "answer": shown_answer(folder / run.slug),
+            "truth": shown_truth(
+                folder / run.slug, None if run.records is None else folder / run.records
+            ),
+            "pictures": [_picture(folder / run.slug / "figures" / f"{f}.svg") for f in run.figures],
+            "links": [(f"{quote(run.slug)}/{page}", words) for page, words in run.pages],
+        }
+        for run in shown
+    ]
+    return render("demo.html", {"runs": runs, "missing": missing})
+
+
+def _attitude_truth(told: dict[str, Any]) -> str | None:
+    full = {
+        s["algorithm"]: s["error_deg"]
+        for s in told["sweep"]
+        if s["factor"] == 1 and s["meaning"] == "drop" and s["error_deg"] is not None
+    }
+    if not full:
+        return None
+    exact = any(s["max_deg"] is not None for s in told["sweep"])
+    known = "The attitude is known exactly" if exact else "The attitude at the end is known"
+    rate = max(s["rate_hz"] for s in told["sweep"])
+    errors = ", ".join(f"{name} {_degrees(error)}" for name, error in full.items())
+    return f"{known}: at {plain(rate, 0)} Hz the algorithms are off by: {errors}."
+
+
+def _degrees(value: float) -> str:
+    if value < _SMALL_DEG:
+        return f"less than {_SMALL_DEG:g}°"
+    return f"{plain(value, max(0, 2 - math.floor(math.log10(value))))}°"
+
+
+def _crash_truth(scenario: dict[str, Any]) -> str:
+    (impact,) = scenario["impacts"]
+    change = math.hypot(*impact["delta_v_m_per_s"]) * _MS_TO_KMH
+    return (
+        f"Simulated: the change of velocity is {plain(change, 2)} km/h, the force comes from "
+        f"{plain(impact['pdof_deg'], 1)}°."
+    )
+
+
+def _navigation_truth(told: dict[str, Any]) -> str | None:
+    if told["control_points"]:
+        points = told["control_points"]
+        return (
+            f"{points['points']} control points, after the origin and heading that fit best: off "
+            f"by {plain(points['rms_m'], 2)} m (root mean square), {plain(points['largest_m'], 2)} "
+            f"m at most, over {plain(points['way_m'], 1)} m: "
+            f"{plain(100.0 * points['rms_m'] / points['way_m'], 2)} %."
+        )
+    if told["against"]:
+        error = told["against"]["errors"]["horizontal"]
+        return (
+            f"Against {told['against']['name']} the place is off by {plain(error['rms_m'], 3)} m "
+            f"(root mean square), {plain(error['largest_m'], 3)} m at most, and within its bound "
+            f"of 95 % for {plain(100.0 * error['share_within_bound'], 1)} % of the time."
+        )
+    if told["withheld"]:
+        return _withheld_truth(told["withheld"])
+    return None
+
+
+def _withheld_truth(withheld: list[dict[str, Any]]) -> str:
+    tried = [w for w in withheld if w["largest_horizontal_error_m"] is not None]
+    length = plain(max(w["to_s"] - w["from_s"] for w in tried), 0)
+    errors = ", ".join(plain(w["largest_horizontal_error_m"], 1) for w in tried)
+    forward = [w["largest_horizontal_error_forward_m"] for w in tried]
+    before = (
+        ""
+        if None in forward
+        else f" (before smoothing by {', '.join(plain(error, 1) for error in forward)} m)"
+    )
+    return (
+        f"Fixes kept back for {length} s at {len(tried)} places: off by {errors} m at most"
+        f"{before}, within the bound of 95 % at {sum(w['inside'] for w in tried)} of {len(tried)}."
+    )
+
+
+def _told(bundle: Path) -> tuple[str, dict[str, Any]]:
+    manifest = _json(bundle / "manifest.json")
+    name = {"navigate": "navigation"}.get(manifest["command"], manifest["command"])
+    return manifest["command"], _json(bundle / f"{name}.json")
+
+
+def _json(path: Path) -> Any:
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def _picture(path: Path) -> dict[str, Any]:
+    drawn = path.read_bytes()
+    size = _SIZE.search(drawn.decode("utf-8"))
+    width = float(size.group(1)) if size else 640.0
+    return {
+        "data": f"data:image/svg+xml;base64,{base64.b64encode(drawn).decode('ascii')}",
+        "least": round(_LEAST_SHARE * width),
+        "alt": path.stem.replace("-", " "),
+    }
