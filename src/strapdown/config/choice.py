@@ -136,9 +136,19 @@ def with_kinds(slot: Slot, given: Any, default: str = "") -> Any:
         if option.slot is None or inner is None:
             continue
         kind = option.default if isinstance(option.default, str) else ""
-        whole = {"kind": inner} if isinstance(inner, str) else inner
-        out[option.key] = with_kinds(option.slot, whole, kind)
+        out[option.key] = as_table(option.slot, inner, kind)
     return out
+
+
+def as_table(slot: Slot, given: Any, default: str) -> Any:
+    """As `with_kinds`, of a module that may itself be named by its kind alone."""
+    return with_kinds(slot, {"kind": given} if isinstance(given, str) else given, default)
+
+
+def field_of(form: type[TableSpec], usual: Mapping[str, Any]) -> tuple[Any, Any]:
+    """A field of a form, which may be left out where nothing in it must be written."""
+    needed = any(one.is_required() for name, one in form.model_fields.items() if name not in usual)
+    return form, ... if needed else form.model_validate(usual)
 
 
 def make_choice(spec: ChoiceSpec, slot: Slot, given: Mapping[str, Any]) -> Any:

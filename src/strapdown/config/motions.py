@@ -78,6 +78,25 @@ class SineVelocitySpec(PlaceSpec):
     phase_deg: Triple = (0.0, 90.0, 0.0)
 
 
+class WalkingSpec(PlaceSpec):
+    """A unit on a shoe, around blocks."""
+
+    kind: Literal["walking"]
+    gait: Literal["walk", "run", "shuffle"] = "walk"
+    strides: int = Field(ge=1, le=100_000, strict=True)
+    #: After so many strides it turns; never, if zero.
+    corner_each: int = Field(default=10, ge=0, strict=True)
+    corner_deg: FiniteFloat = 90.0
+    #: Strides that climb two stairs each, counted from zero.
+    stairs: tuple[Annotated[int, Field(ge=0, strict=True)], ...] = ()
+    stair_m: FiniteFloat = 0.17
+    heading_deg: FiniteFloat = 0.0
+    #: At the beginning and at the end.
+    stand_s: Positive = 5.0
+    roll_deg: FiniteFloat = 0.0
+    pitch_deg: FiniteFloat = 0.0
+
+
 class SpeedSpec(TableSpec):
     """Another speed."""
 
@@ -258,6 +277,7 @@ MotionSpec = Annotated[
     StationarySpec
     | RockingStandSpec
     | SineVelocitySpec
+    | WalkingSpec
     | CarSpec
     | AircraftSpec
     | ShipSpec
@@ -270,6 +290,7 @@ KINDS = (
     "stationary",
     "rocking_stand",
     "sine_velocity",
+    "walking",
     "car",
     "aircraft",
     "ship",

@@ -31,6 +31,7 @@ __all__ = [
     "AidSpec",
     "CoarseModeSpec",
     "CommandTable",
+    "ControlPointsTable",
     "DampingSpec",
     "FilterSpec",
     "FineModeSpec",
@@ -44,7 +45,9 @@ __all__ = [
     "NavigationSpec",
     "ReceiverTable",
     "RecorderSpec",
+    "SmootherSpec",
     "StartTable",
+    "TrustTable",
     "TruthTable",
     "WithholdTable",
     "aids_of",
@@ -188,6 +191,12 @@ class DampingSpec(ChoiceSpec):
     kind: str = "feedback"
 
 
+class SmootherSpec(ChoiceSpec):
+    """What a run is smoothed by when it has ended."""
+
+    kind: str = "none"
+
+
 class RecorderSpec(ChoiceSpec):
     """What of the run is kept."""
 
@@ -214,6 +223,14 @@ class TruthTable(TableSpec):
     path: FileName
 
 
+class ControlPointsTable(TableSpec):
+    """Where the body was at instants, north and east of a mark of one's own."""
+
+    path: FileName
+    #: By quantity (time, north, east) the name of its column, where the names do not say it.
+    columns: dict[Word, Word] = Field(default_factory=dict)
+
+
 class WithholdTable(TableSpec):
     """Fixes that are kept from the navigator, stretch by stretch, to score it by."""
 
@@ -226,6 +243,17 @@ class WithholdTable(TableSpec):
     places: StrictInt = Field(default=5, ge=1, le=100)
     #: Of the first one; half a minute after navigation begins, if not given.
     from_s: Number | None = None
+
+
+class TrustTable(TableSpec):
+    """What is asked of the heading, and of what does not agree."""
+
+    #: What a green light promises: the error is below it.
+    heading_limit_deg: Positive = 3.0
+    #: Known no better than this the light is red.
+    heading_red_deg: Positive = 10.0
+    #: Whether a run is repeated without the first measurement that is not as it was expected.
+    repeat: StrictBool = True
 
 
 class NavigationOutputTable(TableSpec):
@@ -261,10 +289,13 @@ class NavigationSpec(TableSpec):
     mechanization: MechanizationSpec = MechanizationSpec()
     filter: FilterSpec = FilterSpec()
     damping: DampingSpec = DampingSpec()
+    smoother: SmootherSpec = SmootherSpec()
     recorder: RecorderSpec = RecorderSpec()
     aiding: TableSpec = TableSpec()
     truth: TruthTable | None = None
+    control_points: ControlPointsTable | None = None
     withhold: WithholdTable | None = None
+    trust: TrustTable = TrustTable()
     output: NavigationOutputTable = NavigationOutputTable()
 
     @model_validator(mode="before")

@@ -7,38 +7,47 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 
-from strapdown.aiding.aid import Aid, TableAid
+from strapdown.aiding.aid import TableAid
 from strapdown.config.alignment_checks import NEEDS_GNSS, NOT_BEFORE_FINE
 from strapdown.config.choice import make_choice
 from strapdown.config.crash_checks import Written
 from strapdown.config.navigation import NavigationSpec, ReceiverTable, aids_of, receivers_of
+from strapdown.config.navigation_modules import (
+    given_of,
+    make_aid,
+    make_aids,
+    make_filter,
+    uncertainty_of,
+)
 from strapdown.config.slots import SLOTS
 from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
-from strapdown.config.state_tables import processes_of
 from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.state_process import with_processes
-from strapdown.estimation.stated_states import stated_states
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
-from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.stated_imu import stated_imu
 
-__all__ = ["TRAJECTORY_FILES", "check_navigation", "given_of", "make_aids", "make_filter"]
+__all__ = ["TRAJECTORY_FILES", "check_navigation"]
 
 WITHOUT = "without that no position has a bound, and no aid a weight"
 #: Forms of a trajectory that a run can write.
 TRAJECTORY_FILES = tuple(TRAJECTORY_WRITERS)
 #: Stages that are modules.
-STAGES = ("prefilter", "coarse", "fine", "mechanization", "filter", "damping", "recorder")
+STAGES = (
+    "prefilter",
+    "coarse",
+    "fine",
+    "mechanization",
+    "filter",
+    "damping",
+    "smoother",
+    "recorder",
+)
 #: Keys that end an alignment.
 ENDS = ("duration_s", "until_heading_sd_deg", "until_tilt_sd_deg", "window_s")
 #: Aids that observe a height.
@@ -207,7 +216,7 @@ class _Checks(SourceChecks):
         """One aid: its options, and whether it has what it observes by."""
         given = aids_of(spec)[name]
         entry = SLOTS["aiding"].entries[given.kind]
-        self.told(("aiding", name), partial(_aid, spec, name))
+        self.told(("aiding", name), partial(make_aid, spec, name))
         takes = issubclass(entry, TableAid)
         if not takes and given.path is not None:
             raise self.refuse(
@@ -328,74 +337,6 @@ def _fixes(spec: NavigationSpec) -> list[str]:
     return [name for name, aid in aids_of(spec).items() if aid.kind == "gnss"]
 
 
-def _aid(spec: NavigationSpec, name: str) -> Aid:
-    made: Aid = make_choice(aids_of(spec)[name], SLOTS["aiding"], {**given_of(spec), "name": name})
-    return made
-
-
 def _begun(spec: NavigationSpec, filter_: ErrorFilter) -> None:
     start = NavState.from_degrees(min(80.0, filter_.mechanization.latitude_limit_deg), 0.0)
     filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
-
-
-def given_of(spec: NavigationSpec) -> dict[str, Any]:
-    """Fields of modules that the chain fills."""
-    return {"ellipsoid": spec.ellipsoid}
-
-
-def uncertainty_of(spec: NavigationSpec) -> ImuUncertainty:
-    """What is not known of the sensors of a specification.
-
-    Raises
-    ------
-    ConfigError
-        The sensor is unknown, or says too little.
-    """
-    stated = spec.sensors
-    sensor = None if stated.sensor is None else load_sensor(stated.sensor)
-    return stated_imu(sensor, stated.gyro, stated.accel)
-
-
-def make_filter(spec: NavigationSpec, sensors: ImuUncertainty) -> ErrorFilter:
-    """Make the filter of a specification, without the states of its aids.
-
-    Parameters
-    ----------
-    spec : NavigationSpec
-    sensors : ImuUncertainty
-
-    Returns
-    -------
-    ErrorFilter
-
-    Raises
-    ------
-    ConfigError
-        A module refuses an option, or a state has no size.
-    """
-    options = make_choice(spec.filter, SLOTS["filter"], given_of(spec))
-    mechanization = make_choice(spec.mechanization, SLOTS["mechanization"], given_of(spec))
-    return ErrorFilter(
-        mechanization,
-        options.model(
-            gyro_noise=sensors.gyro.axis("noise_density"),
-            accel_noise=sensors.accel.axis("noise_density"),
-            sensors=with_processes(
-                stated_states(sensors, spec.sensors.states), processes_of(spec.states)
-            ),
-        ),
-        options.form,
-        options.rule,
-        step=options.step,
-    )
-
-
-def make_aids(spec: NavigationSpec) -> tuple[Aid, ...]:
-    """Make the aids of a specification.
-
-    Raises
-    ------
-    ConfigError
-        One refuses an option.
-    """
-    return tuple(_aid(spec, name) for name in aids_of(spec))

@@ -8,14 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError, create_model
+from pydantic import BaseModel, create_model
 
 from strapdown.config.alignment import PrefilterSpec
-from strapdown.config.case_keys import canonical
-from strapdown.config.case_paths import with_absolute_paths
-from strapdown.config.choice import ChoiceSpec, choice_form, with_kinds
-from strapdown.config.crash_checks import Written
-from strapdown.config.explain import explained
+from strapdown.config.choice import ChoiceSpec, as_table, choice_form, field_of, with_kinds
+from strapdown.config.filled_form import filled_form, read_named_toml
 from strapdown.config.motions import KINDS, MANOEUVRES
 from strapdown.config.navigation import (
     AidSpec,
@@ -28,15 +25,14 @@ from strapdown.config.navigation import (
     NavigationSpec,
     ReceiverTable,
     RecorderSpec,
+    SmootherSpec,
 )
 from strapdown.config.navigation_checks import check_navigation
-from strapdown.config.navigation_wanted import what_navigation_wants, write_of_navigation
-from strapdown.config.placeholders import refuse_placeholders
+from strapdown.config.navigation_wanted import NAVIGATION_WANTED
 from strapdown.config.slots import SLOTS
 from strapdown.config.spec import TableSpec
 from strapdown.config.state_tables import StatesTable
-from strapdown.config.together import together
-from strapdown.config.toml_file import TomlFile, place_of, read_toml
+from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
 from strapdown.exceptions import ConfigError
 
@@ -51,6 +47,7 @@ NAVIGATION_STAGES: dict[str, tuple[type[ChoiceSpec], str, bool]] = {
     "mechanization": (MechanizationSpec, "ned", False),
     "filter": (FilterSpec, "error_state", False),
     "damping": (DampingSpec, "feedback", False),
+    "smoother": (SmootherSpec, "none", True),
     "recorder": (RecorderSpec, "interval", False),
 }
 #: Of a start that is known nothing is aligned.
@@ -85,18 +82,12 @@ def navigation_form(table: Mapping[str, Any], file: TomlFile | None = None) -> t
             file=file,
             path=(name,),
         )
-        parts[name] = _field(form, {"kind": stage_default(name, table)})
+        parts[name] = field_of(form, {"kind": stage_default(name, table)})
     parts["states"] = (StatesTable, StatesTable())
-    parts["aiding"] = _field(_aiding_form(table, file), {})
+    parts["aiding"] = field_of(_aiding_form(table, file), {})
     if isinstance(table.get("simulation"), Mapping):
         parts["simulation"] = (_simulation_form(table, file), ...)
     return create_model("Navigation", __base__=NavigationSpec, **parts)
-
-
-def _field(form: type[TableSpec], usual: dict[str, Any]) -> tuple[Any, Any]:
-    """A field of a form, which may be left out where nothing in it must be written."""
-    needed = any(one.is_required() for name, one in form.model_fields.items() if name not in usual)
-    return form, ... if needed else form.model_validate(usual)
 
 
 def _aiding_form(table: Mapping[str, Any], file: TomlFile | None) -> type[TableSpec]:
@@ -199,35 +190,19 @@ def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationS
         There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
         does not fit, or the parts do not go together; the message names the line.
     """
-    path = Path(path)
-    file = read_toml(path, "a configuration has three levels")
-    if "name" in file.table:
-        remedy = "a run is named after its file; write title = …"
-        raise file.refuse(("name",), "there is no such key", remedy)
-    refuse_placeholders(file, what_navigation_wants)
+    levels = "a configuration has three levels"
+    file = read_named_toml(Path(path), "a run", levels, NAVIGATION_WANTED)
     file = replace(file, table=_with_kinds(file.table))
-    form = navigation_form(file.table, file)
-    table, written = canonical(file, form)
-    try:
-        spec = form(**{**table, "name": path.stem})
-        if files:
-            whole = spec.model_dump(serialize_as_any=True)
-            spec = form(**with_absolute_paths(file, whole, "this file"))
-    except ValidationError as error:
-        raise together([_explained(one, file, written) for one in error.errors()]) from None
-    check_navigation(spec, Written(file, written))
-    return spec
-
-
-def _explained(error: Any, file: TomlFile, written: Mapping[KeyPath, KeyPath]) -> ConfigError:
-    return explained(
-        error,
+    spec, written = filled_form(
         file,
+        navigation_form(file.table, file),
+        NAVIGATION_WANTED,
+        files=files,
         place=_place,
         tags={"kind": KINDS, "do": MANOEUVRES},
-        written=written,
-        wanted=write_of_navigation,
     )
+    check_navigation(spec, written)
+    return spec
 
 
 def _place(parts: KeyPath) -> str:
@@ -242,8 +217,7 @@ def _with_kinds(table: Mapping[str, Any]) -> dict[str, Any]:
     out = dict(table)
     for name in NAVIGATION_STAGES:
         if name in out:
-            whole = {"kind": out[name]} if isinstance(out[name], str) else out[name]
-            out[name] = with_kinds(SLOTS[name], whole, stage_default(name, table))
+            out[name] = as_table(SLOTS[name], out[name], stage_default(name, table))
     aiding = out.get("aiding")
     if isinstance(aiding, Mapping):
         out["aiding"] = {

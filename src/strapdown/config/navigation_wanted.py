@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from strapdown.config.quantities import base_of, keys_of
-from strapdown.config.toml_lines import KeyPath
+from strapdown.config.wanted import Wanted
 
-__all__ = ["what_navigation_wants", "write_of_navigation"]
+__all__ = ["NAVIGATION_WANTED"]
 
-# By table and field without its unit.
-WANTED: dict[str, str] = {
+_WORDS = {
     "log.path": "the log, from the folder of this file",
     "truth.path": "the reference trajectory, from the folder of this file",
+    "control_points.path": "a table of time, north, east, from the folder of this file",
     "simulation.motion": '[simulation.motion]: the motion, as kind = "car" and its keys',
     "start.lat": "geodetic latitude, north positive",
     "start.lon": "longitude, east positive",
@@ -28,26 +27,4 @@ WANTED: dict[str, str] = {
     "kind": "which module stands here: strapdown modules lists them",
 }
 
-
-def what_navigation_wants(path: KeyPath) -> str:
-    """Say what is wanted at a key; empty where nothing is known of it."""
-    keys = [part for part in path if isinstance(part, str)]
-    if not keys:
-        return ""
-    table = keys[-2] if len(keys) > 1 else ""
-    for name in (keys[-1], base_of(keys[-1])):
-        found = WANTED.get(f"{table}.{name}" if table else name) or WANTED.get(name)
-        if found:
-            return found
-    return ""
-
-
-def write_of_navigation(path: KeyPath) -> str:
-    """The remedy for a key that is missing: how it is written, and what it is."""
-    name = path[-1] if isinstance(path[-1], str) else ""
-    said = what_navigation_wants(path)
-    if said.startswith("["):
-        header, _, meaning = said.partition(": ")
-        return f"write {header} and its keys below it ({meaning})"
-    form = f"write {' or '.join(keys_of(name)[:1])} = …"
-    return f"{form} ({said})" if said else form
+NAVIGATION_WANTED = Wanted(_WORDS)

@@ -24,6 +24,7 @@ from strapdown.mechanization import MECHANIZATIONS, Mechanization
 from strapdown.navigation.damping import DAMPINGS, Damping
 from strapdown.navigation.filter_options import FilterOptions
 from strapdown.navigation.recorder import RECORDERS, Recorder
+from strapdown.navigation.smoother import SMOOTHERS, Smoother
 from strapdown.prefilter import PREFILTERS, Prefilter
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
@@ -66,6 +67,7 @@ SLOTS: dict[str, Slot] = {
     "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
     "aiding": Slot("aiding", "Aids", Aid, AIDS),
     "damping": Slot("damping", "Dampings", Damping, DAMPINGS),
+    "smoother": Slot("smoother", "Smoothers", Smoother, SMOOTHERS),
     "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),
 }
 

@@ -15,7 +15,8 @@ __all__ = ["Spec", "TableSpec", "refuse", "specify"]
 class Spec(BaseModel):
     """Frozen, and strict about names."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    # A command uses a few of the specifications: each is built when it is first used.
+    model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
 
 class TableSpec(Spec):

@@ -126,6 +126,10 @@ def _text(path: Path) -> str:
         ) from None
 
 
+#: Endings of tables, which are no configurations.
+RECORDS = (".csv", ".tsv", ".txt", ".dat")
+
+
 def _no_toml(path: Path, text: str, said: str) -> ConfigError:
     found = _PLACE.search(said)
     what = shown_key(said[: found.start()] if found else said)
@@ -150,6 +154,8 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
                 remedy="keep one of the two; of several tables each begins with [[…]]",
             )
     remedy = next((r for pattern, r in _SLIPS if re.search(pattern, line)), "mend it where it says")
+    if path.suffix.lower() in RECORDS:
+        remedy = "it seems to be a record: strapdown init writes a file from it, and that is given"
     return ConfigError(f"it is no TOML: {what}", file=path.name, line=number, remedy=remedy)
 
 

@@ -124,7 +124,15 @@ def test_the_manual_has_every_key():
 
 def test_options_have_the_units_of_their_fields():
     """An option of an aid that is a length, a time or a speed says so."""
-    plain = {"use_position", "use_velocity", "qualities", "detector", "threshold", "gate"}
+    plain = {
+        "use_position",
+        "use_velocity",
+        "qualities",
+        "detector",
+        "threshold_rule",
+        "threshold",
+        "gate",
+    }
     plain |= {"position_sd_factor", "velocity_sd_factor", "mounting_of", "scale_sd", "update_rule"}
     endings = (
         "_m",

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.config.navigation_checks import make_filter, uncertainty_of
 from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.config.navigation_modules import make_filter, uncertainty_of
 from strapdown.exceptions import ConfigError
 
 FILE = """[log]

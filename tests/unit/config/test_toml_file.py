@@ -40,6 +40,14 @@ def test_a_slip_is_answered_with_what_was_meant(row, tmp_path):
     assert SLIPS[row] in caught.value.finding.remedy
 
 
+def test_a_record_in_place_of_a_file_is_answered_with_init(tmp_path):
+    path = tmp_path / "left.csv"
+    path.write_text("time_s,ax\n0,1\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        read_toml(path, "a case has three levels")
+    assert "strapdown init" in caught.value.finding.remedy
+
+
 def test_a_list_that_does_not_end_is_named_at_the_end_of_the_file(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text("a = [1,\n2,\n\n")
