@@ -27,6 +27,7 @@ from strapdown.results import InputFiles
 __all__ = [
     "Seal",
     "read_manifest",
+    "resolved",
     "sha256",
     "unsealed_changes",
     "write_bundle",
@@ -301,6 +302,25 @@ def names_file(key: str, value: Any) -> bool:
     if not isinstance(value, str):
         return False
     return key.endswith("path") or (key == "sensor" and value.lower().endswith(".toml"))
+
+
+def resolved(value: Any, root: Path) -> Any:
+    """Return a configuration with the paths of copied inputs made absolute.
+
+    Parameters
+    ----------
+    value : object
+        Of a manifest.
+    root : Path
+        The bundle.
+    """
+    if isinstance(value, dict):
+        return {
+            k: str(root / v) if names_file(k, v) else resolved(v, root) for k, v in value.items()
+        }
+    if isinstance(value, list):
+        return [resolved(v, root) for v in value]
+    return value
 
 
 def _files(root: Path) -> list[str]:

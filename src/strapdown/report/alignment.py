@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle import Seal, check_destination, to_json
 from strapdown.config.alignment_file import alignment_spec, read_alignment_spec
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document
 from strapdown.report.alignment_json import alignment_json
@@ -16,6 +16,7 @@ from strapdown.report.crash_csv import write_table
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
+from strapdown.report.report_bundle import report_bundle
 from strapdown.systems.alignment_run import AlignmentResult, run_alignment
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
@@ -99,20 +100,9 @@ def write_alignment(
     """
     name = Path(out).absolute().name if name is None else name
     document = alignment_document(result, name)
-    file = next((str(i.path) for i in result.inputs if i.role == "configuration"), None)
-    configuration = {
-        "name": name,
-        "alignment": result.spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True),
-        **({} if file is None else {"file_path": file}),
-    }
     seals: list[Seal] = []
-    with write_bundle(
-        Path(out),
-        command="align",
-        configuration=configuration,
-        inputs=result.inputs,
-        force=force,
-        seals=seals,
+    with report_bundle(
+        result, out, "align", key="alignment", name=name, force=force, seals=seals
     ) as folder:
         write_text(folder / "align.json", to_json(alignment_json(result)))
         told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle import Seal, check_destination, to_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.formats.mme_writer import write_mme
@@ -19,6 +19,7 @@ from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import write_pdf
+from strapdown.report.report_bundle import report_bundle
 from strapdown.systems.crash_case import CaseResult, run_case
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
@@ -99,22 +100,19 @@ def write_crash(
         `out` exists and may not be replaced.
     """
     name = Path(out).absolute().name if name is None else name
-    case_file = next((str(i.path) for i in result.inputs if i.role == "case"), None)
     progress("drawing the report", 0.55)
     document = crash_document(result, crash_figures(result), name)
-    configuration = {
-        "name": name,
-        "case": result.spec.model_dump(mode="json", exclude_none=True),
-        **({} if case_file is None else {"case_path": case_file}),
-    }
     seals: list[Seal] = []
-    with write_bundle(
-        Path(out),
-        command="crash",
-        configuration=configuration,
-        inputs=result.inputs,
+    with report_bundle(
+        result,
+        out,
+        "crash",
+        key="case",
+        name=name,
         force=force,
         seals=seals,
+        role="case",
+        path_key="case_path",
     ) as folder:
         _write_numbers(result, folder)
         progress("drawing the figures", 0.65)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
-from strapdown.crash.pdof_interval import AngleInterval
-from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.systems.crash_case import CaseResult
+if TYPE_CHECKING:
+    # Reports of other kinds write their numbers by this, and load no crash for it.
+    from strapdown.crash.pdof_interval import AngleInterval
+    from strapdown.crash.unit_reconstruction import UnitReconstruction
+    from strapdown.systems.crash_case import CaseResult
 
 __all__ = [
     "GAP",

@@ -176,6 +176,8 @@ class Document:
     sections : tuple of Section
     footer : str
         On every page of the PDF, beside the page number.
+    links : tuple of (str, str)
+        Files beside the page, and what they are; of the page alone.
     """
 
     title: str
@@ -184,3 +186,4 @@ class Document:
     front: tuple[Block, ...]
     sections: tuple[Section, ...]
     footer: str = ""
+    links: tuple[tuple[str, str], ...] = ()

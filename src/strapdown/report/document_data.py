@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from itertools import count
-from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
@@ -24,6 +22,7 @@ from strapdown.report.document import (
     TableBlock,
 )
 from strapdown.report.document_text import plain_document
+from strapdown.report.still_chart import still
 
 __all__ = ["document_data", "draw_stills", "no_stills"]
 
@@ -43,7 +42,7 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     tuple of str
         An SVG of each, in their order.
     """
-    return tuple(_drawn(chart) for chart in _charts(plain_document(document)))
+    return tuple(still(chart) for chart in _charts(plain_document(document)))
 
 
 def no_stills(document: Document) -> tuple[str, ...]:
@@ -57,15 +56,6 @@ def _charts(document: Document) -> list[Chart]:
         *(block for section in document.sections for block in section.blocks),
     ]
     return [block.chart for block in blocks if isinstance(block, ChartBlock)]
-
-
-def _drawn(chart: Chart) -> str:
-    from strapdown.report.svg_chart import draw
-
-    with tempfile.TemporaryDirectory(prefix="strapdown-") as folder:
-        path = Path(folder) / "chart.svg"
-        draw(chart, path, paper=True)
-        return path.read_text(encoding="utf-8")
 
 
 def document_data(
@@ -103,6 +93,7 @@ def document_data(
         "subtitle": plain.subtitle,
         "footer": plain.footer,
         "facts": _pairs(plain.facts),
+        "links": _pairs(plain.links),
         "front": [writer.block(block) for block in plain.front],
         "sections": [
             {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle import Seal, check_destination, to_json
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
 from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text
@@ -14,12 +14,14 @@ from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_files import write_navigation_files
 from strapdown.report.navigation_found import examine
 from strapdown.report.navigation_json import navigation_json
-from strapdown.report.navigation_result import told_of, withheld_of
+from strapdown.report.navigation_result import told_of
+from strapdown.report.report_bundle import report_bundle
+from strapdown.report.verdict_document import light_section
+from strapdown.report.verdict_files import write_verdict
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.run import run_navigation
-from strapdown.systems.sins.withholding import withheld_aid
 
 __all__ = ["navigate", "rerun_navigation", "write_navigation"]
 
@@ -98,30 +100,17 @@ def write_navigation(
         `out` exists and may not be replaced.
     """
     name = Path(out).absolute().name if name is None else name
-    file = next((str(i.path) for i in result.inputs if i.role == "configuration"), None)
-    configuration = {
-        "name": name,
-        "navigation": result.spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True),
-        **({} if file is None else {"file_path": file}),
-    }
     seals: list[Seal] = []
-    with write_bundle(
-        Path(out),
-        command="navigate",
-        configuration=configuration,
-        inputs=result.inputs,
-        force=force,
-        seals=seals,
+    with report_bundle(
+        result, out, "navigate", key="navigation", name=name, force=force, seals=seals
     ) as folder:
         progress("writing the tables", 0.82)
-        kept = (
-            () if not result.withheld else withheld_of(withheld_aid(result.spec), result.withheld)
-        )
-        found = examine(told_of(result, kept))
+        found = examine(told_of(result))
         write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
         write_navigation_files(result, folder)
+        write_verdict(result, name, folder)
         progress("drawing the figures", 0.86)
-        document = navigation_document(found.told, name, found)
+        document = navigation_document(found.told, name, found, light_section(result))
         if result.spec.output.figures:
             stills = draw_stills(document)
             write_drawings(document, stills, folder / "figures")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,6 +51,8 @@ class Agreement:
         0 where it was rejected.
     consistency : ObservationConsistency
         What they say of the filter.
+    stated : bool
+        Whether it is stated that they last.
     """
 
     name: str
@@ -59,6 +62,7 @@ class Agreement:
     sd: Array
     weight: Array
     consistency: ObservationConsistency
+    stated: bool = False
 
     @cached_property
     def used(self) -> NDArray[np.bool_]:
@@ -150,11 +154,12 @@ class Agreement:
 
         Errors that last do as much as independent ones of `lasting` their size: where that is no
         more than was stated, as of a constraint whose deviation is stated for it, no bound is too
-        narrow.
+        narrow. Where it is stated that they last, that is held to `FAR_OFF`, as a scatter is.
         """
         size = abs(self.correlation)
         far = bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
-        return far and (self.correlation < 0.0 or self.lasting > 1.0)
+        most = FAR_OFF if self.stated else 1.0
+        return far and (self.correlation < 0.0 or self.lasting > most)
 
     @property
     def lasting(self) -> float:
@@ -176,9 +181,19 @@ class Agreement:
         return self.inside or near
 
 
-def agreements(record: NavigationRecord) -> tuple[Agreement, ...]:
-    """Return the innovations of each observation that has any."""
-    found = (_agreement(name, table) for name, table in record.innovations.items())
+def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple[Agreement, ...]:
+    """Return the innovations of each observation that has any.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+    lasting : collection of str
+        Names of the aids that state that their errors last.
+    """
+    found = (
+        _agreement(name, table, (name.rpartition(".")[0] or name) in lasting)
+        for name, table in record.innovations.items()
+    )
     return tuple(one for one in found if one.epochs)
 
 
@@ -189,7 +204,7 @@ def chi_square_far(freedom: float) -> float:
     return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
 
 
-def _agreement(name: str, table: pd.DataFrame) -> Agreement:
+def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
     labels = tuple(str(c)[3:] for c in table.columns if str(c).startswith("nu "))
 
     def part(what: str) -> Array:
@@ -204,4 +219,5 @@ def _agreement(name: str, table: pd.DataFrame) -> Agreement:
         np.sqrt(part("s")),
         part("weight"),
         consistency_of(name, table),
+        stated,
     )

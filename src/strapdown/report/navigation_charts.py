@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.chart import (
     AXIS_COLOURS,
@@ -26,7 +27,6 @@ from strapdown.report.navigation_values import (
     at_marks,
     blocks_of,
     heading_shown,
-    plane_bound,
     unwrapped,
 )
 from strapdown.tables import EULER, NED, VELOCITY
@@ -74,7 +74,10 @@ def bound_chart(told: NavigationTold) -> Chart:
         (
             "Place",
             "m",
-            (("horizontal", plane_bound(record), BLUE), _bound(record, "down", "height")),
+            (
+                ("horizontal", plane_bound(record.covariance), BLUE),
+                _bound(record, "down", "height"),
+            ),
         ),
         (
             "Velocity",
@@ -186,9 +189,9 @@ def _true(told: NavigationTold, column: str, navigated: Array) -> Line:
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 
 
-def state_charts(told: NavigationTold) -> tuple[Chart, ...]:
+def state_charts(record: NavigationRecord) -> tuple[Chart, ...]:
     """Estimates of the errors of sensors and aids, with their bounds."""
-    return tuple(_block_chart(told.record, block) for block in blocks_of(told.record))
+    return tuple(_block_chart(record, block) for block in blocks_of(record))
 
 
 def _block_chart(record: NavigationRecord, block: StateBlock) -> Chart:

@@ -21,6 +21,11 @@ from strapdown.report.navigation_error_charts import error_charts, nees_chart
 from strapdown.report.navigation_found import NavigationFound, examine
 from strapdown.report.navigation_innovation_charts import innovation_chart, nis_chart
 from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.navigation_smoothing import (
+    smoothing_chart,
+    smoothing_table,
+    smoothing_words,
+)
 from strapdown.report.navigation_told import NavigationTold
 from strapdown.report.navigation_trust import trust
 from strapdown.report.navigation_words import cautions, headline, key_figures, place_words
@@ -29,7 +34,10 @@ __all__ = ["navigation_document"]
 
 
 def navigation_document(
-    told: NavigationTold, name: str, found: NavigationFound | None = None
+    told: NavigationTold,
+    name: str,
+    found: NavigationFound | None = None,
+    light: Section | None = None,
 ) -> Document:
     """Return the report of a run of navigation.
 
@@ -40,6 +48,8 @@ def navigation_document(
         Of the folder, for the command that verifies it; no command, if empty.
     found : NavigationFound, optional
         Of `examine`, where it was worked out already.
+    light : Section, optional
+        Whether it can be trusted, of a run whose verdict is a page beside this one.
 
     Returns
     -------
@@ -58,6 +68,7 @@ def navigation_document(
     )
     sections = (
         _section("answer", "The answer", *_answer(found, verdict.reasons)),
+        *(() if light is None else (light,)),
         _section(
             "state",
             "Height, velocity, attitude",
@@ -66,6 +77,8 @@ def navigation_document(
             ChartBlock(charts.attitude_chart(told)),
         ),
         _section("truth", f"Against {told.truth_name}", *_errors(found)),
+        _section("points", "At the control points", tables.point_table(found)),
+        _section("smoothing", "Smoothed", *_smoothing(found)),
         _section("sensors", "Errors of the sensors and the aids", *_states(found)),
         _section("observations", "What was observed", *_observations(found)),
         _section("outages", "Outages", *_outages(found)),
@@ -82,6 +95,7 @@ def navigation_document(
         tuple(block for block in front if block is not None),
         tuple(s for s in sections if s.blocks),
         title,
+        links=() if light is None else (("verdict.html", "Can it be trusted? The verdict"),),
     )
 
 
@@ -118,9 +132,16 @@ def _errors(found: NavigationFound) -> tuple[Block | None, ...]:
     return (tables.error_table(found), *drawn, None if nees is None else ChartBlock(nees))
 
 
+def _smoothing(found: NavigationFound) -> tuple[Block | None, ...]:
+    said, chart = smoothing_words(found), smoothing_chart(found)
+    if said is None or chart is None:
+        return ()
+    return (Paragraph(said), smoothing_table(found), ChartBlock(chart))
+
+
 def _states(found: NavigationFound) -> tuple[Block | None, ...]:
     table: TableBlock | None = tables.state_table(found)
-    return (table, *(ChartBlock(c) for c in charts.state_charts(found.told)))
+    return (table, *(ChartBlock(c) for c in charts.state_charts(found.filtered)))
 
 
 def _observations(found: NavigationFound) -> tuple[Block | None, ...]:

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.evaluation.truth_comparison import TruthComparison, compare_with_truth
 from strapdown.exceptions import Finding
-from strapdown.report.error_envelope import PLANE_95
 from strapdown.report.navigation_told import NavigationTold
 from strapdown.tables import EULER, NED, VELOCITY
 
@@ -110,13 +110,11 @@ class NavigationErrors:
 
         The error is within it if and only if it is within the ellipse.
         """
-        largest = np.linalg.eigvalsh(self.comparison.covariance[:, :2, :2])[:, 1]
-        reach = PLANE_95 * np.sqrt(np.maximum(largest, 0.0))
+        covariance = self.comparison.covariance
         if "horizontal" not in self.comparison.nees:
-            return np.asarray(reach)
-        length = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.where(length > 0.0, PLANE_95 * size / length, reach))
+            return plane_bound(covariance)
+        distance = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
+        return plane_reach(size, distance, covariance)
 
     @cached_property
     def _weight(self) -> Array:

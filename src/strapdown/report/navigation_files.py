@@ -11,6 +11,7 @@ import pandas as pd
 from strapdown.formats import csv
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.formats.trajectory_writers import write_trajectory
+from strapdown.navigation.record import NavigationRecord
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.tables import EULER, NED, VELOCITY
 
@@ -32,17 +33,15 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
     result : NavigationResult
     folder : Path
         ``trajectory.*`` in the forms that are asked for, ``sd.csv``, ``sensor_errors.csv``,
-        ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` where the truth is known.
+        ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` where the truth is known; of a
+        run that is smoothed the first three by the filter alone, too, in ``forward``.
     """
     record = result.record
-    options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
     told = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
-    for form in result.spec.output.files:
-        path = folder / f"trajectory.{form}"
-        write_trajectory(path, record.trajectory, name=result.source.name, options=options)
-    sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
-    _write(folder / "sd.csv", sd, told)
-    _write(folder / "sensor_errors.csv", _sensors(result), told)
+    _write_states(result, record, folder, told)
+    if result.forward is not None:
+        (folder / "forward").mkdir()
+        _write_states(result, result.forward, folder / "forward", {**told, "by": "filter alone"})
     if record.innovations:
         (folder / "innovations").mkdir()
         for name, table in record.innovations.items():
@@ -58,6 +57,17 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
         },
         told,
     )
+    if result.points is not None:
+        score = result.points
+        columns = {
+            "time_s": score.time,
+            "north_m": score.points[:, 0],
+            "east_m": score.points[:, 1],
+            "north_error_m": score.error[:, 0],
+            "east_error_m": score.error[:, 1],
+        }
+        told_points = {**told, "sign": "computed less the point, turned and shifted onto the path"}
+        csv.write(folder / "control_points.csv", columns, told_points)
     if result.differences is not None:
         errors = result.differences.rename(
             columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
@@ -66,9 +76,21 @@ def write_navigation_files(result: NavigationResult, folder: Path) -> None:
         _write(folder / "errors.csv", errors, against)
 
 
-def _sensors(result: NavigationResult) -> pd.DataFrame:
+def _write_states(
+    result: NavigationResult, record: NavigationRecord, folder: Path, told: dict[str, str]
+) -> None:
+    """Write a trajectory, its standard deviations, and the errors of the sensors."""
+    options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
+    for form in result.spec.output.files:
+        path = folder / f"trajectory.{form}"
+        write_trajectory(path, record.trajectory, name=result.source.name, options=options)
+    sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
+    _write(folder / "sd.csv", sd, told)
+    _write(folder / "sensor_errors.csv", _sensors(record), told)
+
+
+def _sensors(record: NavigationRecord) -> pd.DataFrame:
     """Estimates beside their standard deviations, with units."""
-    record = result.record
     units = {n: _WORDS.get(u, u.replace("/", "_per_")) for n, u in record.units.items()}
     ends = {n: f"_{u}" if u else "" for n, u in units.items()}
     estimates = record.sensors.rename(columns={n: f"{n}{e}" for n, e in ends.items()})

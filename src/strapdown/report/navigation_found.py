@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from strapdown.evaluation.smoother_consistency import SmootherConsistency, smoother_consistency
 from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.navigation_agreement import Agreement, agreements
@@ -24,16 +25,26 @@ class NavigationFound:
         One a name of an observation.
     errors : NavigationErrors or None
         Against the truth.
+    smoother : SmootherConsistency or None
+    forward_errors : NavigationErrors or None
+        Of a run that was smoothed: the filter beside its smoother, and against the truth.
     """
 
     told: NavigationTold
     agreements: tuple[Agreement, ...]
     errors: NavigationErrors | None
+    smoother: SmootherConsistency | None = None
+    forward_errors: NavigationErrors | None = None
 
     @property
     def record(self) -> NavigationRecord:
         """Of the run."""
         return self.told.record
+
+    @property
+    def filtered(self) -> NavigationRecord:
+        """Of the filter alone, by which it is seen how sensors and aids came to be known."""
+        return self.told.forward or self.told.record
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -57,4 +68,9 @@ def examine(told: NavigationTold) -> NavigationFound:
     DataError
         The truth has no instant in common with the run.
     """
-    return NavigationFound(told, agreements(told.record), navigation_errors(told))
+    smoother = before = None
+    if told.forward is not None:
+        smoother = smoother_consistency(told.forward, told.record, told.ellipsoid)
+        before = navigation_errors(replace(told, record=told.forward))
+    agreed = agreements(told.record, told.lasting)
+    return NavigationFound(told, agreed, navigation_errors(told), smoother, before)

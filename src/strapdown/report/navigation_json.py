@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.navigation_agreement import Agreement
@@ -18,7 +19,7 @@ from strapdown.report.navigation_errors import Score
 from strapdown.report.navigation_found import NavigationFound, examine
 from strapdown.report.navigation_result import told_of
 from strapdown.report.navigation_trust import trust
-from strapdown.report.navigation_values import distance_over_ground, plane_bound, worst_within
+from strapdown.report.navigation_values import distance_over_ground, worst_within
 from strapdown.report.navigation_words import cautions, headline
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
@@ -32,6 +33,7 @@ MODULES = (
     "mechanization",
     "filter",
     "damping",
+    "smoother",
     "recorder",
     "aiding",
 )
@@ -97,6 +99,7 @@ def navigation_json(
             }
             for name in record.sensors.columns
         },
+        "smoothing": _smoothing(found),
         "observations": {one.name: _innovations(one) for one in found.agreements},
         "outages": _outages(record),
         "withheld": [
@@ -107,14 +110,33 @@ def navigation_json(
                 "largest_horizontal_error_m": _number(w.error_m),
                 "bound_95_m": _number(w.bound_m),
                 "inside": w.inside,
+                "largest_horizontal_error_forward_m": (
+                    None if w.forward_m is None else _number(w.forward_m)
+                ),
             }
             for w in found.told.withheld
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [{"time_s": e.time, "kind": e.kind, "what": e.what} for e in record.events],
         "against": _against(found),
+        "control_points": _points(found),
         "method": _method(result),
         "findings": [_finding(f) for f in result.findings],
+    }
+
+
+def _smoothing(found: NavigationFound) -> dict[str, Any] | None:
+    """How filter and smoother agree; None of a run that was not smoothed."""
+    one = found.smoother
+    if one is None:
+        return None
+    return {
+        name: {
+            "instants": int(one.instants[k]),
+            "share_within_3_sd": _number(one.share[k]),
+            "rms_in_sd": _number(one.rms[k]),
+        }
+        for k, name in enumerate(one.columns)
     }
 
 
@@ -144,6 +166,23 @@ def _against(found: NavigationFound) -> dict[str, Any] | None:
         "mean_nees": _number(errors.nees.mean()) if errors.freedom else None,
         "nees_of": errors.freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
+    }
+
+
+def _points(found: NavigationFound) -> dict[str, Any] | None:
+    """The path at its control points, after the origin and heading that fit best."""
+    score = found.told.points
+    if score is None:
+        return None
+    return {
+        "points": len(score.time),
+        "points_given": score.given,
+        "way_m": score.way,
+        "rms_m": score.rms,
+        "median_m": score.median,
+        "largest_m": score.largest,
+        "largest_at_s": score.largest_at,
+        "turn_deg": score.turn_deg,
     }
 
 
@@ -188,7 +227,7 @@ def _state(found: NavigationFound, row: int) -> dict[str, Any]:
         **{f"{n}_{units[n]}": _number(at[n]) for n in names},
         "sd_at_s": float(record.sd.index[row]),
         **{f"{n}_sd_{units[n]}": _number(how[n]) for n in [*NED, *VELOCITY, *EULER]},
-        "horizontal_bound_95_m": _number(plane_bound(record)[row]),
+        "horizontal_bound_95_m": _number(plane_bound(record.covariance)[row]),
     }
 
 

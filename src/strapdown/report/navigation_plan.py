@@ -3,57 +3,39 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats.trajectory_thinning import thin
 from strapdown.frames import ned_from_geodetic
-from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.record import NavigationRecord
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Chart, Line, Panel
 from strapdown.report.crash_values import GAP, plain
-from strapdown.report.error_envelope import ellipse
-from strapdown.report.label_places import place_labels
+from strapdown.report.navigation_plan_bounds import bound_labels, centres, ellipse_rows, ellipses
+from strapdown.report.navigation_plane import Plane, within_span
 from strapdown.report.navigation_strip import mode_colour
 from strapdown.report.navigation_told import NavigationTold
-from strapdown.report.navigation_values import duration_words, length_words, plane_bound
 from strapdown.report.path_marks import View, path_marks
 from strapdown.report.plan_view import nice_step
 from strapdown.tables import places_of
 
-__all__ = ["ellipse_rows", "plan_chart"]
+__all__ = ["plan_chart"]
 
 Array = NDArray[np.float64]
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # From here on a plan is in kilometres.
 _FAR = 20e3
-# Ellipses: so many at ends of outages, and along the way; the largest as a share of the view.
-_AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.05
 # Bar of the scale and arrow to the north, as shares of the view, and what they keep off.
 _BAR, _ARROW, _CORNER = 0.12, 0.05, 0.22
 # Height of the plan over its width, at most.
 _TALL = 0.9
-# A letter and a line of text, as shares of the width and of the height.
-_LETTER, _TEXT = 0.0082, 0.04
 # What moves less has no path, m.
 NO_PATH = 0.05
-
-
-@dataclass(frozen=True)
-class _Plane:
-    """East and north in the unit of the plan about the start."""
-
-    origin: Array
-    told: NavigationTold
-    unit: str
-    scale: float
-
-    def of(self, table: pd.DataFrame) -> tuple[Array, Array]:
-        ned = ned_from_geodetic(places_of(table), self.origin, ellipsoid=self.told.ellipsoid)
-        return self.scale * ned[:, 1], self.scale * ned[:, 0]
 
 
 def plan_chart(told: NavigationTold) -> Chart | None:
@@ -77,17 +59,17 @@ def plan_chart(told: NavigationTold) -> Chart | None:
     reach = float(np.ptp(ned[:, :2], axis=0).max())
     if reach < NO_PATH:
         return None
-    plane = _Plane(origin, told, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
+    plane = Plane(origin, told, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = kept.index.to_numpy(dtype=np.float64)
     view = _with_margin(View.of([path, *_around(plane)], most=_TALL))
     fixes, beyond = _fixes(plane, view)
-    lines = [*fixes, *_truth(plane), *_path(record, time, path)]
-    round_, said, obstacles = _ellipses(plane, view)
+    lines = [*fixes, *_truth(plane), *_path(record, time, path), *_points(plane)]
+    round_, said, obstacles = ellipses(plane, view)
     lines += round_
     marks = path_marks(time, [path], view, BLACK)
     lines += marks
-    lines += _labels(plane, view, path, marks, obstacles)
+    lines += bound_labels(plane, view, path, marks, obstacles)
     lines += _scale(view, path, plane.unit)
     at = f"{plain(origin[0], 6)}°, {plain(origin[1], 6)}°"
     words = [
@@ -134,14 +116,14 @@ def _with_margin(view: View) -> View:
     return View(view.low - room, view.high + room)
 
 
-def _around(plane: _Plane) -> list[tuple[Array, Array]]:
+def _around(plane: Plane) -> list[tuple[Array, Array]]:
     """Corners about the ellipses, which may be larger than the path is long."""
     along, ends = ellipse_rows(plane.told.record)
     rows = [*along, *(k for k, _ in ends)]
     if not rows:
         return []
-    bounds = plane_bound(plane.told.record)[rows] * plane.scale
-    east, north = _centres(plane, rows).T
+    bounds = plane_bound(plane.told.record.covariance)[rows] * plane.scale
+    east, north = centres(plane, rows).T
     return [(east + side * bounds, north + side * bounds) for side in (-1.0, 1.0)]
 
 
@@ -151,9 +133,9 @@ def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> l
     names = tuple(dict.fromkeys(m.name for m in record.modes))
     what = np.full(middle.size, "path", dtype=object)
     for mode in record.modes:
-        what[_in(middle, mode)] = mode.name
+        what[within_span(middle, mode)] = mode.name
     missing: dict[str, NDArray[np.bool_]] = {
-        aid: np.any([_in(middle, s) for s in spans], axis=0)
+        aid: np.any([within_span(middle, s) for s in spans], axis=0)
         for aid, spans in record.outages.items()
         if spans
     }
@@ -172,10 +154,6 @@ def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> l
     return sorted(out, key=lambda line: line.name in lost)
 
 
-def _in(time: Array, span: Span) -> NDArray[np.bool_]:
-    return np.asarray((time >= span.begin) & (time <= span.end))
-
-
 def _pieces(of: NDArray[np.bool_], path: tuple[Array, Array]) -> tuple[Array, Array]:
     """Stretches of a path over some of its steps, with NaN between them."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], of.astype(np.int8), [0]])))
@@ -187,7 +165,7 @@ def _pieces(of: NDArray[np.bool_], path: tuple[Array, Array]) -> tuple[Array, Ar
     return np.concatenate(x)[:-1], np.concatenate(y)[:-1]
 
 
-def _fixes(plane: _Plane, view: View) -> tuple[list[Line], str]:
+def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
     """What was measured, as faint points; words on what lies outside of the view."""
     out: list[Line] = []
     beyond = 0
@@ -239,7 +217,7 @@ def _rejected(record: NavigationRecord, aid: str) -> Array:
     return table.index.to_numpy(dtype=np.float64)[(weights <= 0.0).any(axis=1)]
 
 
-def _truth(plane: _Plane) -> list[Line]:
+def _truth(plane: Plane) -> list[Line]:
     truth = plane.told.truth
     if truth is None:
         return []
@@ -251,136 +229,21 @@ def _truth(plane: _Plane) -> list[Line]:
     return [Line("truth", *plane.of(within.iloc[rows]), BLACK, "dot", 1.2)]
 
 
-def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, Span]]]:
-    """Marks at which ellipses are drawn: along the way, and at the ends of outages.
-
-    Parameters
-    ----------
-    record : NavigationRecord
-
-    Returns
-    -------
-    along : list of int
-        Even over the way, the end among them; none in an outage.
-    at_outages : list of (int, Span)
-        The last mark before each ends; of many those that are known least.
-    """
-    time = record.sd.index.to_numpy(dtype=np.float64)
-    bounds = plane_bound(record)
-    ends: list[tuple[int, Span]] = []
-    for span in sorted({s for v in record.outages.values() for s in v}, key=lambda s: s.begin):
-        inside = np.flatnonzero((time >= span.begin) & (time < span.end - 1e-6))
-        if inside.size:
-            ends.append((int(inside[-1]), span))
-    ends = sorted(sorted(ends, key=lambda e: -bounds[e[0]])[:_AT_OUTAGES])
-    spans = [s for v in record.outages.values() for s in v]
-    free = ~np.any([_in(time, s) for s in spans], axis=0) if spans else np.ones(time.size, bool)
-    rows = np.flatnonzero(free)
-    if not rows.size:
-        return [], ends
-    table = record.trajectory
-    speed = np.hypot(table["VN"].to_numpy(), table["VE"].to_numpy())
-    at = table.index.to_numpy(dtype=np.float64)
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(at))])
-    gone = np.interp(time[rows], at, way)
-    picked = np.searchsorted(gone, np.linspace(0.0, gone[-1], _ALONG + 1)[1:])
-    picked = np.clip(picked, 0, rows.size - 1)
-    return [int(k) for k in np.unique(rows[picked])], ends
-
-
-def _ellipses(plane: _Plane, view: View) -> tuple[list[Line], str, list[tuple[int, Span]]]:
-    """Ellipses, magnified alike so that the largest can be seen; and what to say of them."""
-    record = plane.told.record
-    along, ends = ellipse_rows(record)
-    rows = [*along, *(k for k, _ in ends)]
-    bounds = plane_bound(record)[rows] * plane.scale
-    if not rows or not bounds.max() > 0.0:
-        return [], "", []
-    factor = max(1.0, _round_down(_LARGEST * view.width / float(bounds.max())))
-    centres = _centres(plane, rows)
-    out = []
-    count = len(along)
-    times = f"{factor:,.0f}".replace(",", GAP)
-    named = "" if factor == 1.0 else f" × {times}"
-    drawn = "" if factor == 1.0 else f", drawn {times} times as large"
-    for name, colour, part in (
-        (f"95{GAP}% ellipse{named}", BLUE, slice(0, count)),
-        (f"95{GAP}% ellipse{named} at the end of an outage", VERMILLION, slice(count, None)),
-    ):
-        if not rows[part]:
-            continue
-        rings = []
-        for k, centre in zip(rows[part], centres[part], strict=True):
-            ring = ellipse(
-                centre[::-1], (factor * plane.scale) ** 2 * record.covariance[k, :2, :2], 48
-            )
-            rings.append(np.vstack([ring, ring[:1], [[np.nan, np.nan]]]))
-        ned = np.vstack(rings)[:-1]
-        out.append(Line(name, ned[:, 1], ned[:, 0], colour, width=1.4, inside=0.16))
-    said = f"The place is within an ellipse in 95 of 100 cases{drawn}."
-    return out, said if factor == 1.0 else f"{said[:-1]} than they are.", ends
-
-
-def _centres(plane: _Plane, rows: list[int]) -> Array:
-    """East and north of marks, (k, 2)."""
-    record = plane.told.record
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
-    at = np.searchsorted(time, record.sd.index.to_numpy(dtype=np.float64)[rows] - 1e-9)
-    near = record.trajectory.iloc[np.clip(at, 0, len(time) - 1)]
-    return np.column_stack(plane.of(near))
-
-
-def _round_down(value: float) -> float:
-    """The greatest of 1, 2, 5 times a power of ten that is not above a number."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return next(f * power for f in (5.0, 2.0, 1.0) if f * power <= value * (1.0 + 1e-9))
-
-
-def _labels(
-    plane: _Plane,
-    view: View,
-    path: tuple[Array, Array],
-    marks: list[Line],
-    ends: list[tuple[int, Span]],
-) -> list[Line]:
-    """What the bound had grown to where an outage ended."""
-    if not ends:
+def _points(plane: Plane) -> list[Line]:
+    """Control points, turned and shifted onto the path, and how far it is from each."""
+    score = plane.told.points
+    if score is None:
         return []
-    record = plane.told.record
-    bounds = plane_bound(record)
-    points = _centres(plane, [k for k, _ in ends])
-    words = tuple(
-        f"{length_words(float(bounds[k]))} after {duration_words(s.end - s.begin)}" for k, s in ends
-    )
-    taken = [_text(m, view) for m in marks if m.labels]
-    obstacles = np.vstack([view.corners, np.column_stack(path)[:: max(1, path[0].size // 150)]])
-    places = place_labels(points[:, 0], points[:, 1], words, np.vstack([obstacles, *taken]))
+    placed, there = plane.scale * score.points, plane.scale * (score.points + score.error)
+    drawn: dict[str, Any] = {"points": True, "symbol": "circle", "size": 5.0, "hollow": True}
+    gap = np.full(len(placed), np.nan)
+    x = np.column_stack([placed[:, 1], there[:, 1], gap]).reshape(-1)[:-1]
+    y = np.column_stack([placed[:, 0], there[:, 0], gap]).reshape(-1)[:-1]
+    east, north = placed[:, 1], placed[:, 0]
     return [
-        Line(
-            "bound",
-            points[:, 0],
-            points[:, 1],
-            VERMILLION,
-            points=True,
-            symbol="circle",
-            size=3.0,
-            labels=words,
-            places=places,
-            legend=False,
-        )
+        Line("error at a control point", x, y, VERMILLION, width=1.2),
+        Line("control points", east, north, BLACK, **drawn),
     ]
-
-
-def _text(mark: Line, view: View) -> Array:
-    """Points on the labels of marks, about where they stand, (n, 2)."""
-    letter, line = _LETTER * view.width, _TEXT * float(view.high[1] - view.low[1])
-    found = [np.column_stack([mark.x, mark.y])]
-    for x, y, label, (side, rise) in zip(mark.x, mark.y, mark.labels, mark.places, strict=True):
-        length = letter * len(label)
-        left = x + side * 1.5 * letter - 0.5 * (1 - side) * length
-        along = np.linspace(left, left + length, 5)
-        found.append(np.column_stack([along, np.full(5, y + rise * line)]))
-    return np.vstack(found)
 
 
 def _scale(view: View, path: tuple[Array, Array], unit: str) -> list[Line]:

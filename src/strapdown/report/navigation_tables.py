@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.alignment_values import instant
 from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import TableBlock
@@ -13,7 +14,6 @@ from strapdown.report.navigation_values import (
     duration_words,
     half,
     length_words,
-    plane_bound,
     share_words,
 )
 from strapdown.report.navigation_words import longest_outages, place_words
@@ -39,7 +39,7 @@ def end_table(found: NavigationFound) -> TableBlock:
         ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
         ("place", place_words(found, 0), place_words(found, -1)),
     ]
-    plane = plane_bound(record)
+    plane = plane_bound(record.covariance)
     rows.append(("horizontal ±", *(length_words(float(plane[k])) for k in (0, -1))))
     for name, column, sd, unit in (
         ("height", "alt", "down", "m"),
@@ -62,7 +62,7 @@ def end_table(found: NavigationFound) -> TableBlock:
 
 def state_table(found: NavigationFound) -> TableBlock | None:
     """Errors of sensors and aids: what was known before, and what is known now."""
-    record = found.record
+    record = found.filtered
     if record.sensors.empty or not len(record.sensors.columns):
         return None
     rows = []
@@ -162,18 +162,46 @@ def withheld_table(found: NavigationFound) -> TableBlock | None:
             length_words(w.error_m),
             length_words(w.bound_m),
             "yes" if w.inside else "no",
+            *(() if w.forward_m is None else (length_words(w.forward_m),)),
         )
         for w in found.told.withheld
     ]
     if not rows:
         return None
+    smoothed = found.told.forward is not None
     return TableBlock(
-        ("withheld", "from", "for", "largest error", "bound then", "inside"),
+        (
+            *("withheld", "from", "for", "largest error", "bound then", "inside"),
+            *(("filter alone",) if smoothed else ()),
+        ),
         tuple(rows),
         text=(0, 5),
         caption="Aids withheld on purpose: the largest horizontal error, and the run's own bound "
-        "of 95 % at that instant.",
+        "of 95 % at that instant" + ("; smoothed, and of the filter alone." if smoothed else "."),
         strong=tuple(k for k, w in enumerate(found.told.withheld) if not w.inside),
+    )
+
+
+def point_table(found: NavigationFound) -> TableBlock | None:
+    """The path at its control points."""
+    score = found.told.points
+    if score is None:
+        return None
+    row = (
+        f"{len(score.time)} of {score.given}",
+        length_words(score.way),
+        length_words(score.rms),
+        length_words(score.median),
+        length_words(score.largest),
+        instant(score.largest_at),
+        f"{plain(100.0 * score.rms / score.way, 2)} %",
+    )
+    return TableBlock(
+        ("control points", "way", "rms", "median", "largest", "at", "rms of the way"),
+        (row,),
+        caption="Horizontal distance from the control points, after the one origin and heading "
+        "that fit best (no scale): the run's heading less theirs is "
+        f"{plain(score.turn_deg, 2)} deg.",
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import pandas as pd
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.evaluation.control_points import ControlPointScore
 from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 
@@ -26,6 +27,8 @@ class Withheld:
         The largest horizontal distance from what was withheld.
     bound_m : float
         The run's own bound of 95 % at that instant: the longer half axis of its ellipse.
+    forward_m : float, optional
+        Of a run that is smoothed, what the largest distance was before.
     """
 
     aid: str
@@ -33,6 +36,7 @@ class Withheld:
     end: float
     error_m: float
     bound_m: float
+    forward_m: float | None = None
 
     @property
     def inside(self) -> bool:
@@ -47,6 +51,8 @@ class NavigationTold:
     Attributes
     ----------
     record : NavigationRecord
+    forward : NavigationRecord, optional
+        Of a run that is smoothed, what the filter alone said.
     name, what : str
         Of the log: its file, and what it is (``recorded log``).
     title : str
@@ -59,12 +65,17 @@ class NavigationTold:
         Trajectory table on the clock of the run.
     truth_name : str
         In words, as they stand after "error against".
+    points : ControlPointScore, optional
+        The path at its control points.
     withheld : tuple of Withheld
     findings : tuple of Finding
     ellipsoid : Ellipsoid
+    lasting : tuple of str
+        Names of the aids that state that their errors last.
     """
 
     record: NavigationRecord
+    forward: NavigationRecord | None = None
     name: str = "log"
     what: str = ""
     title: str = ""
@@ -72,6 +83,8 @@ class NavigationTold:
     fixes: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     truth: pd.DataFrame | None = None
     truth_name: str = "the truth"
+    points: ControlPointScore | None = None
     withheld: tuple[Withheld, ...] = ()
     findings: tuple[Finding, ...] = ()
     ellipsoid: Ellipsoid = WGS84
+    lasting: tuple[str, ...] = ()

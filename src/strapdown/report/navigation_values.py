@@ -10,10 +10,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import break_jumps
 from strapdown.report.crash_values import GAP, plain
-from strapdown.report.error_envelope import PLANE_95
 
 __all__ = [
     "StateBlock",
@@ -24,8 +24,8 @@ __all__ = [
     "half",
     "heading_shown",
     "length_words",
-    "plane_bound",
     "share_words",
+    "shown_unit",
     "unwrapped",
     "worst_within",
 ]
@@ -74,7 +74,7 @@ def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
         # What was unknown at first, and what is known now, are both to be read.
         sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
         size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
-        factor, unit = _shown(record.units.get(columns[0], ""), size)
+        factor, unit = shown_unit(record.units.get(columns[0], ""), size)
         aid, dot, own = name.rpartition(".")
         words = own.replace("_", " ")
         out.append(
@@ -90,7 +90,7 @@ def blocks_of(record: NavigationRecord) -> tuple[StateBlock, ...]:
     return tuple(out)
 
 
-def _shown(unit: str, size: float) -> tuple[float, str]:
+def shown_unit(unit: str, size: float) -> tuple[float, str]:
     """Factor and unit in which states of such a size are told."""
     if unit == "rad/s":
         slow = size * DEG_PER_HOUR < 1000.0
@@ -100,8 +100,8 @@ def _shown(unit: str, size: float) -> tuple[float, str]:
         return (MICRO_G, "µg") if micro else (_MG, "mg")
     if unit == "1":
         return (1e6, "ppm") if size < 1e-2 else (100.0, "%")
-    if unit == "rad":
-        return math.degrees(1.0), "deg"
+    if unit in ("rad", "rad/g"):
+        return math.degrees(1.0), unit.replace("rad", "deg")
     if unit == "(rad/s)/(m/s²)":
         return DEG_PER_HOUR * STANDARD_GRAVITY, "deg/h/g"
     return 1.0, unit
@@ -140,19 +140,13 @@ def at_marks(record: NavigationRecord, column: str) -> Array:
     return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
 
 
-def plane_bound(record: NavigationRecord) -> Array:
-    """Longer half axis, m, of the horizontal ellipse of 95 % at each mark."""
-    largest = np.linalg.eigvalsh(record.covariance[:, :2, :2])[:, 1]
-    return np.asarray(PLANE_95 * np.sqrt(np.maximum(largest, 0.0)))
-
-
 def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
     """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
     time = record.sd.index.to_numpy(dtype=np.float64)
     rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
     if not rows.size:
         return None
-    bounds = plane_bound(record)[rows]
+    bounds = plane_bound(record.covariance)[rows]
     k = int(np.argmax(bounds))
     return float(bounds[k]), float(time[rows[k]])
 

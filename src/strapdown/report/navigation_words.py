@@ -6,20 +6,22 @@ import math
 
 import numpy as np
 
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import Span
 from strapdown.report.alignment_values import instant
 from strapdown.report.crash_values import GAP, about, plain
 from strapdown.report.document import KeyFigure
 from strapdown.report.navigation_found import NavigationFound
+from strapdown.report.navigation_smoothing import agreement_words
 from strapdown.report.navigation_values import (
     blocks_of,
     distance_over_ground,
     duration_words,
     half,
     length_words,
-    plane_bound,
     worst_within,
 )
+from strapdown.rotation import within_half_turn
 
 __all__ = ["cautions", "headline", "key_figures", "longest_outages", "place_words"]
 
@@ -35,7 +37,7 @@ def headline(found: NavigationFound) -> str:
     return (
         f"Ended at {place_words(found)} after {duration_words(_duration(found))} and "
         f"{length_words(distance_over_ground(record.trajectory))}; the place is known to "
-        f"{length_words(float(plane_bound(record)[-1]))}, the heading {_heading(found)} "
+        f"{length_words(float(plane_bound(record.covariance)[-1]))}, the heading {_heading(found)} "
         "(bounds of 95 %)."
     )
 
@@ -43,7 +45,7 @@ def headline(found: NavigationFound) -> str:
 def place_words(found: NavigationFound, row: int = -1) -> str:
     """Latitude, longitude and height of a row: ``40.096627°, −105.147448°, 1601.5 m``."""
     last = found.record.trajectory.iloc[row]
-    lon = (float(last["lon"]) + 180.0) % 360.0 - 180.0
+    lon = float(within_half_turn(last["lon"]))
     return (
         f"{plain(float(last['lat']), 6)}°, {plain(lon, 6)}°, {plain(float(last['alt']), 1)}{GAP}m"
     )
@@ -54,7 +56,7 @@ def key_figures(found: NavigationFound) -> tuple[KeyFigure, ...]:
     record = found.record
     sd = record.sd.iloc[-1]
     last = record.trajectory.iloc[-1]
-    plane = float(plane_bound(record)[-1])
+    plane = float(plane_bound(record.covariance)[-1])
     heading = half(sd["heading"])
     out = [
         KeyFigure(
@@ -104,7 +106,7 @@ def _known(found: NavigationFound) -> KeyFigure:
             f"horizontal, 95{GAP}%, after {duration_words(span.end - span.begin)} without {aid}",
             f"{len(outages)} {'outage' if len(outages) == 1 else 'outages'} in all",
         )
-    bounds = plane_bound(found.record)
+    bounds = plane_bound(found.record.covariance)
     worst = int(np.argmax(bounds))
     return KeyFigure(
         "Largest bound",
@@ -134,6 +136,7 @@ def cautions(found: NavigationFound) -> tuple[tuple[str, str], ...]:
         *_memory(found),
         *_refused(found),
         *_not_told(found),
+        *agreement_words(found),
     )
 
 
@@ -211,11 +214,11 @@ def _refused(found: NavigationFound) -> list[tuple[str, str]]:
 
 def _not_told(found: NavigationFound) -> list[tuple[str, str]]:
     """States whose bounds hardly fell."""
-    sd = found.record.sensors_sd
+    sd = found.filtered.sensors_sd
     if len(sd) < 2:
         return []
     names = []
-    for block in blocks_of(found.record):
+    for block in blocks_of(found.filtered):
         first = sd[list(block.columns)].iloc[0].to_numpy()
         last = sd[list(block.columns)].iloc[-1].to_numpy()
         some = [

@@ -11,6 +11,7 @@ _CUT = "… ({} characters)"
 _MOST_COMBINING = 3
 # Control, format (direction, zero width), lone surrogates, private use: none has its own shape.
 _SHAPELESS = frozenset({"Cc", "Cf", "Cs", "Co"})
+_COMBINING = frozenset({"Mn", "Me"})
 
 
 def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
@@ -40,13 +41,14 @@ def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
 
 
 def _marked(text: str, end_of_line: str) -> str:
-    if text.isascii() and text.isprintable():
+    # What is printable has a shape; only a heap of combining marks can be wrong with it.
+    if text.isprintable() and (text.isascii() or not _COMBINING & _kinds(text)):
         return text
     out: list[str] = []
     combining = 0
     for char in text:
         kind = unicodedata.category(char)
-        combining = combining + 1 if kind in ("Mn", "Me") else 0
+        combining = combining + 1 if kind in _COMBINING else 0
         if char in "\n\r\u2028\u2029":
             out.append(end_of_line)
         elif char == "\t":
@@ -56,6 +58,10 @@ def _marked(text: str, end_of_line: str) -> str:
         else:
             out.append(char)
     return "".join(out)
+
+
+def _kinds(text: str) -> set[str]:
+    return set(map(unicodedata.category, set(text)))
 
 
 def _is_no_character(char: str) -> bool:

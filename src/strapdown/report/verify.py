@@ -19,8 +19,8 @@ from strapdown.bundle import (
     MANIFEST,
     Seal,
     machine,
-    names_file,
     read_manifest,
+    resolved,
     sha256,
     unsealed_changes,
     versions,
@@ -37,6 +37,7 @@ from strapdown.formats import read_raw
 from strapdown.report.alignment import rerun_alignment
 from strapdown.report.attitude import write_attitude
 from strapdown.report.changed_case import changed_case
+from strapdown.report.coast import rerun_coast
 from strapdown.report.crash_case import rerun_crash
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.navigation import rerun_navigation
@@ -107,9 +108,14 @@ def _rerun_navigation(configuration: dict[str, Any], out: Path, sealed: set[str]
     return rerun_navigation(configuration, out)
 
 
+def _rerun_coast(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
+    return rerun_coast(configuration, out)
+
+
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "align": _rerun_alignment,
     "attitude": _rerun_attitude,
+    "coast": _rerun_coast,
     "crash": _rerun_crash,
     "navigate": _rerun_navigation,
     "reproduce": _rerun_reproduction,
@@ -153,7 +159,7 @@ def verify(bundle: str | Path) -> Verification:
         )
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
         again = Path(folder) / "again"
-        configuration = _resolved(manifest["configuration"], root)
+        configuration = resolved(manifest["configuration"], root)
         try:
             sealed = {item["name"] for item in manifest["outputs"]}
             RERUNS[manifest["command"]](configuration, again, sealed)
@@ -164,17 +170,6 @@ def verify(bundle: str | Path) -> Verification:
                 remedy="use the version of strapdown that wrote it",
             ) from None
         return _compare(root, again, manifest, digest)
-
-
-def _resolved(value: Any, root: Path) -> Any:
-    """Configuration with the paths of copied inputs made absolute."""
-    if isinstance(value, dict):
-        return {
-            k: str(root / v) if names_file(k, v) else _resolved(v, root) for k, v in value.items()
-        }
-    if isinstance(value, list):
-        return [_resolved(v, root) for v in value]
-    return value
 
 
 def _compare(root: Path, again: Path, manifest: dict[str, Any], digest: str) -> Verification:

@@ -13,7 +13,7 @@ import pytest
 
 from strapdown.exceptions import DataError
 from strapdown.report.chart import Chart
-from strapdown.report.document import Animation, Document, Picture
+from strapdown.report.document import Animation, Document, KeyFigure, KeyFigures, Picture
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_html import document_page
 from strapdown.report.document_text import plain_document
@@ -156,3 +156,11 @@ def test_what_is_no_svg_is_named():
     broken = Picture("plan", "<svg><g></svg>", "The plan")
     with pytest.raises(DataError, match="'plan' is no SVG: mismatched tag"):
         document_page(Document("t", "", (), (broken,), ()))
+
+
+def test_a_key_figure_breaks_before_its_bound_alone():
+    keys = KeyFigures((KeyFigure("Heading", "180.8143\u00a0±\u00a00.0044°", "95 % bound"),))
+    page = document_page(Document("t", "", (), (keys,), ()))
+    assert '<dd class="value"><span>180.8143</span> <span>±&nbsp;0.0044°</span></dd>' in page
+    (style,) = re.findall(r"\.keys \.value \{[^}]*\}", page)[:1]
+    assert "nowrap" not in style

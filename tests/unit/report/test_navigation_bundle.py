@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
+from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document_data import draw_stills
 from strapdown.report.document_files import drawings, write_drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_found import examine
 from strapdown.report.navigation_json import navigation_json
 from strapdown.report.navigation_result import told_of, withheld_of
-from strapdown.report.navigation_values import plane_bound
 from strapdown.systems.sins.run import run_navigation
 
 FILE = """
@@ -78,13 +78,13 @@ def test_the_json_is_the_record(result, found):
     record = result.record
     assert told["end"]["lat_deg"] == float(record.trajectory["lat"].iloc[-1])
     assert told["end"]["heading_sd_deg"] == float(record.sd["heading"].iloc[-1])
-    assert told["end"]["horizontal_bound_95_m"] == float(plane_bound(record)[-1])
+    assert told["end"]["horizontal_bound_95_m"] == float(plane_bound(record.covariance)[-1])
     (outage,) = told["outages"]
     assert outage["aid"] == "rtk"
     assert 11.0 <= outage["from_s"] <= 12.0
     assert 20.0 <= outage["to_s"] <= 21.0
     inside = (record.sd.index >= outage["from_s"]) & (record.sd.index <= outage["to_s"])
-    assert outage["largest_horizontal_bound_95_m"] == plane_bound(record)[inside].max()
+    assert outage["largest_horizontal_bound_95_m"] == plane_bound(record.covariance)[inside].max()
     place = told["observations"]["rtk.position"]
     assert place["epochs"] == len(record.innovations["rtk.position"])
     low, high = place["mean_nis_expected_95"]
@@ -139,6 +139,7 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
 def test_scores_of_what_was_withheld_are_told_as_they_are():
     from strapdown.evaluation.withheld import WithheldScore
     from strapdown.navigation.record import Span
+    from strapdown.systems.sins.withholding import Withheld
 
     score = WithheldScore(
         Span("withheld", 10.0, 20.0),
@@ -147,7 +148,7 @@ def test_scores_of_what_was_withheld_are_told_as_they_are():
         np.ones((2, 3)),
         np.array([np.diag([1.0, 9.0])] * 2),
     )
-    (one,) = withheld_of("rtk", [score])
+    (one,) = withheld_of("rtk", [Withheld(score, None)])
     assert (one.aid, one.begin, one.end, one.error_m) == ("rtk", 10.0, 20.0, 4.0)
     # East the ellipse of 95 % reaches 2.4477 times 3 m.
     assert one.bound_m == pytest.approx(3.0 * math.sqrt(-2.0 * math.log(0.05)))

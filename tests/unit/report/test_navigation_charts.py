@@ -16,18 +16,19 @@ from tests.unit.report.navigation_records import (
     without_aids,
 )
 
+from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import Span
 from strapdown.report import navigation_charts as charts
-from strapdown.report.error_envelope import PLANE_95
 from strapdown.report.navigation_agreement import agreements
 from strapdown.report.navigation_error_charts import error_charts, nees_chart
 from strapdown.report.navigation_errors import navigation_errors
 from strapdown.report.navigation_innovation_charts import innovation_chart, nis_chart
-from strapdown.report.navigation_plan import ellipse_rows, plan_chart
+from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.navigation_plan_bounds import ellipse_rows
 from strapdown.report.navigation_strip import strip
 from strapdown.report.navigation_thinning import broken, kept_rows, thin_fill
-from strapdown.report.navigation_values import heading_shown, plane_bound, unwrapped
+from strapdown.report.navigation_values import heading_shown, unwrapped
 from strapdown.report.plotly_chart import figure
 
 
@@ -84,7 +85,7 @@ def test_the_ellipses_have_the_axes_of_the_covariance():
     assert size.min() == pytest.approx(PLANE_95 * AXES[1], rel=1.8e-2)
     north, east = off[np.argmax(size)]
     assert np.degrees(np.arctan2(east, north)) % 180.0 == pytest.approx(np.degrees(TURN), abs=3.8)
-    assert plane_bound(made)[0] == pytest.approx(PLANE_95 * AXES[0], rel=1e-12)
+    assert plane_bound(made.covariance)[0] == pytest.approx(PLANE_95 * AXES[0], rel=1e-12)
 
 
 def test_ellipses_stand_at_the_ends_of_outages():
@@ -184,14 +185,14 @@ def test_bounds_are_of_95_percent():
     made = record()
     chart = charts.bound_chart(told(made))
     place, velocity, attitude = chart.panels[1:]
-    assert named(place, "horizontal")[0].y == pytest.approx(plane_bound(made))
+    assert named(place, "horizontal")[0].y == pytest.approx(plane_bound(made.covariance))
     assert named(place, "height")[0].y[0] == pytest.approx(1.959964 * 2.0)
     assert named(velocity, "north")[0].y[0] == pytest.approx(1.959964 * 0.1)
     assert named(attitude, "heading")[0].y[0] == pytest.approx(1.959964 * 0.5)
 
 
 def test_states_are_in_units_that_people_use():
-    gyro, offset = charts.state_charts(told(record()))
+    gyro, offset = charts.state_charts(record())
     assert gyro.panels[1].y_label == "x, deg/h"
     assert gyro.panels[1].lines[0].y[0] == pytest.approx(np.degrees(2e-6) * 3600.0)
     assert offset.title == "Rtk: time offset"
@@ -298,7 +299,7 @@ def test_short_and_lonely_runs_are_drawn(make):
         charts.height_chart(given),
         charts.velocity_chart(given),
         charts.attitude_chart(given),
-        *charts.state_charts(given),
+        *charts.state_charts(given.record),
     ]
     drawn += [innovation_chart(given.record, one) for one in agreements(given.record)]
     for chart in drawn:
