@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import time
+from itertools import pairwise
 
 import pytest
 
@@ -165,17 +166,6 @@ def test_a_simulation_takes_a_named_sensor_or_a_file(here, run_cli):
     assert "did you mean 'mpu-9250'" in wrong.err
 
 
-def test_the_demo_runs_without_any_recording(here, run_cli, monkeypatch):
-    monkeypatch.setenv("STRAPDOWN_DATA", str(here / "nowhere"))
-    found = run_cli("demo")
-    assert found.code == 0
-    assert "set STRAPDOWN_DATA" in found.out
-    assert (here / "demo" / "alexiev-fig4" / "report.html").is_file()
-    assert (here / "demo" / "crash-pole" / "report.html").is_file()
-    # -7.203 m/s are -25.9 km/h.
-    assert re.search(r"Delta-V 2[56]\.\d+ ± 0\.\d+ km/h; direction of force", found.out)
-
-
 def test_python_m_strapdown_and_a_closed_pipe(tmp_path):
     assert shell("--version").stdout.startswith("strapdown 0.")
     done = shell("attitude", "no-such-log.csv", cwd=tmp_path)
@@ -229,3 +219,14 @@ def test_a_job_that_is_stopped_leaves_nothing_behind(tmp_path):
     job.terminate()
     assert job.wait(60) == 128 + 15
     assert list(tmp_path.iterdir()) == []
+
+
+def test_lines_of_the_help_break_where_the_terminal_ends_alone(run_cli):
+    """No line of prose is broken while the next word would still have fitted."""
+    for command in (*COMMANDS, "coast", "navigate"):
+        head = run_cli(command, "--help").out.split("╭")[0].rstrip().splitlines()
+        width = len(head[0]) or 80
+        for line, following in pairwise(head):
+            if line.strip() and following.strip():
+                word = following.split()[0]
+                assert len(line.rstrip()) + 1 + len(word) >= width - 1, (command, line)

@@ -10,12 +10,14 @@ import time
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_navigate import FILE, NAVIGATE_CASES, drive, navigate_said, undrawn, write_drive
 
+from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.formats import read_raw
 from strapdown.formats.trajectory_readers import read_trajectory
@@ -201,6 +203,34 @@ def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, un
     assert one["alignment"]["coarse"]["method"] == "gnss_course"
     again = run_cli("init", "navigate", log, *options)
     assert again.code == 4 and "--force" in again.err
+    beside = run_cli("navigate", path, "--smooth", "--out", tmp_path / "c")
+    assert beside.code == 4 and 'kind = "rts" under [smoother]' in beside.err
+
+
+def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run_cli, tmp_path):
+    """What a remedy names can be done: columns are stated, a deviation is assumed and listed."""
+    write_drive(tmp_path)
+    log, fixes = pd.read_csv(tmp_path / "drive.csv", comment="#"), tmp_path / "bare.csv"
+    names = ["time", "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z"]
+    log = log.iloc[:, :7].set_axis([f"c{k}" for k in range(7)], axis=1)
+    log.to_csv(tmp_path / "odd.csv", index=False)
+    pd.read_csv(tmp_path / "fixes.csv", comment="#").filter(regex="^(time|lat|lon|alt)").to_csv(
+        fixes, index=False
+    )
+    columns = ",".join(f"{name}=c{k}" for k, name in enumerate(names))
+    path = tmp_path / "odd.toml"
+    units = ("--gyro-unit", "rad/s", "--accel-unit", "m/s2", "--time-unit", "s")
+    done = run_cli(
+        "init", "navigate", tmp_path / "odd.csv", "--gnss", fixes, "--columns", columns, *units,
+        "--out", path,
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert "position_sd_m: how well each fix knows its place" in done.out
+    assert read_navigation_spec(path).log.columns["gyro_z"] == "c3"
+    assert "\nposition_sd_m = 5.0\n" in path.read_text()
+    flags = ("navigate", tmp_path / "odd.csv", "--gnss", fixes, "--columns", columns, *units)
+    refused = run_cli(*flags, "--sensor", "mpu-6050", "--out", tmp_path / "out")
+    assert refused.code == 4 and "strapdown init navigate" in refused.err
 
 
 def test_the_car_is_navigated_from_its_raw_files(recordings, run_cli, tmp_path, undrawn_here):
@@ -240,6 +270,65 @@ def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path, undrawn_
         assert said.startswith("error: ") and "Remedy: " in said
     else:
         assert "note: " in said
+
+
+# The signal comes while the callback of a weak reference runs, as they do in numbers when pictures
+# are drawn by matplotlib: what is raised there, Python drops.
+DROPPED = """
+import os, signal, time, weakref
+from strapdown.cli import main
+from strapdown.report import navigation
+
+# A shell that ignores interrupts hands that on to its jobs.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+class Thing:
+    pass
+
+def gone(_):
+    os.kill(os.getpid(), SENT)
+    for _ in range(10_000):
+        pass
+
+def draw_stills(document):
+    thing = Thing()
+    kept = weakref.ref(thing, gone)
+    del thing
+    # What is sent again comes while it is at work; a minute is longer than any machine needs.
+    end = time.monotonic() + 60.0
+    while time.monotonic() < end:
+        found = drawn(document)
+    return found
+
+drawn, navigation.draw_stills = navigation.draw_stills, draw_stills
+main.run()
+"""
+
+
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_signal_that_python_drops_while_figures_are_drawn(tmp_path, sent, code):
+    write_drive(tmp_path)
+    before = {p.name for p in tmp_path.iterdir()}
+    job = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            DROPPED.replace("SENT", str(int(sent))),
+            "navigate",
+            "navigate.toml",
+            "--out",
+            "out",
+        ],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert job.returncode == code, job.stderr
+    assert "Traceback" not in job.stderr
+    assert "ignored" not in job.stderr
+    assert {p.name for p in tmp_path.iterdir()} == before
 
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGINT])

@@ -6,16 +6,18 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from strapdown import simulate
+from strapdown import bench_attitude, simulate
 from strapdown.config import read_trajectory_spec
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.ellipsoids import find_ellipsoid
+from strapdown.report.attitude_charts import charts
 from strapdown.report.document_files import drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_result import told_of
@@ -49,18 +51,69 @@ def test_a_picture_of_the_manual_is_what_is_drawn_now(name, tmp_path):
     assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
 
 
+def drawn_of(spec):
+    """The charts of the report of a run, without its page."""
+    return drawings(navigation_document(told_of(run_navigation(spec)), ""))
+
+
 @pytest.fixture(scope="module")
 def navigated():
-    """The report of the drive of the manual, without its page."""
-    result = run_navigation(read_navigation_spec(EXAMPLES / "navigate_car.toml"))
-    return drawings(navigation_document(told_of(result), ""))
+    """The report of the drive of the manual."""
+    return drawn_of(read_navigation_spec(EXAMPLES / "navigate_car.toml"))
+
+
+@pytest.fixture(scope="module")
+def smoothed(tmp_path_factory):
+    """The report of the drive through a tunnel, smoothed as the manual does it."""
+    file = tmp_path_factory.mktemp("smoothed") / "smoothed.toml"
+    drive = (EXAMPLES / "navigate_drive.toml").read_text(encoding="utf-8")
+    file.write_text(f'{drive}\n[smoother]\nkind = "rts"\n', encoding="utf-8")
+    return drawn_of(read_navigation_spec(file))
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 @pytest.mark.parametrize("name", ["plan", "bounds"])
 def test_a_picture_of_a_run_is_what_is_drawn_now(name, navigated, tmp_path):
-    (chart,) = [d.chart for d in navigated if d.chart.slug == name]
+    compare(navigated, name, tmp_path)
+
+
+@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
+def test_the_picture_of_a_smoothed_run_is_what_is_drawn_now(smoothed, tmp_path):
+    compare(smoothed, "smoothing", tmp_path)
+
+
+def compare(drawings_of_run, name, folder):
+    (chart,) = [d.chart for d in drawings_of_run if d.chart.slug == name]
     shown = IMAGES / f"navigate_{name}.svg"
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        draw(chart, shown)
+    draw(chart, folder / "now.svg")
+    assert same_picture(shown, folder / "now.svg"), "make pictures, and look at them"
+
+
+@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
+def test_the_rates_of_the_readme_are_what_is_drawn_now(tmp_path):
+    (chart,) = [c for c in charts(bench_attitude("alexiev-fig6", rate=200)) if c.slug == "sweep"]
+    shown = IMAGES / "attitude_rates.svg"
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        draw(chart, shown)
+    draw(chart, tmp_path / "now.svg")
+    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+
+
+def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
+    shown, now = IMAGES / "crash_path.svg", sealed_crash.folder / "figures" / "path.svg"
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        shutil.copyfile(now, shown)
+    assert same_picture(shown, now), "make pictures, and look at them"
+
+
+@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
+def test_the_drive_of_the_readme_is_what_is_drawn_now(tmp_path):
+    result = run_navigation(read_navigation_spec(EXAMPLES / "navigate_drive.toml"))
+    drawn = drawings(navigation_document(told_of(result), ""))
+    (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
+    shown = IMAGES / "drive_plan.svg"
     if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
         draw(chart, shown)
     draw(chart, tmp_path / "now.svg")

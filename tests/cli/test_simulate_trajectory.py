@@ -67,7 +67,9 @@ def test_an_example_is_simulated_and_its_truth_agrees_with_itself(name):
     # A vehicle's velocity is what its place does, to the step's second order.
     down = np.diff(trajectory["alt"]) / np.diff(trajectory.index)
     middle = 0.5 * (trajectory["VD"].to_numpy()[1:] + trajectory["VD"].to_numpy()[:-1])
-    np.testing.assert_allclose(-down, middle, atol=1e-3)
+    # The trapezium's error is a twelfth of the second difference; a tenth for the next order.
+    curved = np.abs(np.diff(trajectory["VD"].to_numpy(), 2)).max() / 12.0
+    np.testing.assert_allclose(-down, middle, atol=1.1 * curved + 1e-9)
 
 
 def test_the_examples_show_the_kinds_that_need_more_than_a_line():

@@ -20,7 +20,7 @@ from strapdown.cli.log_options import (
 )
 
 EPILOG = (
-    "Example: strapdown attitude alexiev-fig4 --rate 100   |   "
+    "Example: strapdown attitude alexiev-fig4 --rate 100\n\n"
     "Example: strapdown attitude log.csv --gyro-unit deg/s --reference 'end same as start'"
 )
 _RUN, _OUT = "What to run", "What to write"
@@ -30,7 +30,7 @@ def attitude(
     sources: Annotated[
         list[str],
         typer.Argument(
-            metavar="LOG|SCENARIO...",
+            metavar="LOG|SCENARIO",
             help="A log (a file or a folder; see: strapdown modules), or the name of a scenario. "
             "Several are trials of one question.",
         ),
@@ -38,6 +38,7 @@ def attitude(
     algorithms: Annotated[
         str,
         typer.Option(
+            metavar="NAMES",
             help="Names joined by blanks or commas, with options after a colon: 'naive "
             "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all.",
             rich_help_panel=_RUN,
@@ -134,7 +135,8 @@ def attitude(
     axes: Axes = None,
     repair: Repair = False,
     seed: Annotated[
-        int | None, typer.Option(help="Of a scenario's noise (0).", rich_help_panel=_RUN)
+        int | None,
+        typer.Option(metavar="N", help="Of a scenario's noise (0).", rich_help_panel=_RUN),
     ] = None,
     sensor: Annotated[
         str | None,
@@ -157,7 +159,7 @@ def attitude(
         Path | None,
         typer.Option(
             metavar="DIR",
-            help="Folder to make; named after the input if not given.",
+            help="Folder to make (LOG-attitude).",
             rich_help_panel=_OUT,
         ),
     ] = None,

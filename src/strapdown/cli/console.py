@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from strapdown.bundle import Seal
     from strapdown.exceptions import Finding
+    from strapdown.report.document import TableBlock
 
 
 # Redirected output has no width of its own; a table is then as wide as it is.
@@ -143,19 +144,31 @@ def print_table(
     console().print(table, soft_wrap=False)
 
 
+def print_block(block: TableBlock) -> None:
+    """Print a table of a report, its lines unbroken where the page has no break either."""
+    from strapdown.report.crash_values import spaced
+
+    rows = [[spaced(cell) for cell in row] for row in block.rows]
+    columns = [spaced(name) for name in block.columns]
+    print_table(columns, rows, text=block.text, strong=block.strong)
+
+
 def _broken(name: str) -> str:
     """A long name with its options below each other."""
     return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
 
 
-def print_findings(findings: Sequence[Finding]) -> None:
-    """Print what a person should know, to stderr."""
+def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
+    """Print what a person should know, to stderr; the first alone of more than `most`."""
     out = console(err=True)
-    for finding in findings:
+    for finding in findings[:most]:
         head, _, remedy = str(finding).partition("\n")
         out.print(f"note: {head}", style="yellow")
         if remedy:
             out.print(remedy, style="dim")
+    if most is not None and len(findings) > most:
+        more = f"{len(findings) - most} more; all of them are in the report"
+        out.print(f"note: {more}", style="yellow")
 
 
 def print_seal(seal: Seal, look_at: str) -> None:

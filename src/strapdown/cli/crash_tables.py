@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from strapdown.cli.console import console, print_table
+from strapdown.cli.console import console, print_block
 from strapdown.report.crash_check_tables import comparison_table
 from strapdown.report.crash_limits import limitations
 from strapdown.report.crash_tables import answers_table, path_table
 from strapdown.report.crash_values import spaced
 from strapdown.report.crash_words import headline
-from strapdown.report.document import TableBlock
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["print_crash"]
@@ -19,16 +18,10 @@ def print_crash(result: CaseResult) -> None:
     out = console()
     for block in (answers_table(result), path_table(result), comparison_table(result)):
         if block is not None and block.rows:
-            _print(block)
+            print_block(block)
     out.print(spaced(headline(result)), style="bold")
     found = limitations(result)
     if found:
         out.print("\nWhat limits it (more in the report):")
         for head, _ in found:
             out.print(f"  - {spaced(head)}")
-
-
-def _print(block: TableBlock) -> None:
-    rows = [[spaced(cell) for cell in row] for row in block.rows]
-    columns = [spaced(name) for name in block.columns]
-    print_table(columns, rows, text=block.text, strong=block.strong)

@@ -2,12 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapdown.cli.log_options import AccelUnit, Axes, GyroUnit, Rate, Sampling, TimeUnit
+from strapdown.cli.log_options import (
+    AccelUnit,
+    Axes,
+    Columns,
+    GyroUnit,
+    Rate,
+    Repair,
+    Sampling,
+    TimeUnit,
+)
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from strapdown.exceptions import Finding
+    from strapdown.systems.crash_draft.toml_text import Asked
 
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"
@@ -34,7 +50,7 @@ def crash(
     records: Annotated[
         list[Path],
         typer.Argument(
-            metavar="RECORD...",
+            metavar="RECORD",
             help="Records of one crash: CSV or text tables of any layout, tables of an event data "
             "recorder, the folder of a test (NHTSA, ISO MME).",
             show_default=False,
@@ -51,7 +67,7 @@ def crash(
     Each line says whether it was found, is assumed, or is yours to fill in ("?"). Then:
     strapdown crash case.toml
     """
-    from strapdown.cli.console import console, print_findings, progress
+    from strapdown.cli.console import progress
     from strapdown.systems.crash_draft import draft_case, read_records
     from strapdown.systems.crash_draft.file import check_free, write_file
 
@@ -64,11 +80,7 @@ def crash(
         write_file(out, draft.text, force=force)
     if quiet:
         return
-    print_findings(draft.findings)
-    page = console()
-    page.print("Found", style="bold")
-    for line in draft.found:
-        page.print(f"  {line}")
+    page = _say_found(draft.findings, draft.found)
     if draft.left_out:
         page.print("Left out", style="bold")
         for gone in draft.left_out[:SHOWN]:
@@ -76,14 +88,8 @@ def crash(
         if len(draft.left_out) > SHOWN:
             page.print(f"  and {len(draft.left_out) - SHOWN} more: at the end of {out}")
     page.print(f"\nWrote {out}")
-    if draft.asked:
-        page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
-        for one in draft.asked:
-            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
-    if draft.to_check:
-        page.print(f"\nIs this so? If not, correct it in {out}:", style="bold")
-        for one in draft.to_check:
-            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+    _list(page, f'Only you know; put it in place of each "?" in {out}:', draft.asked)
+    _list(page, f"Is this so? If not, correct it in {out}:", draft.to_check)
     page.print("\nLook at the lines that say 'assumed', too.")
     page.print(f"\nThen   strapdown crash {out}")
 
@@ -96,12 +102,14 @@ def align(
             metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
         ),
     ],
+    columns: Columns = None,
     gyro_unit: GyroUnit = None,
     accel_unit: AccelUnit = None,
     time_unit: TimeUnit = None,
     axes: Axes = None,
     rate: Rate = None,
     sampling: Sampling = None,
+    repair: Repair = False,
     out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
         "align.toml"
     ),
@@ -112,34 +120,29 @@ def align(
 
     Then: strapdown align align.toml
     """
-    from strapdown.cli.console import console, print_findings
     from strapdown.formats import ReadOptions
+    from strapdown.formats.columns import parse_column_option
     from strapdown.systems.alignment_draft import draft_alignment
     from strapdown.systems.crash_draft.file import check_free, write_file
 
     check_free(out, force)
     options = ReadOptions(
+        columns=parse_column_option(columns or []),
         gyro_unit=gyro_unit,
         accel_unit=accel_unit,
         time_unit=time_unit,
         axes=axes,
         rate=rate,
         sampling=sampling,
+        repair=repair,
     )
     draft = draft_alignment(log, folder=out.absolute().parent, options=options)
     write_file(out, draft.text, force=force)
     if quiet:
         return
-    print_findings(draft.findings)
-    page = console()
-    page.print("Found", style="bold")
-    for line in draft.found:
-        page.print(f"  {line}")
+    page = _say_found(draft.findings, draft.found)
     page.print(f"\nWrote {out}")
-    if draft.asked:
-        page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
-        for one in draft.asked:
-            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
+    _list(page, f'Only you know; put it in place of each "?" in {out}:', draft.asked)
     page.print(f"\nThen   strapdown align {out}")
 
 
@@ -159,12 +162,18 @@ def navigate(
         str | None,
         typer.Option(metavar="NAME|FILE", help="The sensor; the nearest by noise, if not given."),
     ] = None,
+    foot: Annotated[
+        bool,
+        typer.Option("--foot", help="It is of a unit on a shoe: zero velocity at its stances."),
+    ] = False,
+    columns: Columns = None,
     gyro_unit: GyroUnit = None,
     accel_unit: AccelUnit = None,
     time_unit: TimeUnit = None,
     axes: Axes = None,
     rate: Rate = None,
     sampling: Sampling = None,
+    repair: Repair = False,
     out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
         "navigate.toml"
     ),
@@ -175,9 +184,10 @@ def navigate(
 
     Then: strapdown navigate navigate.toml
     """
-    from strapdown.cli.console import console, print_findings, progress
+    from strapdown.cli.console import progress
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
+    from strapdown.formats.columns import parse_column_option
     from strapdown.systems.crash_draft.file import check_free, write_file
     from strapdown.systems.sins.draft import draft_navigation
 
@@ -185,32 +195,49 @@ def navigate(
     table = specify(
         LogTable,
         path=str(log),
+        columns=parse_column_option(columns or []),
         gyro_unit=gyro_unit,
         accel_unit=accel_unit,
         time_unit=time_unit,
         sampling=sampling,
         rate_hz=rate,
+        repair=repair,
     )
     with progress(quiet) as report:
         report("reading", 0.3)
         draft = draft_navigation(
-            table, folder=out.absolute().parent, axes=axes, gnss=gnss, sensor=sensor
+            table,
+            folder=out.absolute().parent,
+            axes=axes,
+            gnss=gnss,
+            sensor=sensor,
+            foot=foot,
         )
         write_file(out, draft.text, force=force)
     if quiet:
         return
-    print_findings(draft.findings)
+    page = _say_found(draft.findings, draft.found)
+    page.print(f"\nWrote {out}")
+    _list(page, f'Only you know; put it in place of each "?" in {out}:', draft.asked)
+    _list(page, f"Assumed; if it is not so, correct it in {out}:", draft.to_check)
+    page.print(f"\nThen   strapdown navigate {out}")
+
+
+def _say_found(findings: Sequence[Finding], found: Sequence[str]) -> Console:
+    """Print what the records told; return where the rest goes."""
+    from strapdown.cli.console import console, print_findings
+
+    print_findings(findings)
     page = console()
     page.print("Found", style="bold")
-    for line in draft.found:
+    for line in found:
         page.print(f"  {line}")
-    page.print(f"\nWrote {out}")
-    if draft.asked:
-        page.print(f'\nOnly you know; put it in place of each "?" in {out}:', style="bold")
-        for one in draft.asked:
-            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
-    if draft.to_check:
-        page.print(f"\nAssumed; if it is not so, correct it in {out}:", style="bold")
-        for one in draft.to_check:
-            page.print(f"  line {one.line:>3}  {one.key}: {one.what}")
-    page.print(f"\nThen   strapdown navigate {out}")
+    return page
+
+
+def _list(page: Console, head: str, lines: Sequence[Asked]) -> None:
+    """Print lines of the file that wait for the user, if there are any."""
+    if lines:
+        page.print(f"\n{head}", style="bold")
+    for one in lines:
+        page.print(f"  line {one.line:>3}  {one.key}: {one.what}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import gc
+import inspect
 import io
 import os
 import signal
@@ -16,6 +17,7 @@ from strapdown import __version__
 from strapdown.cli import (
     align,
     attitude,
+    coast,
     crash,
     demo,
     init,
@@ -25,13 +27,14 @@ from strapdown.cli import (
     simulate,
     verify,
 )
+from strapdown.cli.interrupts import keep_interrupts
 from strapdown.exceptions import Finding, StrapdownError
 
-EXIT_CODES = """
-Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood;
-3 the data cannot be used; 4 what was asked for is unknown or cannot be done; 5 a computation
-diverged; 6 verify found a change.
-"""
+EXIT_CODES = (
+    "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
+    "3 the data cannot be used; 4 what was asked for is unknown or cannot be done; 5 a computation "
+    "diverged; 6 verify found a change."
+)
 
 app = typer.Typer(
     name="strapdown",
@@ -63,6 +66,7 @@ def main(
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
 app.command("align", epilog=align.EPILOG)(align.align)
 app.command("navigate", epilog=navigate.EPILOG)(navigate.navigate)
+app.command("coast", epilog=coast.EPILOG)(coast.coast)
 app.add_typer(init.app, name="init")
 app.command("crash", epilog=crash.EPILOG)(crash.crash)
 app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
@@ -70,6 +74,11 @@ app.command("reproduce", epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
 app.command("modules", epilog=modules.EPILOG)(modules.modules)
 app.command("demo", epilog=demo.EPILOG)(demo.demo)
+
+# Line breaks of a docstring would break the lines of its help a second time.
+for command in (*app.registered_commands, *init.app.registered_commands):
+    told = inspect.getdoc(command.callback) or ""
+    command.help = "\n\n".join(part.replace("\n", " ") for part in told.split("\n\n"))
 
 
 #: Before cycles of references are looked for.
@@ -87,6 +96,7 @@ def run() -> None:
     # A terminal that closes, or a scheduler that stops a job, leaves nothing behind either.
     for number in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)):
         signal.signal(number, lambda got, _: sys.exit(128 + got))
+    keep_interrupts()
     try:
         app()
     except StrapdownError as error:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 EPILOG = "Example: strapdown modules"
+# What stands in a slot that a file leaves out, where that is none of the modules.
+_UNSAID = {"update_rule": "; where none is named, every observation counts in full"}
 
 
 def modules() -> None:
     """List what can stand in each slot: algorithms, the modules of a chain, sensors, formats."""
     from dataclasses import fields
 
+    from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
+    from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
     from strapdown.attitude import ALGORITHMS
     from strapdown.cli.console import console, print_table
     from strapdown.config.motions import KINDS
@@ -53,7 +57,7 @@ def modules() -> None:
     for name, slot in SLOTS.items():
         if name == "mechanization":
             continue
-        out.print(f"{slot.title} ([{name}] of a chain)", style="bold")
+        out.print(f"{slot.title} ([{name}] of a chain{_UNSAID.get(name, '')})", style="bold")
         print_table(
             ["name", "source", "options", "what it does"],
             [
@@ -67,6 +71,18 @@ def modules() -> None:
             ],
             text=(0, 1, 2, 3),
         )
+    out.print("Detectors of a standstill (detector = … of an aid that watches)", style="bold")
+    print_table(
+        ["name", "source", "what it does"],
+        [[name, one.source, one.summary] for name, one in STANDSTILL_DETECTORS.items()],
+        text=(0, 1, 2),
+    )
+    out.print("What becomes of its threshold (threshold_rule = …)", style="bold")
+    print_table(
+        ["name", "source", "what it does"],
+        [[name, one.source, one.summary] for name, one in STANDSTILL_THRESHOLDS.items()],
+        text=(0, 1, 2),
+    )
     out.print("Ellipsoids", style="bold")
     print_table(
         ["name", "a, m", "1/f", "source"],

@@ -19,7 +19,7 @@ from strapdown.cli.log_options import (
 )
 
 EPILOG = (
-    "Example: strapdown navigate log.csv --gnss fixes.csv --sensor adis16470   |   "
+    "Example: strapdown navigate log.csv --gnss fixes.csv --sensor adis16470\n\n"
     "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
 )
 MOST = 6  # findings on the terminal
@@ -81,6 +81,23 @@ def navigate(
         Path | None,
         typer.Option(metavar="FILE", help="A trajectory to compare with.", rich_help_panel=_WITH),
     ] = None,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Control points (time, north, east) to score the path by, after the origin and "
+            "heading that fit best.",
+            rich_help_panel=_WITH,
+        ),
+    ] = None,
+    smooth: Annotated[
+        bool,
+        typer.Option(
+            "--smooth",
+            help="When it has ended, tell every state by all observations, later ones too.",
+            rich_help_panel=_RUN,
+        ),
+    ] = False,
     from_s: Annotated[
         float | None,
         typer.Option(
@@ -147,10 +164,9 @@ def navigate(
     from strapdown.cli.align_options import flag_words
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency
-    from strapdown.cli.navigate_options import navigation_of_flags
+    from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.config.navigation_file import read_navigation_spec
-    from strapdown.exceptions import Finding
     from strapdown.live.replay import Replay, parse_pace
     from strapdown.report.navigation import write_navigation
     from strapdown.systems.sins.run import run_navigation
@@ -167,6 +183,8 @@ def navigate(
         "alt": alt,
         "heading": heading,
         "truth": truth,
+        "points": points,
+        "smooth": smooth or None,
         "from_s": from_s,
         "duration": duration,
         "rate": rate,
@@ -197,7 +215,7 @@ def navigate(
     with progress(quiet or json) as show:
         report = Stopwatch(show)
         if own:
-            flag_words(source, given, "the file of a run")
+            flag_words(source, given, "the file of a run", FLAGS)
             spec = read_navigation_spec(source)
         else:
             report("looking through", 0.01)
@@ -218,8 +236,5 @@ def navigate(
     print_navigation(result)
     if latency is not None:
         print_latency(latency, f"played, pace {pace}")
-    print_findings(result.findings[:MOST])
-    if len(result.findings) > MOST:
-        more = f"{len(result.findings) - MOST} more; all of them are in the report"
-        print_findings([Finding(more)])
+    print_findings(result.findings, MOST)
     print_seal(seal, "report.html")

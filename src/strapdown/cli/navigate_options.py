@@ -16,7 +16,7 @@ from strapdown.exceptions import ConfigError
 from strapdown.formats.columns import parse_column_option
 from strapdown.systems.sins.proposal import propose
 
-__all__ = ["navigation_of_flags"]
+__all__ = ["FLAGS", "navigation_of_flags"]
 
 #: Flags by the place in a specification.
 FLAGS = {
@@ -29,6 +29,8 @@ FLAGS = {
     "aiding, gnss, path": "--gnss",
     "aiding, gnss, lever_arm_m": "--lever-arm",
     "truth, path": "--truth",
+    "control_points, path": "--points",
+    "smoother, kind": "--smooth",
     "log, from_s": "--from",
     "log, duration_s": "--duration",
     "log, sampling": "--sampling",
@@ -93,6 +95,14 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
             + (f"; nearest by the noise of the log is {near}" if near else ""),
         )
     whole = {"name": log.resolve().stem, **proposal.table}
+    if "position_sd_m" in whole.get("aiding", {}).get("gnss", {}):
+        raise ConfigError(
+            "the fixes do not state how well they know their places",
+            file=Path(given["gnss"]).name,
+            quantity="--gnss",
+            remedy="write a file with strapdown init navigate, and position_sd_m of the fixes in "
+            "it; or add columns north_sd, east_sd, down_sd",
+        )
     coarse = whole["coarse"]
     if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
         raise ConfigError(
@@ -118,6 +128,10 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
         whole["aiding"]["gnss"]["lever_arm_m"] = _arm(given["lever_arm"])
     if given["truth"] is not None:
         whole["truth"] = {"path": str(given["truth"])}
+    if given["points"] is not None:
+        whole["control_points"] = {"path": str(given["points"])}
+    if given["smooth"]:
+        whole["smoother"] = {"kind": "rts"}
     try:
         return navigation_spec(whole)
     except ValidationError as error:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from strapdown.cli.console import console, print_table
+from dataclasses import replace
+
+from strapdown.cli.console import console, print_block
 from strapdown.report.crash_values import spaced
 from strapdown.report.document import TableBlock
 from strapdown.report.navigation_found import examine
@@ -12,12 +14,14 @@ from strapdown.report.navigation_tables import (
     error_table,
     observation_table,
     outage_table,
+    point_table,
     state_table,
     withheld_table,
 )
 from strapdown.report.navigation_trust import trust
 from strapdown.report.navigation_values import duration_words
 from strapdown.report.navigation_words import cautions, headline
+from strapdown.report.verdict_words import terminal_lines
 from strapdown.systems.sins.result import NavigationResult
 
 __all__ = ["print_navigation"]
@@ -38,6 +42,7 @@ def print_navigation(result: NavigationResult) -> None:
     tables = (
         end_table(found),
         error_table(found),
+        point_table(found),
         observation_table(found),
         outage_table(found),
         withheld_table(found),
@@ -52,12 +57,11 @@ def print_navigation(result: NavigationResult) -> None:
     out.print(spaced(verdict.sentence), style=style)
     for head, text in cautions(found):
         out.print(spaced(f"  - {head}: {text}"))
+    for text, style in terminal_lines(result):
+        out.print(spaced(text), style=style)
 
 
 def _print(block: TableBlock) -> None:
-    rows = [[spaced(cell) for cell in row] for row in block.rows]
-    columns = [spaced(name) for name in block.columns]
-    strong = tuple(k for k in block.strong if k < _MOST)
-    print_table(columns, rows[:_MOST], text=block.text, strong=strong)
-    if len(rows) > _MOST:
-        console().print(f"  {len(rows) - _MOST} more rows; all of them are in the report")
+    print_block(replace(block, rows=block.rows[:_MOST]))
+    if len(block.rows) > _MOST:
+        console().print(f"  {len(block.rows) - _MOST} more rows; all of them are in the report")

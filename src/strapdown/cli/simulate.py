@@ -39,7 +39,7 @@ def simulate(
             help="csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.",
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Of the errors (0).")] = None,
+    seed: Annotated[int | None, typer.Option(metavar="N", help="Of the errors (0).")] = None,
     sensor: Annotated[
         str | None,
         typer.Option(
