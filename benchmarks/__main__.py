@@ -11,9 +11,11 @@ from benchmarks import (
     crash,
     drive30,
     estimation,
+    kfgins,
     memory,
     navigation,
     prefilter,
+    smoothing,
     start_up,
 )
 
@@ -30,6 +32,8 @@ def main() -> None:
         prefilter,
         estimation,
         drive30,
+        kfgins,
+        smoothing,
         crash,
         answer,
         start_up,

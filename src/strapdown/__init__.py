@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from strapdown.nav_state import NavState
     from strapdown.report.alignment import align
     from strapdown.report.attitude import write_attitude
+    from strapdown.report.coast import coast
     from strapdown.report.crash_case import reconstruct_case
     from strapdown.report.navigation import navigate
     from strapdown.report.reproduction import reproduce
@@ -83,6 +84,7 @@ __all__ = [
     "align",
     "bench_attitude",
     "check_imu_channels",
+    "coast",
     "motion_increments",
     "navigate",
     "read_crash_record",
@@ -122,6 +124,7 @@ _HOMES = {
     "RecordedTriad": "strapdown.sensors.crash_unit",
     "TriadUncertainty": "strapdown.sensors.triad_uncertainty",
     "bench_attitude": "strapdown.systems.attitude_bench",
+    "coast": "strapdown.report.coast",
     "motion_increments": "strapdown.increments",
     "navigate": "strapdown.report.navigation",
     "read_log": "strapdown.formats",

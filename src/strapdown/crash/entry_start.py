@@ -12,6 +12,7 @@ from strapdown.crash.entry_estimate import Fixes
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_sensitivity import between
 from strapdown.ellipsoids import WGS84
+from strapdown.evaluation.control_points import rigid_fit
 from strapdown.exceptions import Finding
 from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.mechanization import NavigationRun
@@ -105,10 +106,9 @@ def _heading_by_changes(turned: NavigationRun, instants: Array, velocity: Array)
     seen = velocity[:, :2] - velocity[:, :2].mean(axis=0)
     if min(float(np.sqrt((x * x).sum(axis=1).mean())) for x in (felt, seen)) < _LEAST_CHANGE:
         return None
-    cross = float((felt[:, 0] * seen[:, 1] - felt[:, 1] * seen[:, 0]).sum())
-    begun = math.degrees(math.atan2(cross, float((felt * seen).sum())))
-    return begun + float(rotation.euler_from_quaternion(turned.history[-1, 6:10])[2])
+    begun, _ = rigid_fit(felt, seen)
+    return math.degrees(begun) + float(rotation.euler_from_quaternion(turned.history[-1, 6:10])[2])
 
 
 def _near(a: float, b: float) -> bool:
-    return abs((a - b + 180.0) % 360.0 - 180.0) < _SAME
+    return bool(np.abs(rotation.within_half_turn(np.array(a - b))) < _SAME)

@@ -87,11 +87,6 @@ class EntryState:
         return float(np.sqrt(along @ block @ along))
 
     @property
-    def course_deg(self) -> float:
-        """Direction of travel over the ground, 0 to 360 deg from north."""
-        return math.degrees(math.atan2(self.state.v_n[1], self.state.v_n[0])) % 360.0
-
-    @property
     def course_sd_deg(self) -> float:
         """Standard deviation of the course, deg; infinite at a stand."""
         north, east, _ = self.state.v_n

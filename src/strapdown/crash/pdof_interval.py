@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.pdof import covariance_of, vector_of
 from strapdown.exceptions import ConfigError
+from strapdown.rotation import within_half_turn
 
 Array = NDArray[np.float64]
 
@@ -150,7 +151,7 @@ def _fieller(mean: Array, spread: Array, z: float) -> tuple[float, float] | None
     reach = math.degrees(math.atan(math.sqrt(max(-least, 0.0) / most)))
     estimate = math.degrees(math.atan2(m[1], m[0]))
     # Of the two opposite directions the one on the estimate's side.
-    away = (middle - estimate + 180.0) % 360.0 - 180.0
+    away = float(within_half_turn(np.array(middle - estimate)))
     if abs(away) > 90.0:
         away -= math.copysign(180.0, away)
     return estimate + min(away - reach, 0.0), estimate + max(away + reach, 0.0)

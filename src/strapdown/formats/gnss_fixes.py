@@ -19,6 +19,9 @@ __all__ = ["Fixes", "GnssOptions", "table_of_fixes"]
 Array = NDArray[np.float64]
 Sd = float | tuple[float, float, float]
 
+#: What receivers reach, m.
+POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
+
 
 @dataclass(frozen=True)
 class GnssOptions:
@@ -34,6 +37,8 @@ class GnssOptions:
     position_sd, velocity_sd : float or tuple of float, optional, m and m/s
         Standard deviations north, east, down, or one for all three: of each fix, in place of
         those of the file.
+    unstated_position_sd : float, optional, m
+        Taken where the file states none; `attrs` of the table then have ``position_sd_taken``.
     repair : bool
         Leave out rows that cannot be used, and say how many, instead of refusing the file.
     """
@@ -42,10 +47,11 @@ class GnssOptions:
     columns: Mapping[str, str] = field(default_factory=dict)
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
+    unstated_position_sd: float | None = None
     repair: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("position_sd", "velocity_sd"):
+        for name in ("position_sd", "velocity_sd", "unstated_position_sd"):
             value = getattr(self, name)
             if value is not None and not (
                 np.shape(value) in ((), (3,)) and np.all(np.asarray(value) > 0.0)
@@ -112,7 +118,10 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
         negative, or nowhere stated, or as `gnss_table`.
     """
     count = fixes.time.size
-    position_sd = _sd(fixes, "position", options.position_sd, count)
+    asked, taken = options.position_sd, None
+    if fixes.position_sd is None and asked is None:
+        asked = taken = options.unstated_position_sd
+    position_sd = _sd(fixes, "position", asked, count)
     velocity, velocity_sd = _velocity(fixes, options.velocity_sd, count)
     quality = np.ones(count) if fixes.quality is None else fixes.quality
     quality = np.where(np.isnan(quality), 0.0, quality)
@@ -148,6 +157,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
         ) from None
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
+    if taken is not None:
+        table.attrs["position_sd_taken"] = taken
     table.attrs["first_row"] = first_of(fixes.rows[at])
     return table
 
@@ -269,8 +280,7 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
             "no standard deviations of the places are in it",
             file=fixes.name,
             quantity=", ".join(names),
-            remedy="state position_sd, in m: 0.02 suits RTK, 1 a code receiver with corrections, "
-            "5 one without",
+            remedy=f"state position_sd, in m: {POSITION_SDS}",
         )
     sd = np.where(np.isnan(stated), np.inf, stated)
     zero = sd == 0.0

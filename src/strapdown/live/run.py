@@ -14,7 +14,7 @@ import pandas as pd
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_checks import given_of, uncertainty_of
+from strapdown.config.navigation_modules import given_of, uncertainty_of
 from strapdown.config.slots import SLOTS
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.live.clock import Clock

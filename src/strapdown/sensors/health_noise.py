@@ -17,6 +17,7 @@ from strapdown.sensors.health_log import (
     name_in_words,
     usual,
 )
+from strapdown.sensors.known_median import known_median
 
 Array = NDArray[np.float64]
 
@@ -142,19 +143,11 @@ def _relative(log: HealthLog) -> Array:
     b = log.blocks
     with np.errstate(divide="ignore", invalid="ignore"):
         size = np.where(b.valid & (b.noise > 0.0), np.log(b.noise), np.nan)
-        size = size - _median(size, 0)
+        size = size - known_median(size, 0)
         out = np.empty_like(size)
         for k in range(size.shape[1]):
-            out[:, k] = size[:, k] - _median(np.delete(size, k, axis=1), 1)
+            out[:, k] = size[:, k] - known_median(np.delete(size, k, axis=1), 1)
     return out
-
-
-def _median(values: Array, axis: int) -> Array:
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of channels with nothing in them
-        return np.asarray(np.nanmedian(values, axis=axis))
 
 
 def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
@@ -221,5 +214,8 @@ def _fault(
         remedy = "filter it robustly before anything integrates it; look at its cable"
     else:
         what = f"{words} is noisy {when}: {size:.3g} {unit} from sample to sample, {times}"
-        remedy = "look at its mounting and cable; give it the weight of this noise, or leave it out"
+        remedy = (
+            "if the body rocked or shook along or about this axis then, it is motion and no fault; "
+            "if not, look at the sensor's mounting and cable, and give it the weight of this noise"
+        )
     return log.fault(k, kind, span, size, limit, what, remedy)

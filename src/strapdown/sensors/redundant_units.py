@@ -13,6 +13,7 @@ from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.axis_voting import AxisVoting, VotingState
 from strapdown.sensors.fused_axes import fused_drift, fused_noise, fused_uncertainty
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.sensors.known_median import known_median
 from strapdown.sensors.mounted_unit import MountedUnit
 from strapdown.sensors.unit_checks import SAME_STAMP
 from strapdown.sensors.vote_events import VoteEvent, told_events
@@ -143,8 +144,9 @@ class UnitVoting:
                 for k, u in enumerate(self.units)
             ]
         )
-        # The middle one: a unit that fails does not loosen the test of the gyros.
-        force = _middle(turned)
+        # The middle one, so that a unit that fails does not loosen the test of the gyros; zero
+        # where none has a reading.
+        force = np.nan_to_num(known_median(turned, 0))
         gyro_state, rates = self.gyro.advance(state.gyro, gyro, force)
         accel_state, forces = self.accel.advance(state.accel, accel, rates.values)
         names = [u.name for u in self.units]
@@ -279,12 +281,3 @@ def vote_units(
     rate = float((time.size - 1) / (time[-1] - time[0]))
     voting = UnitVoting(units, rate, VotingRule() if rule is None else rule)
     return voting.advance(voting.begin(), tables)[1]
-
-
-def _middle(values: Array) -> Array:
-    """Median over the units of each axis, zero where none has a reading."""
-    import warnings
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)
-        return np.nan_to_num(np.nanmedian(values, axis=0))

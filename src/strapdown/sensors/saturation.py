@@ -123,13 +123,16 @@ def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | 
     if y.size < LEAST_FLAT:
         return None
     top = float(y.max())
+    at = y == top
+    edges = np.diff(np.r_[False, at, False].astype(np.int8))
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    # Most records stop here, before all that is sorted.
+    if (ends - starts).max() < LEAST_FLAT:
+        return None
     floor = LEAST_PART * max(full if np.isfinite(full) else 0.0, float(np.abs(y).max()))
     usual = float(np.median(y))
     if top <= 0.0 or top == usual:
         return None
-    at = y == top
-    edges = np.diff(np.r_[False, at, False].astype(np.int8))
-    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     step, scatter = _least_step(y), _scatter(y)
     low = top <= floor
     if low and top - usual < OFF_REST * step:

@@ -15,6 +15,8 @@ from strapdown.results import AttitudeBench, Trials
 
 Array = NDArray[np.float64]
 
+#: Decimals of a degree beyond which two errors differ by rounding alone.
+ROUNDED = 9
 CONFIDENCE = 0.95
 _KIND = ["algorithm", "meaning"]
 _NUMBERS = [
@@ -89,7 +91,7 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
     from scipy import stats
 
     by = errors.pivot(index="trial", columns="algorithm", values="error_deg")
-    order = by.mean().sort_values(kind="stable").index
+    order = by.mean().round(ROUNDED).sort_values(kind="stable").index
     count = len(by)
     rows = []
     for k, name in enumerate(order):
@@ -119,8 +121,10 @@ def _luck(worse_by: Array) -> float:
 
     spread = float(worse_by.std(ddof=1))
     # Rounding alone tells nothing apart.
+    if float(np.abs(worse_by).max()) < 10.0**-ROUNDED:
+        return 0.5
     if spread <= 1e-12 * max(1.0, float(np.abs(worse_by).max())):
-        return 0.5 if abs(float(worse_by.mean())) < 1e-9 else float(worse_by.mean() < 0.0)
+        return float(worse_by.mean() < 0.0)
     t = float(worse_by.mean()) / (spread / np.sqrt(len(worse_by)))
     return float(stats.t.sf(t, len(worse_by) - 1))
 

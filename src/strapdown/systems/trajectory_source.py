@@ -30,6 +30,7 @@ from strapdown.simulation import (
 from strapdown.simulation import manoeuvres as steps
 from strapdown.simulation.course import Manoeuvre
 from strapdown.simulation.vehicles import LIMITS
+from strapdown.simulation.walking import GAITS, walk
 
 # How fast a turn or a climb comes and goes where nothing is said, s.
 TURN_RAMP = {"car": 1.0, "aircraft": 3.0, "ship": 10.0}
@@ -52,6 +53,7 @@ _KEYS = {
     "ramp": "ramp_s",
     "rate": "rate_hz",
     "speed": "speed_m_per_s",
+    "stand": "stand_s",
     "time": "time_s",
     "to": "to_m_per_s",
 }
@@ -128,6 +130,21 @@ def make_motion(spec: motions.MotionSpec, ellipsoid: Ellipsoid) -> EarthMotion:
             roll_waves=_angle_waves(spec.roll_waves),
             pitch_waves=_angle_waves(spec.pitch_waves),
             heading_waves=_angle_waves(spec.heading_waves),
+            ellipsoid=ellipsoid,
+        )
+    if isinstance(spec, motions.WalkingSpec):
+        return walk(
+            GAITS[spec.gait],
+            spec.strides,
+            origin,
+            corner_each=spec.corner_each,
+            corner_deg=spec.corner_deg,
+            stairs=spec.stairs,
+            climb=spec.stair_m,
+            heading_deg=spec.heading_deg,
+            stand=spec.stand_s,
+            roll_deg=spec.roll_deg,
+            pitch_deg=spec.pitch_deg,
             ellipsoid=ellipsoid,
         )
     return _vehicle(spec, origin, ellipsoid)

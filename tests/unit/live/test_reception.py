@@ -11,8 +11,8 @@ import pytest
 from tests.contracts.test_chain_cuts import LENGTH, assert_same, drive
 from tests.town_drive import ARM, fixes, motion
 
-from strapdown.config.navigation_checks import uncertainty_of
 from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation_modules import uncertainty_of
 from strapdown.exceptions import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.live.clock import MachineClock

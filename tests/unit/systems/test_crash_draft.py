@@ -390,6 +390,13 @@ def test_one_record_named_twice_is_refused(german):
             32,
         ),
         (
+            # Stamps of ten digits, twice the same.
+            "t_ns,ax,ay,az\n"
+            + "".join(f"{1495000000 + 5000000 * (k - (k > 30))},1,{k},9.8\n" for k in range(50)),
+            "time stays at",
+            33,
+        ),
+        (
             "t,ax,ay,az\n"
             + "".join(f"0.{k:03},1,{k if k != 7 else 'ERR'},9.8\n" for k in range(50)),
             "'ERR' is not a number",

@@ -12,6 +12,7 @@ from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError
 from strapdown.formats.columns import parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns
+from strapdown.formats.inference.arm import LARGEST as LARGEST_ARM
 from strapdown.formats.inference.arm import Arm, fit_arm
 from strapdown.formats.inference.clock import (
     infer_rate,
@@ -187,7 +188,8 @@ def _arm(signals: Signals, step: float | None) -> Arm | None:
     if step is None or signals.gyro is None or signals.accel is None:
         return None
     kept = np.isfinite(signals.gyro).all(axis=1) & np.isfinite(signals.accel).all(axis=1)
-    return fit_arm(step, signals.gyro[kept], signals.accel[kept])
+    first = np.flatnonzero(kept)[:LARGEST_ARM]
+    return fit_arm(step, signals.gyro[first], signals.accel[first])
 
 
 def _doubted(one: Inference, arm: Arm) -> Inference:

@@ -187,7 +187,11 @@ def _evidence(
         told.append("no turn of gravity to hold the gyro against")
     if unit is not None:
         told.append(
-            f"99 % of the rates are below {largest:.4g}, "
-            f"{np.degrees(largest * GYRO_UNITS[unit]):.4g} deg/s in {unit}"
+            f"99 % of the rates are below {largest:.4g}"
+            + (
+                f", in {unit} {np.degrees(largest * GYRO_UNITS[unit]):.4g} deg/s"
+                if unit != "deg/s"
+                else ""
+            )
         )
     return tuple(told)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from strapdown.attitude import EulerKrylov
 from strapdown.increments import increments_from_imu
+from strapdown.rotation import within_half_turn
 from strapdown.simulation import simulate_imu
 from strapdown.systems.alexiev.fig4 import NUMBERS
 from strapdown.systems.alexiev.sampling import NONE, scenario_motion
@@ -77,7 +78,7 @@ def approach(rate: float, step: str = "forward") -> Approach:
     _, history = algorithm.advance(start, increments_from_imu(imu))
     known = truth[["roll", "pitch", "heading"]].to_numpy()[1:]
     off = np.degrees(history) - known
-    off = np.abs((off + 180.0) % 360.0 - 180.0)
+    off = np.abs(within_half_turn(off))
     top = int(np.argmax(known[:, 1])) + 1
     first = int(np.argmax(known[:, 1] > 0.0))
     turning = slice(first, top)

@@ -140,8 +140,13 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
     if not back.size:
         return
     k = int(back[0]) + 1
+    stays = stamps[k] == stamps[k - 1]
     raise DataError(
-        f"time goes from {stamps[k - 1]:.9g} to {stamps[k]:.9g}"
+        (
+            f"time stays at {stamps[k]:.15g}"
+            if stays
+            else f"time goes from {stamps[k - 1]:.15g} to {stamps[k]:.15g}"
+        )
         + (f" ({back.size} times such)" if back.size > 1 else ""),
         file=channel.file or None,
         row=channel.row(k),

@@ -15,6 +15,7 @@ from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_
 from strapdown.crash.velocity_change import EventChanges, VelocityChange
 from strapdown.earth import gravity
 from strapdown.exceptions import DataError
+from strapdown.rotation import within_half_turn
 from strapdown.sensors.synchronise import synchronise
 from strapdown.systems.crash_trials.exact_answers import ExactAnswers
 from strapdown.systems.crash_trials.trial_case import TrialCase
@@ -173,7 +174,7 @@ def _direction(change: VelocityChange, true: Array, frame: str) -> dict[str, Jud
     else:
         over, under = ned_pdof(change.delta_v, 0.0), ned_pdof(true, 0.0)
         angles = over.azimuth_deg, under.azimuth_deg
-    error = (angles[0] - angles[1] + 180.0) % 360.0 - 180.0
+    error = float(within_half_turn(np.array(angles[0] - angles[1])))
     interval = change.interval.horizontal
     sd = 0.5 * interval.width_deg / TWO_SIDED_95
     name = f"{frame} {change.window} direction"

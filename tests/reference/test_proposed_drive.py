@@ -1,0 +1,80 @@
+"""A recorded drive by the chain that is proposed for it: its pitch is that of the road, and more.
+
+What is proposed goes by the recording alone. There is no truth of the attitude; but a car's axis
+lies along the road, so that pitch less the slope of its way is the mounting of the unit, -6.8 deg
+as the recording's description has it, to what springs and the distance of the axles make.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown.config.alignment import LogTable
+from strapdown.config.navigation_file import navigation_spec
+from strapdown.evaluation.smoother_consistency import smoother_consistency
+from strapdown.frames import place_difference
+from strapdown.systems.sins.proposal import propose
+from strapdown.systems.sins.run import run_navigation
+from strapdown.tables import GEODETIC
+
+MOUNTING = -6.8
+#: The way before and after that its slope is of, m: about the distance of the axles.
+WAY = 2.0
+#: The body on its springs against the road, deg.
+SPRINGS = 0.7
+
+
+@pytest.fixture(scope="module", params=["mpu-6050", "icm-42688-p"])
+def result(request, recordings):
+    folder = recordings("car_rtk")
+    made = propose(
+        LogTable(path=str(folder / "part1_imu_frd_si.csv")),
+        gnss=folder / "part1_gnss_rtk.csv",
+        sensor=request.param,
+    )
+    table = {"name": "drive", **made.table, "smoother": "rts"}
+    table["aiding"]["wheels"] = {"kind": "no_slip", "mounting_sd_deg": (6.0, 6.0)}
+    return made, run_navigation(navigation_spec(table))
+
+
+def slopes(fixes):
+    """Time, speed and slope of the way in deg where fixes are fixed."""
+    place = fixes[GEODETIC].to_numpy()
+    apart = place_difference(place, place[0])
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(apart[:, :2], axis=0).T))])
+    height = place[:, 2]
+    rise = np.interp(way + WAY, way, height) - np.interp(way - WAY, way, height)
+    speed = np.gradient(way, fixes.index.to_numpy())
+    good = (speed > 2.0) & (fixes["quality"].to_numpy() == 4)
+    return fixes.index.to_numpy()[good], np.degrees(np.arctan2(rise, 2.0 * WAY))[good]
+
+
+def test_the_pitch_is_that_of_the_road_within_its_bound(result):
+    made, run = result
+    offset = made.table["aiding"]["gnss"]["time_offset_s"]
+    for record in (run.forward, run.record):
+        trajectory, sd = record.trajectory, record.sd
+        time, slope = slopes(made.gnss)
+        at = time - offset
+        within = (at > trajectory.index[0]) & (at < trajectory.index[-1])
+        at, slope = at[within], slope[within]
+        pitch = np.interp(at, trajectory.index, trajectory["pitch"])
+        told = np.hypot(np.interp(at, sd.index, sd["pitch"]), SPRINGS)
+        off = pitch - slope - MOUNTING
+        # Down a ramp of 10 deg in the first ten seconds: it is the road, and no error.
+        assert slope.min() < -8.0
+        assert (np.abs(off) < 1.96 * told).mean() > 0.95
+        assert np.sqrt(np.mean(off**2)) < 1.0
+    # The clock of these sensors runs apart from the receiver's.
+    assert made.table["aiding"]["gnss"]["time_offset_drift_s_per_sqrt_s"] > 0.0
+
+
+def test_later_fixes_bear_out_what_the_filter_told(result):
+    _, run = result
+    found = smoother_consistency(run.forward, run.record)
+    share = dict(zip(found.columns, found.share, strict=True))
+    # 62 and 57 % of the east without a clock that drifts. One of a hundred is left to fixes
+    # whose errors last for many epochs.
+    assert min(share.values()) > 0.92, share
+    assert share["pitch"] > 0.98
