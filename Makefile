@@ -7,13 +7,14 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds check format bench docs messages statements pictures clean
+.PHONY: demo test test-slow test-bounds examples check format bench docs messages statements pictures clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo       install into $(VENV) and run strapdown on built-in data"
 	@echo "make test       install into $(VENV) and run the tests"
 	@echo "make test-slow  the tests that take more than 20 s each"
+	@echo "make examples   the longer examples of the manual: each prints what its page shows"
 	@echo "make check      ruff, format, mypy, import-linter"
 	@echo "make bench      speed and memory as ratios against named alternatives"
 	@echo "make docs       the manual, into docs/_build"
@@ -41,6 +42,9 @@ test: $(VENV)/.test
 
 test-slow: $(VENV)/.test
 	@$(FRESH) $(PYTEST) -m slow
+
+examples: $(VENV)/.test
+	@$(FRESH) $(PYTEST) -n 2 -m slow tests/cli/test_manual.py
 
 test-bounds: $(VENV)/.test
 	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts

@@ -1,14 +1,17 @@
 """Run every example of the manual and compare what it prints with what is written.
 
 ``python docs/run_examples.py`` says where they differ; ``--write`` puts what was printed into the
-pages. Each page has a temporary folder of its own, in which its examples run in order; the files of
-``examples`` are in it under that name. A line
-that is ``…`` alone stands for any number of lines, and ``…`` in a line for any text. Recordings
-are looked for where STRAPDOWN_DATA points; a page that needs them is left out without it.
+pages; ``--list`` says what of each page is run, and what is not and why. Each page has a temporary
+folder of its own, in which its examples run in order; the files of ``examples`` are in it under
+that name. A line that is ``…`` alone stands for any number of lines, and ``…`` in a line for any
+text. Recordings are looked for where STRAPDOWN_DATA points; a page that needs them is left out
+without it.
 
-The pages in ``notebooks`` are notebooks kept as text (jupytext's form "myst"). Their cells run in
-order in one Python process; what a cell prints, and the value of its last line, is compared with
-the ``text`` block under it.
+``console`` blocks are commands and what they print. ``python`` blocks, and the cells of pages that
+are notebooks kept as text (jupytext's form "myst"), run after them in order in one Python process;
+what one prints, and of a cell the value of its last line, is compared with the ``text`` block under
+it.
+What cannot run has its reason above it, in a comment: ``<!-- not run: REASON -->``.
 """
 
 from __future__ import annotations
@@ -23,22 +26,26 @@ import tempfile
 from pathlib import Path
 
 HERE = Path(__file__).parent
-BLOCK = re.compile(r"^```console\n(.*?)^```$", re.M | re.S)
-CELL = re.compile(
-    r"^```\{code-cell\} ipython3\n(?P<code>.*?)^```\n(?P<shown>\n```text\n(?P<out>.*?)^```\n)?",
+# A block that is an example, what it prints where that is in a block of its own, and why it is
+# not run, where it is not.
+BLOCK = re.compile(
+    r"^(?P<mark><!-- not run: (?P<reason>.+?) -->\n)?"
+    r"^```(?P<kind>console|python|sh|bash|\{code-cell\} ipython3)\n(?P<code>.*?)^```\n"
+    r"(?P<shown>\n```text\n(?P<out>.*?)^```\n)?",
     re.M | re.S,
 )
-# Runs the cells that it is given as JSON; tells what each printed, and where one failed.
+# Runs the code that it is given as JSON, each with whether it is a cell, whose last value is shown;
+# tells what each printed, and where one failed.
 RUNNER = """
 import ast, contextlib, io, json, sys, traceback
 space, printed = {"__name__": "__main__"}, []
-for code in json.load(sys.stdin):
+for code, is_cell in json.load(sys.stdin):
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         try:
             body = ast.parse(code)
             last = body.body[-1] if body.body else None
-            value = isinstance(last, ast.Expr)
+            value = is_cell and isinstance(last, ast.Expr)
             if value:
                 body.body.pop()
             exec(compile(body, "cell", "exec"), space)
@@ -110,8 +117,8 @@ def trimmed(expected: list[str], printed: list[str]) -> list[str]:
     return ["…"] * (first > 0) + printed[first:last] + ["…"] * (last < len(printed))
 
 
-def run_cells(cells: list[str], folder: Path) -> list[list[str]]:
-    """Return the lines that each cell prints, run in order in one process."""
+def run_cells(cells: list[tuple[str, bool]], folder: Path) -> list[list[str]]:
+    """Return the lines that each piece of code prints, run in order in one process."""
     done = subprocess.run(
         [sys.executable, "-c", RUNNER],
         cwd=folder,
@@ -128,64 +135,95 @@ def run_cells(cells: list[str], folder: Path) -> list[list[str]]:
     return found
 
 
-def check_notebook(page: Path, write: bool) -> int:
-    """Run the cells of a notebook kept as text; return how many print something else."""
-    text = page.read_text(encoding="utf-8")
-    blocks = list(CELL.finditer(text))
-    with tempfile.TemporaryDirectory() as folder:
-        printed = run_cells([b["code"] for b in blocks], Path(folder))
-    differ, pieces, last = 0, [], 0
-    for block, lines in zip(blocks, printed, strict=True):
-        good = same((block["out"] or "").splitlines(), lines)
-        pieces.append(text[last : block.start()])
-        last = block.end()
-        if good:
-            pieces.append(block[0])
-            continue
-        differ += 1
-        print(f"{page.name}: {block['code']}" + "\n".join(f"  {line}" for line in lines))
-        cell = block[0][: len(block[0]) - len(block["shown"] or "")]
-        shown = "\n```text\n" + "".join(f"{line}\n" for line in lines) + "```\n"
-        pieces.append(cell + (shown if lines else ""))
-    if write and differ:
-        page.write_text("".join([*pieces, text[last:]]), encoding="utf-8")
-    return differ
+def examples(page: Path) -> list[re.Match[str]]:
+    """Return the blocks of a page that are examples, in order."""
+    return list(BLOCK.finditer(page.read_text(encoding="utf-8")))
+
+
+def is_run(block: re.Match[str]) -> bool:
+    """Say whether a block is run: it is not where it says why, nor where nothing can run it."""
+    return block["reason"] is None and block["kind"] not in ("sh", "bash")
+
+
+def mend_console(block: re.Match[str], folder: Path, page: Path) -> str | None:
+    """Run the commands of a block; return it as it should be, None where it is."""
+    lines, differ = [], False
+    for command, expected in commands(block["code"]):
+        printed = run(command, folder)
+        good = same(expected, printed)
+        if not good:
+            differ = True
+            print(f"{page.name}: $ {command}\n" + "\n".join(f"  {line}" for line in printed))
+        lines += [f"$ {command}", *(expected if good else trimmed(expected, printed))]
+    rest = block["shown"] or ""
+    return "```console\n" + "\n".join(lines) + "\n```\n" + rest if differ else None
+
+
+def mend_cell(block: re.Match[str], printed: list[str], page: Path) -> str | None:
+    """Return a block of Python with what it printed under it, None where that is so."""
+    if same((block["out"] or "").splitlines(), printed):
+        return None
+    print(f"{page.name}: {block['code']}" + "\n".join(f"  {line}" for line in printed))
+    cell = block[0][: len(block[0]) - len(block["shown"] or "")]
+    shown = "\n```text\n" + "".join(f"{line}\n" for line in printed) + "```\n"
+    return cell + (shown if printed else "")
 
 
 def check(page: Path, write: bool) -> int:
-    """Run the examples of one page; return how many differ."""
+    """Run the examples of one page; return how many blocks differ."""
     text = page.read_text(encoding="utf-8")
     needs = "$STRAPDOWN_DATA/" in text or 'environ["STRAPDOWN_DATA"]' in text
     if needs and not os.environ.get("STRAPDOWN_DATA"):
         return 0
-    if CELL.search(text):
-        return check_notebook(page, write)
-    blocks = list(BLOCK.finditer(text))
-    if not blocks:
-        return 0
-    differ, pieces, last = 0, [], 0
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(HERE / "examples", Path(folder) / "examples")
-        for match in blocks:
-            lines = []
-            for command, expected in commands(match.group(1)):
-                printed = run(command, Path(folder))
-                good = same(expected, printed)
-                if not good:
-                    differ += 1
-                    print(f"{page.name}: $ {command}\n" + "\n".join(f"  {p}" for p in printed))
-                lines += [f"$ {command}", *(expected if good else trimmed(expected, printed))]
-            pieces += [text[last : match.start(1)], "\n".join(lines) + "\n"]
-            last = match.end(1)
-    if write and differ:
+    blocks = [block for block in examples(page) if is_run(block)]
+    cells = [block for block in blocks if block["kind"] != "console"]
+    mended: dict[int, str] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copytree(HERE / "examples", folder / "examples")
+        for block in blocks:
+            if block["kind"] == "console":
+                found = mend_console(block, folder, page)
+                if found is not None:
+                    mended[block.start()] = found
+        codes = [(block["code"], block["kind"] != "python") for block in cells]
+        printed = run_cells(codes, folder) if codes else []
+    for block, lines in zip(cells, printed, strict=True):
+        found = mend_cell(block, lines, page)
+        if found is not None:
+            mended[block.start()] = found
+    if write and mended:
+        pieces, last = [], 0
+        for block in blocks:
+            pieces += [text[last : block.start()], mended.get(block.start(), block[0])]
+            last = block.end()
         page.write_text("".join([*pieces, text[last:]]), encoding="utf-8")
-    return differ
+    return len(mended)
+
+
+def listed(page: Path) -> str:
+    """Say in a line how much of a page is run, and in others what is not."""
+    blocks = examples(page)
+    done = [block["kind"].split("}")[0].strip("{") for block in blocks if is_run(block)]
+    counted = ", ".join(f"{done.count(kind)} {kind}" for kind in sorted(set(done)))
+    left = [
+        f"    not run: {(block['reason'] or '?')}: {block['code'].splitlines()[0]}"
+        for block in blocks
+        if not is_run(block)
+    ]
+    return "\n".join([f"{page.name}: {counted or 'nothing to run'}", *left])
+
+
+def pages() -> list[Path]:
+    """Return every page whose examples are run here."""
+    # What is said about bad input has files of its own, and is held by the tests.
+    kept = [page for page in sorted(HERE.glob("*.md")) if page.name != "messages.md"]
+    return [*kept, *sorted(HERE.glob("notebooks/*.md"))]
 
 
 if __name__ == "__main__":
-    pages = [Path(a) for a in sys.argv[1:] if a != "--write"] or [
-        # What is said about bad input has files of its own, and is held by the tests.
-        *(page for page in sorted(HERE.glob("*.md")) if page.name != "messages.md"),
-        *sorted(HERE.glob("notebooks/*.md")),
-    ]
-    sys.exit(1 if sum(check(page, "--write" in sys.argv) for page in pages) else 0)
+    chosen = [Path(a) for a in sys.argv[1:] if not a.startswith("--")] or pages()
+    if "--list" in sys.argv:
+        print("\n".join(listed(page) for page in chosen))
+        sys.exit(0)
+    sys.exit(1 if sum(check(page, "--write" in sys.argv) for page in chosen) else 0)
