@@ -22,8 +22,8 @@ from strapdown.cli.log_options import (
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from strapdown.config.toml_text import Asked
     from strapdown.exceptions import Finding
-    from strapdown.systems.crash_draft.toml_text import Asked
 
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"

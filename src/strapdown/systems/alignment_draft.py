@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass
 from pathlib import Path
@@ -12,12 +11,12 @@ import numpy as np
 
 from strapdown.config.alignment_file import MAY_BE_EMPTY, STAGES
 from strapdown.config.slots import SLOTS, Slot, options_of
+from strapdown.config.toml_text import ASK, Asked, Page, inline, number, string
 from strapdown.exceptions import Finding
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.recording import Recording
 from strapdown.sensors.axes_matrix import NAMED_AXES
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, inline, number, string
 
 __all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "toml_value"]
 
@@ -93,7 +92,7 @@ def _log(
     rate = 1.0 / float(np.median(np.diff(time)))
     span = f"{len(time)} samples, {time[0]:.6g} to {time[-1]:.6g} s, {rate:.4g} Hz"
     page.table("[log]", f"Found: {span}, {recording.imu.attrs['sampling']} values.")
-    page.key("path", string(_from(log, folder)), "from the folder of this file")
+    page.path("path", log, folder)
     if options.columns:
         page.key("columns", inline(options.columns))
     for key, value in (
@@ -112,13 +111,6 @@ def _log(
         f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone, where the body stands"
     )
     return [f"{recording.name}: {span}"]
-
-
-def _from(path: Path, folder: Path) -> str:
-    try:
-        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
-    except ValueError:  # on another drive
-        return path.absolute().as_posix()
 
 
 def _site(page: Page, recording: Recording) -> list[str]:

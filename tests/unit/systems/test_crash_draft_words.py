@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from strapdown.config.toml_text import ASK, Page, array, inline, number, plain, string
 from strapdown.systems.crash_draft.header_words import read_heading
-from strapdown.systems.crash_draft.toml_text import ASK, Page, array, inline, number, plain, string
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from strapdown.config.toml_text import ASK, Page, array, number, plain, string
 from strapdown.crash.event_rule import KMH
 from strapdown.formats.crash_units import FACTORS
 from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import Facing, direction
 from strapdown.systems.crash_draft.parts import Skipped
-from strapdown.systems.crash_draft.toml_text import ASK, Page, array, number, plain, string
 
 __all__ = [
     "agreement",

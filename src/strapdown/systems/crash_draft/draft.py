@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from strapdown.config.toml_text import Asked, Page, instant, plain
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.event_rule import KMH
 from strapdown.exceptions import Finding
@@ -21,7 +22,6 @@ from strapdown.systems.crash_draft.group_units import Unit
 from strapdown.systems.crash_draft.heading_of_unit import facings
 from strapdown.systems.crash_draft.known_path import KnownPath, reference_tables
 from strapdown.systems.crash_draft.parts import Skipped
-from strapdown.systems.crash_draft.toml_text import Asked, Page, instant, plain
 from strapdown.systems.crash_draft.unit_tables import unit_tables
 
 __all__ = ["Draft", "write_draft"]

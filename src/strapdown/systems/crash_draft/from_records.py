@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from strapdown.config.toml_text import named_from
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
@@ -84,7 +84,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     findings: list[Finding] = []
     paths: list[KnownPath] = []
     for record in records:
-        path = _from(record.path, Path(folder))
+        path = named_from(record.path, Path(folder))
         # What the reader concluded of the clock is stated in the case.
         findings += [f for f in record.findings if f.quantity != "time"]
         known = known_path(path, record)
@@ -104,14 +104,6 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     facts = next((r.facts for r in records if r.facts), {})
     title = next((r.title for r in records if r.facts and r.title), "")
     return write_draft(units, skipped, title=title, facts=facts, findings=findings, paths=paths)
-
-
-def _from(path: Path, folder: Path) -> str:
-    """How a case in a folder names a file: with slashes, from there where it can."""
-    try:
-        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
-    except ValueError:  # another drive
-        return path.absolute().as_posix()
 
 
 def _nothing(

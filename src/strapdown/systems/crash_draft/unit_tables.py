@@ -5,14 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from strapdown.crash.event_rule import KMH
-from strapdown.formats.crash_units import FACTORS
-from strapdown.systems.crash_draft.group_units import Unit
-from strapdown.systems.crash_draft.heading_of_unit import Facing, direction, side_of
-from strapdown.systems.crash_draft.parts import Part
-from strapdown.systems.crash_draft.range_ends import RangeEnds, in_words
-from strapdown.systems.crash_draft.stated_errors import stated_of
-from strapdown.systems.crash_draft.toml_text import (
+from strapdown.config.toml_text import (
     ASK,
     Page,
     array,
@@ -22,6 +15,13 @@ from strapdown.systems.crash_draft.toml_text import (
     plain,
     string,
 )
+from strapdown.crash.event_rule import KMH
+from strapdown.formats.crash_units import FACTORS
+from strapdown.systems.crash_draft.group_units import Unit
+from strapdown.systems.crash_draft.heading_of_unit import Facing, direction, side_of
+from strapdown.systems.crash_draft.parts import Part
+from strapdown.systems.crash_draft.range_ends import RangeEnds, in_words
+from strapdown.systems.crash_draft.stated_errors import stated_of
 from strapdown.systems.crash_draft.turn_after import LEAST_TURN, in_turn_words, turn_after
 
 __all__ = ["unit_tables"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,13 +11,13 @@ from typing import Any
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import NAVIGATION_STAGES
 from strapdown.config.slots import SLOTS, Slot, options_of
+from strapdown.config.toml_text import ASK, Asked, Page, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.stated_states import STATED_STATES
 from strapdown.exceptions import Finding
 from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.systems.alignment_draft import listed_kinds, toml_value
-from strapdown.systems.crash_draft.toml_text import ASK, Asked, Page, string
 from strapdown.systems.sins.foot import HERE, STILL, on_foot
 from strapdown.systems.sins.proposal import Proposal, propose
 from strapdown.tables.checks import index_of
@@ -117,18 +116,11 @@ def _log(page: Page, made: Proposal, folder: Path) -> list[str]:
     page.table("[log]", f"Found: {span}, {made.imu.attrs['sampling']} values.")
     for key, value in made.table["log"].items():
         if key == "path":
-            page.key("path", string(_from(Path(value), folder)), "from the folder of this file")
+            page.path("path", Path(value), folder)
         elif value not in (False, {}):
             page.key(key, _inline(value))
     page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
     return [f"{made.recording.name}: {span}"]
-
-
-def _from(path: Path, folder: Path) -> str:
-    try:
-        return Path(os.path.relpath(path.absolute(), folder.absolute())).as_posix()
-    except ValueError:  # on another drive
-        return path.absolute().as_posix()
 
 
 def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
@@ -326,7 +318,7 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         page.table(f"[aiding.{name}]")
         page.key("kind", string(aid["kind"]))
         if "path" in aid:
-            page.key("path", string(_from(Path(aid["path"]), folder)))
+            page.key("path", string(named_from(Path(aid["path"]), folder)))
             _with_remarks(page)
         if "position_sd_m" in aid:
             page.key(

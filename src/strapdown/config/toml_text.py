@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import os
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
-__all__ = ["ASK", "Asked", "Page", "array", "inline", "instant", "number", "plain", "string"]
+__all__ = [
+    "ASK",
+    "Asked",
+    "Page",
+    "array",
+    "inline",
+    "instant",
+    "named_from",
+    "number",
+    "plain",
+    "string",
+]
 
 #: What stands where only a person knows the value.
 ASK = '"?"'
@@ -37,6 +50,22 @@ def _escaped(c: str) -> str:
     if not c.isprintable():
         return f"\\u{code:04X}" if code <= 0xFFFF else f"\\U{code:08X}"
     return c
+
+
+def named_from(path: Path, folder: Path) -> str:
+    """How a file in a folder names another, with slashes.
+
+    From there, that both may be moved together; as a whole where they share no folder but the
+    root, for such a way tells a reader nothing.
+    """
+    whole, start = path.absolute(), folder.absolute()
+    try:
+        shared = Path(os.path.commonpath([whole, start]))
+    except ValueError:  # on another drive
+        return whole.as_posix()
+    if shared == shared.parent != start:
+        return whole.as_posix()
+    return Path(os.path.relpath(whole, start)).as_posix()
 
 
 def plain(text: str) -> str:
@@ -112,6 +141,19 @@ class Page:
         """A blank line, never two."""
         if self.lines and self.lines[-1]:
             self.lines.append("")
+
+    def path(self, name: str, path: Path, folder: Path) -> None:
+        """A key that names a file; its remark is above, that lines stay where they are.
+
+        Parameters
+        ----------
+        name : str
+        path : Path
+        folder : Path
+            Of the file that is written.
+        """
+        self.say("from the folder of this file, or whole")
+        self.key(name, string(named_from(path, folder)))
 
     def key(
         self, name: str, value: str, remark: str = "", *, what: str = "", check: str = ""
