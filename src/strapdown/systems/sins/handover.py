@@ -86,8 +86,10 @@ def from_alignment(
     joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
     if found.joint is not None:
         joint[3:, 3:] = found.joint
-        joint[:3, 3:6] = P[:3, 3:6]
-        joint[3:6, :3] = P[3:6, :3]
+        # What is wrong of the velocity moved the place since its fix, and with it goes whatever
+        # the alignment knows to go with the velocity.
+        joint[:3, 3:] = np.linalg.solve(P[3:, 3:], P[3:, :3]).T @ found.joint[:3]
+        joint[3:, :3] = joint[:3, 3:].T
     told = np.concatenate([found.gyro_bias, found.accel_bias])
     return _with_biases(filter_, start, joint, told, rest, by_others)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
+from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.site import Site
@@ -206,3 +207,37 @@ def test_a_levelled_tilt_goes_with_the_accelerometers_that_made_it(method):
     assert left == pytest.approx(0.0, abs=0.03 * ACCEL_SD)
     assert np.sqrt(np.diagonal(P))[6:8] * 9.81 == pytest.approx(ACCEL_SD, rel=0.01)
     assert np.linalg.eigvalsh(P[6:15, 6:15]).min() > -1e-12
+
+
+@pytest.mark.parametrize("after", [0.0, 0.2, 1.5])
+def test_a_place_that_was_carried_goes_with_all_that_goes_with_the_velocity(after):
+    root = (
+        np.random.default_rng(5).normal(size=(12, 12))
+        * np.repeat([0.1, 0.02, 1e-3, 0.1], 3)[:, None]
+    )
+    known = root @ root.T
+    found = Alignment(
+        method="gnss_course",
+        time=0.0,
+        q_nb=rotation.quaternion_from_euler([1.0, -2.0, 60.0]),
+        covariance=known[3:6, 3:6],
+        gyro_bias=np.zeros(3),
+        accel_bias=np.zeros(3),
+        gyro_bias_sd=np.sqrt(np.diagonal(known)[6:9]),
+        accel_bias_sd=np.sqrt(np.diagonal(known)[9:]),
+        velocity=np.zeros(3),
+        joint=known,
+    )
+    fix = np.diag([1e-4, 2e-4, 4e-4])
+    # The place is a fix, whose error is its own, and the velocity times the time since.
+    carried = np.zeros((15, 15))
+    carried[3:, 3:] = known
+    carried[:3, 3:] = after * known[:3]
+    carried[3:, :3] = carried[:3, 3:].T
+    carried[:3, :3] = fix + after**2 * known[:3, :3]
+    filter_ = made()
+    start = NavState.from_degrees(*HERE, time=0.0)
+    begun = from_alignment(filter_, found, start, carried[:6, :6], np.r_[np.zeros(5), -9.81])
+    told = in_ned(filter_, begun)
+    sd = np.sqrt(np.diagonal(carried))
+    assert told / sd / sd[:, None] == pytest.approx(carried / sd / sd[:, None], abs=1e-9)
