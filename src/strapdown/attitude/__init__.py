@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown._kernels.increments import LARGEST
 from strapdown.attitude.algorithm import AttitudeAlgorithm, Steps, steps_of
 from strapdown.attitude.direction_cosine import DirectionCosine
 from strapdown.attitude.euler_krylov import EulerKrylov
@@ -107,7 +108,7 @@ def _option(name: str, key: str, value: str, default: object) -> object:
 
 def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64]) -> None:
     """Say where a truncated series grew beyond what can be squared."""
-    bad = np.flatnonzero(~(np.abs(history) < rotation.LARGEST).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
     if bad.size:
         raise DivergenceError(
             "its numbers left the range of floating point",
