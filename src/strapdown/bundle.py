@@ -22,7 +22,7 @@ from secrets import token_hex
 from typing import Any
 
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 
 __all__ = [
     "Seal",

@@ -19,7 +19,7 @@ from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.exceptions import ConfigError, DivergenceError, nearest
-from strapdown.results import AttitudeRun
+from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 
 __all__ = [

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.results import AttitudeRun
+from strapdown.results.runs import AttitudeRun
 from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.tables import QUATERNION
 

@@ -27,7 +27,7 @@ from strapdown.formats.plausibility import report_absurd, report_gaps
 from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
 from strapdown.formats.stamps import Stamps, read_stamps
 from strapdown.formats.summed import OPEN, SUMS, intervals, sampling_of_sums
-from strapdown.results import Reading
+from strapdown.results.inputs import Reading
 from strapdown.tables import SAMPLINGS, imu_table
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import Origin, RawLog, ReadOptions
 from strapdown.formats.stamps import read_stamps
-from strapdown.results import Reading
+from strapdown.results.inputs import Reading
 from strapdown.tables import attitude_table
 
 Array = NDArray[np.float64]

@@ -16,7 +16,7 @@ from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_json import attitude_json
 from strapdown.report.attitude_page import attitude_page
 from strapdown.report.svg_chart import draw
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.tables import EULER, QUATERNION
 
 __all__ = ["attitude_json", "attitude_page", "write_attitude"]

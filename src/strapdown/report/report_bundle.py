@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from strapdown.bundle import Seal, write_bundle
 from strapdown.config.spec import Spec
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 
 __all__ = ["report_bundle"]
 

@@ -19,7 +19,8 @@ from strapdown.evaluation.place_scores import score_places
 from strapdown.evaluation.reference_points import score_references
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeBench, RestStretch
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.rests import RestStretch
 from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_answer import Evidence, find_answer

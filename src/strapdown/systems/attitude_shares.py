@@ -18,7 +18,8 @@ from strapdown.attitude import (
 from strapdown.attitude.single import run_single, single_increments
 from strapdown.evaluation.known import Errors, Known, angles_to_errors
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeRun, Share
+from strapdown.results.answer import Share
+from strapdown.results.runs import AttitudeRun
 from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.tables import QUATERNION
 

@@ -18,7 +18,7 @@ from strapdown.formats import read_log
 from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.increments import increments_from_imu
-from strapdown.results import InputFiles, Reading
+from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
