@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.attitude import Quaternion, run_attitude
-from strapdown.bundle import sha256
+from strapdown.bundle.seal import sha256
 from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
 from strapdown.evaluation.differences import error_angles
 from strapdown.exceptions import ConfigError, DataError, Finding
