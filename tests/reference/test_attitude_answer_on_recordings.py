@@ -10,6 +10,7 @@ import pytest
 from strapdown import bench_attitude, rotation
 from strapdown.attitude import attitude_history, make_algorithm
 from strapdown.increments import increments_from_imu
+from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.tables import QUATERNION, THETA
 
 TRIALS = [
@@ -42,7 +43,7 @@ def test_the_matrix_alone_loses_what_its_axis_turned_within_the_steps(recordings
         attitude_history(make_algorithm(text), increments, q[0])
         for text in ("rotvec:samples=1", "rotvec:samples=4,coefficients=fit")
     )
-    left = 5 * rotation.unit_rotation_angle(one, four).max()
+    left = 5 * unit_rotation_angle(one, four).max()
     assert left < 0.1 * expected.max()
     final, rms, largest = matrix.own_deg
     assert final == pytest.approx(expected[-1], abs=left)

@@ -8,7 +8,8 @@ import shutil
 import pytest
 
 from strapdown import bench_attitude, simulate, verify, write_attitude
-from strapdown.bundle import MANIFEST, sha256, write_bundle
+from strapdown.bundle import sha256, write_bundle
+from strapdown.bundle.seal import MANIFEST
 from strapdown.exceptions import ConfigError, DataError
 
 pytestmark = pytest.mark.usefixtures("sketched_module")
@@ -162,7 +163,7 @@ def test_a_folder_that_is_no_bundle_is_never_touched(log, tmp_path, force):
 
 
 def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypatch):
-    monkeypatch.setattr("strapdown.bundle.COPY_LIMIT", 10)
+    monkeypatch.setattr("strapdown.bundle.manifest.COPY_LIMIT", 10)
     source = shutil.copy(log, tmp_path / "mine.csv")
     seal = write_attitude(bench_attitude(source), tmp_path / "out")
     assert not (seal.path / "inputs").exists()

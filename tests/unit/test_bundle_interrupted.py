@@ -8,15 +8,24 @@ import sys
 
 import pytest
 
-import strapdown.bundle as module
-from strapdown.bundle import read_manifest, unsealed_changes, write_bundle
+from strapdown.bundle import (
+    configuration_paths,
+    manifest,
+    read_manifest,
+    seal,
+    sha256,
+    unsealed_changes,
+    write_bundle,
+    writing,
+)
 from strapdown.results import InputFiles
 
-NAMES = {"write_bundle", "_manifest", "_move", "_files", "_replace_paths"}
+NAMES = {"write_bundle", "make_manifest", "_keep", "_place", "_move", "files_of", "with_paths"}
+FILES = {m.__file__ for m in (configuration_paths, manifest, seal, writing)}
 
 
 def write(out, given, text, *, force=False):
-    inputs = (InputFiles("record", given, (given,), (module.sha256(given),)),)
+    inputs = (InputFiles("record", given, (given,), (sha256(given),)),)
     with write_bundle(
         out, command="none", configuration={"text": text}, inputs=inputs, force=force, seals=[]
     ) as folder:
@@ -39,7 +48,7 @@ def at_line(number, act):
 
     def outer(frame, event, argument):
         code = frame.f_code
-        return inner if code.co_filename == module.__file__ and code.co_name in NAMES else None
+        return inner if code.co_filename in FILES and code.co_name in NAMES else None
 
     return outer
 
@@ -55,7 +64,7 @@ def lines(run):
 
     def outer(frame, event, argument):
         code = frame.f_code
-        return tell if code.co_filename == module.__file__ and code.co_name in NAMES else None
+        return tell if code.co_filename in FILES and code.co_name in NAMES else None
 
     traced(outer, run)
     return count
@@ -83,8 +92,8 @@ def given(tmp_path):
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(module, "versions", dict)
-    monkeypatch.setattr(module, "machine", dict)
+    monkeypatch.setattr(manifest, "versions", dict)
+    monkeypatch.setattr(manifest, "machine", dict)
 
 
 def whole(folder):

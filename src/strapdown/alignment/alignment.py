@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import Finding
+from strapdown.rotation.euler_angles import euler_sd
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ class Alignment:
 
         Near a pitch of ±90° those of roll and heading grow without bound.
         """
-        return rotation.euler_sd(self.roll_pitch_heading, self.covariance)
+        return euler_sd(self.roll_pitch_heading, self.covariance)
 
     def sd_deg_after(self, seconds: float) -> Array:
         """Standard deviations of roll, pitch and heading when the gyros have carried them on.
@@ -93,4 +94,4 @@ class Alignment:
         carry = np.zeros((3, len(self.joint)))
         carry[:, 3:6] = np.eye(3)
         carry[:, 6:9] = rotation.dcm_from_quaternion(self.q_nb) * seconds
-        return rotation.euler_sd(self.roll_pitch_heading, carry @ self.joint @ carry.T)
+        return euler_sd(self.roll_pitch_heading, carry @ self.joint @ carry.T)

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.course_fixes import CourseFixes
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.rest import rest_between
 from strapdown.sensors.shaking_rest import find_rests_of_every_grade

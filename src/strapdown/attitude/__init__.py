@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown._kernels.increments import LARGEST
 from strapdown.attitude.algorithm import AttitudeAlgorithm, Steps, steps_of
 from strapdown.attitude.direction_cosine import DirectionCosine
 from strapdown.attitude.euler_krylov import EulerKrylov
@@ -18,7 +19,7 @@ from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.exceptions import ConfigError, DivergenceError, nearest
-from strapdown.results import AttitudeRun
+from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 
 __all__ = [
@@ -107,7 +108,7 @@ def _option(name: str, key: str, value: str, default: object) -> object:
 
 def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64]) -> None:
     """Say where a truncated series grew beyond what can be squared."""
-    bad = np.flatnonzero(~(np.abs(history) < rotation.LARGEST).all(axis=1))
+    bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
     if bad.size:
         raise DivergenceError(
             "its numbers left the range of floating point",

@@ -13,7 +13,7 @@ from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude.algorithm import AttitudeAlgorithm
 from strapdown.constants import CORTEX_M4F_CYCLES
-from strapdown.results import Cost
+from strapdown.results.answer import Cost
 
 STEPS = 12
 TURN = 0.01

@@ -10,7 +10,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike
 
 from strapdown import rotation
-from strapdown._kernels.increments import HEAD, MEAN, OPTIONS, SAMPLES, TIME
+from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
 from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.tables import SAMPLINGS
@@ -99,7 +99,7 @@ class AttitudeTracker:
             )
         raise DataError(
             f"time {time}, rate {np.asarray(gyro).tolist()}: a time and three finite rates below "
-            f"{rotation.LARGEST:g} rad/s are needed",
+            f"{LARGEST:g} rad/s are needed",
             row=int(self._record[SAMPLES]) + 1,
             quantity="gyro",
             remedy="leave the sample out; the attitude is as before it",

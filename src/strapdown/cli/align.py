@@ -125,7 +125,8 @@ def align(
     drifts and biases; the report says how well each is known, what limits it, and after how long
     it was known.
     """
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.timing import write_timing
     from strapdown.cli.align_options import flag_words, spec_of_flags
     from strapdown.cli.align_tables import print_alignment
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress

@@ -193,7 +193,8 @@ def attitude(
     """
     from strapdown.attitude import make_algorithm
     from strapdown.attitude.speed import time_algorithms
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.timing import write_timing
     from strapdown.cli.attitude_tables import print_bench, print_speed
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.formats.columns import parse_column_option

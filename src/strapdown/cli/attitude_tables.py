@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from strapdown.report.attitude_tables import TextTable
-    from strapdown.results import AttitudeBench
+    from strapdown.results.attitude_bench import AttitudeBench
 
 
 MOST_LINES = 8

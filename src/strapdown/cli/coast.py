@@ -141,7 +141,8 @@ def coast(
     Of a sensor the answer is by its data sheet, along a motion that is stated. Of a run of
     navigation the filter's own state is taken, and the drifts that came are laid over the forecast.
     """
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.timing import write_timing
     from strapdown.cli.coast_options import coast_of_flags
     from strapdown.cli.coast_tables import print_coast
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress

@@ -13,7 +13,7 @@ from strapdown.cli.compiling import Compilations
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from strapdown.bundle import Seal
+    from strapdown.bundle.seal import Seal
     from strapdown.exceptions import Finding
     from strapdown.report.document import TableBlock
 

@@ -26,7 +26,8 @@ def crash(
     Reads the records that the case names and writes a report (HTML and PDF), JSON, CSV and
     figures, sealed so that any change is found.
     """
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.timing import write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.crash_tables import print_crash
     from strapdown.config.crash_case_file import read_case_spec

@@ -160,7 +160,8 @@ def navigate(
     ] = False,
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
-    from strapdown.bundle import check_destination, write_latency, write_timing
+    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.timing import write_latency, write_timing
     from strapdown.cli.align_options import flag_words
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency

@@ -12,7 +12,9 @@ from typing import Any
 
 import typer
 
-from strapdown.bundle import Seal, read_manifest, write_latency, write_timing
+from strapdown.bundle.reading import read_manifest
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.timing import write_latency, write_timing
 from strapdown.cli.console import Stopwatch, print_seal, progress
 from strapdown.cli.latency_table import print_latency
 from strapdown.cli.navigate_tables import print_navigation

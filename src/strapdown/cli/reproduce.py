@@ -29,7 +29,8 @@ def reproduce(
 
     Simulated throughout: the same numbers every time. Writes a page, its figures and JSON.
     """
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle.destination import check_destination
+    from strapdown.bundle.timing import write_timing
     from strapdown.cli.console import Stopwatch, console, print_seal, print_table, progress
     from strapdown.report.reproduction import (
         make_reproduction,

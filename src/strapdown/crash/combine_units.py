@@ -16,7 +16,7 @@ from strapdown.crash.mean_weights import CRASH_WINDOW, by_none, force_weights
 from strapdown.crash.sample_effects import SampleEffects, level_turned_by
 from strapdown.crash.unit_differences import TINY
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.prepared_unit import Levelling
 from strapdown.sensors.rest import LEAST_SAMPLES, rest_between
 from strapdown.tables import imu_table

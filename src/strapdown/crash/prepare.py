@@ -24,7 +24,7 @@ from strapdown.crash.rest_attitude import (
     with_gravity,
 )
 from strapdown.exceptions import Finding
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.high_g_bias import bias_from_lower_range
 from strapdown.sensors.pre_crash import (

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.range_merge import MergedRanges
 from strapdown.sensors.saturation import RangeLimits

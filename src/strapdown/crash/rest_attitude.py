@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.levelling import level
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.exceptions import DataError
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.prepared_unit import Levelling
 from strapdown.sensors.triad_uncertainty import TriadUncertainty

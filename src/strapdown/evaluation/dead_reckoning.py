@@ -19,7 +19,8 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.evaluation.differences import attitude_at
 from strapdown.exceptions import DataError
-from strapdown.results import AttitudeRun, RestStretch
+from strapdown.results.rests import RestStretch
+from strapdown.results.runs import AttitudeRun
 from strapdown.tables import ACCEL, QUATERNION
 
 Array = NDArray[np.float64]

@@ -9,7 +9,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.results import AttitudeRun
+from strapdown.results.runs import AttitudeRun
+from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.tables import QUATERNION
 
 Array = NDArray[np.float64]
@@ -66,7 +67,7 @@ def error_angles(attitude: pd.DataFrame, truth: pd.DataFrame) -> pd.Series:
     stamps = truth.index.to_numpy(dtype=np.float64)
     inside = (stamps >= attitude.index[0]) & (stamps <= attitude.index[-1])
     known = truth[QUATERNION].to_numpy(dtype=np.float64)[inside]
-    angles = rotation.unit_rotation_angle(attitude_at(attitude, stamps[inside]), known)
+    angles = unit_rotation_angle(attitude_at(attitude, stamps[inside]), known)
     return pd.Series(angles, index=pd.Index(stamps[inside], name="time"), name="error")
 
 
@@ -86,7 +87,7 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
     names = [run.algorithm for run in runs]
     table = pd.DataFrame(0.0, index=names, columns=names)
     for a, b in combinations(range(len(runs)), 2):
-        angle = rotation.unit_rotation_angle(
+        angle = unit_rotation_angle(
             runs[a].attitude[QUATERNION].to_numpy(), runs[b].attitude[QUATERNION].to_numpy()
         )
         table.iloc[a, b] = table.iloc[b, a] = float(angle.max())

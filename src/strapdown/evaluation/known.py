@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
+from strapdown.rotation.angles import unit_rotation_angle
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -49,10 +49,10 @@ class Known:
             Final, RMS and largest rotation angle in deg; None where nothing is known.
         """
         if self.counts.all():
-            return angles_to_errors(rotation.unit_rotation_angle(q_nb, self.q_nb))
+            return angles_to_errors(unit_rotation_angle(q_nb, self.q_nb))
         if not self.counts.any():
             return None
-        angles = rotation.unit_rotation_angle(q_nb[self.counts], self.q_nb[self.counts])
+        angles = unit_rotation_angle(q_nb[self.counts], self.q_nb[self.counts])
         return angles_to_errors(angles)
 
 

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from strapdown.evaluation.dead_reckoning import dead_reckon
 from strapdown.evaluation.place_references import PlaceReference
 from strapdown.exceptions import DataError
-from strapdown.results import AttitudeRun, PositionScore, RestStretch
+from strapdown.results.rests import RestStretch
+from strapdown.results.runs import AttitudeRun
+from strapdown.results.scores import PositionScore
 
 Array = NDArray[np.float64]
 

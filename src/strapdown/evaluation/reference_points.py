@@ -25,7 +25,8 @@ from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeRun, Score
+from strapdown.results.runs import AttitudeRun
+from strapdown.results.scores import Score
 from strapdown.tables import EULER, THETA, references_table
 
 __all__ = [

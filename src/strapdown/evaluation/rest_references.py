@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.levelling import level
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError
-from strapdown.results import RestStretch, SamePose
+from strapdown.results.rests import RestStretch, SamePose
 from strapdown.tables import references_table
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from strapdown.evaluation.clock_alignment import (
     proper_rotation,
 )
 from strapdown.exceptions import DataError
-from strapdown.results import SecondLog
+from strapdown.results.second_log import SecondLog
 from strapdown.tables import check_imu
 
 if TYPE_CHECKING:

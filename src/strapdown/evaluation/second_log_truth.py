@@ -11,7 +11,7 @@ from strapdown.attitude import Quaternion, run_attitude
 from strapdown.evaluation.differences import attitude_at
 from strapdown.exceptions import DataError
 from strapdown.increments import increments_from_imu
-from strapdown.results import SecondLog
+from strapdown.results.second_log import SecondLog
 from strapdown.tables import GYRO, attitude_table, check_imu, imu_table
 
 Array = NDArray[np.float64]

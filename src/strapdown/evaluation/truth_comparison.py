@@ -18,6 +18,7 @@ from strapdown.evaluation.trajectory_at import SAME_BEAT, same_stamps, trajector
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.exceptions import DataError, Finding
 from strapdown.frames import q_ne
+from strapdown.rotation.euler_angles import euler_sd
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import (
     EULER,
@@ -300,9 +301,7 @@ def _comparison(
         inside[part] = float(np.mean(squares[part] <= limit))
     index = pd.Index(time, name="time")
     sd = np.sqrt(np.maximum(variance, 0.0))
-    sds = trajectory_error_table(
-        time, sd[:, :3], sd[:, 3:6], rotation.euler_sd(euler, P[:, 6:, 6:])
-    )
+    sds = trajectory_error_table(time, sd[:, :3], sd[:, 3:6], euler_sd(euler, P[:, 6:, 6:]))
     return TruthComparison(
         time,
         errors,

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.formats.body_axes import axes_matrix, mirrored
 from strapdown.formats.columns import EULERS, QUATERNIONS, parse_unit
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import Origin, RawLog, ReadOptions
 from strapdown.formats.stamps import read_stamps
-from strapdown.results import Reading
+from strapdown.results.inputs import Reading
 from strapdown.tables import attitude_table
 
 Array = NDArray[np.float64]
@@ -190,9 +191,7 @@ def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
     """Quaternion ``q_sb`` from body axes to the axes in which the file has its truth."""
-    axis, sign = axes
-    C_bs = np.eye(3)[axis] * np.array(sign)[:, None]
-    if np.linalg.det(C_bs) < 0:
+    if mirrored(*axes):
         raise ConfigError(
             "the axes stated are a mirror image of the sensor's, and its truth cannot be turned "
             "into it",
@@ -200,4 +199,4 @@ def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
             quantity="--axes",
             remedy="state a right-handed set, as in x,-y,-z",
         )
-    return rotation.quaternion_from_dcm(C_bs.T)
+    return rotation.quaternion_from_dcm(axes_matrix(*axes).T)

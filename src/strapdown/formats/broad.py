@@ -13,6 +13,7 @@ from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble_truth import LOST
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
+from strapdown.rotation.quaternions import Q_NED_ENU
 
 
 def detect(path: Path) -> bool:
@@ -67,7 +68,7 @@ def read(path: Path) -> RawLog:
     # Zeros stand where the markers were lost, as NaN does.
     known = np.isfinite(q_enu).all(axis=1) & (np.abs(q_enu).max(axis=1) > LOST)
     q_ns = np.full((samples, 4), np.nan)
-    q_ns[known] = rotation.compose(rotation.Q_NED_ENU, q_enu[known])
+    q_ns[known] = rotation.compose(Q_NED_ENU, q_enu[known])
     return dataclasses.replace(
         raw,
         stated={

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import Finding
-from strapdown.results import Reading
+from strapdown.results.inputs import Reading
 
 Array = NDArray[np.float64]
 

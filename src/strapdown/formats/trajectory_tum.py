@@ -14,6 +14,7 @@ from strapdown.exceptions import DataError
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
 from strapdown.frames import ecef_from_geodetic, q_ne
+from strapdown.rotation.quaternions import Q_NED_ENU
 from strapdown.tables import EULER, check_trajectory, places_of
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ def poses(
     if chosen.tum_frame != "ecef":
         q_we = to_level[0]
         if chosen.tum_frame == "enu":
-            q_we = rotation.compose(rotation.Q_NED_ENU, q_we)
+            q_we = rotation.compose(Q_NED_ENU, q_we)
             q_wb = rotation.compose(q_wb, _Q_FRD_FLU)
         position = rotation.rotate(q_we, position - position[0])
         q_wb = rotation.compose(q_we, q_wb)

@@ -9,10 +9,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.exceptions import ConfigError
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import Mark
+from strapdown.rotation.euler_angles import euler_sd
 from strapdown.systems.sins.piece import ChainPiece
 from strapdown.tables import EULER, GEODETIC, TRAJECTORY, VELOCITY
 from strapdown.tables.columns import POSITION_SD, VELOCITY_SD
@@ -97,5 +97,5 @@ class StateLines:
         covariance = self._mark.covariance
         euler = np.array([state[angle] for angle in EULER])
         sd = np.sqrt(np.diagonal(covariance)[:6]).tolist()
-        sd += rotation.euler_sd(euler, covariance[6:, 6:]).tolist()
+        sd += euler_sd(euler, covariance[6:, 6:]).tolist()
         return {**told, **{n: round(v, _COARSE) for n, v in zip(SD, sd, strict=True)}}

@@ -12,13 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.smoother import Smoothing
+from strapdown.rotation.euler_angles import euler_sd
 from strapdown.tables import EULER, trajectory_error_table
 from strapdown.tables.checks import is_number
 
@@ -213,7 +213,7 @@ class Tape:
                 time,
                 sd[:, :3],
                 sd[:, 3:6],
-                rotation.euler_sd(euler, covariance[:, 6:, 6:]),
+                euler_sd(euler, covariance[:, 6:, 6:]),
                 source,
             ),
             covariance=covariance.copy(),

@@ -24,6 +24,7 @@ import numpy as np
 
 from strapdown import rotation
 from strapdown.peers.peer import Array, Peer, PeerFilter, Samples, load
+from strapdown.rotation.quaternions import Q_NED_ENU
 
 
 def _step_by_step(
@@ -58,7 +59,7 @@ def _madgwick(samples: Samples, q_nb: Array) -> Array:
 def _mahony(samples: Samples, q_nb: Array) -> Array:
     mahony, gyro = load("ahrs").filters.Mahony(), samples.gyro
     force, mag = samples.force, samples.mag
-    start = rotation.compose(rotation.Q_NED_ENU, q_nb)
+    start = rotation.compose(Q_NED_ENU, q_nb)
     if len(mag):
         q = _step_by_step(
             samples,
@@ -69,7 +70,7 @@ def _mahony(samples: Samples, q_nb: Array) -> Array:
         q = _step_by_step(
             samples, start, lambda q, k, dt: mahony.updateIMU(q, gyro[k], force[k], dt=dt)
         )
-    return np.vstack([q_nb, rotation.compose(rotation.Q_NED_ENU, q[1:])])
+    return np.vstack([q_nb, rotation.compose(Q_NED_ENU, q[1:])])
 
 
 def _dip_deg(samples: Samples) -> float:

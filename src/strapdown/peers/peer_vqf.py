@@ -18,6 +18,7 @@ from strapdown.peers.peer import (
     align_heading,
     load,
 )
+from strapdown.rotation.quaternions import Q_NED_ENU
 
 
 def _gyro(samples: Samples, q_nb: Array) -> Array:
@@ -29,13 +30,13 @@ def _gyro(samples: Samples, q_nb: Array) -> Array:
 
 def _inclination(samples: Samples, q_nb: Array) -> Array:
     found = load("vqf").VQF(float(samples.dt.mean())).updateBatch(samples.gyro, samples.force)
-    return align_heading(rotation.compose(rotation.Q_NED_ENU, found["quat6D"]), q_nb)
+    return align_heading(rotation.compose(Q_NED_ENU, found["quat6D"]), q_nb)
 
 
 def _magnetic(samples: Samples, q_nb: Array) -> Array:
     vqf = load("vqf").VQF(float(samples.dt.mean()))
     found = vqf.updateBatch(samples.gyro, samples.force, samples.mag)
-    return rotation.compose(rotation.Q_NED_ENU, found["quat9D"])
+    return rotation.compose(Q_NED_ENU, found["quat9D"])
 
 
 PEER = Peer(

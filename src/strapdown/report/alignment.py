@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import Seal, check_destination, to_json
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
 from strapdown.config.alignment_file import alignment_spec, read_alignment_spec
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document
 from strapdown.report.alignment_json import alignment_json

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.bundle import Seal, to_json, write_bundle
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.writing import write_bundle
 from strapdown.formats import csv
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_answer_charts import share_basis
@@ -16,7 +18,7 @@ from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_json import attitude_json
 from strapdown.report.attitude_page import attitude_page
 from strapdown.report.svg_chart import draw
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.tables import EULER, QUATERNION
 
 __all__ = ["attitude_json", "attitude_page", "write_attitude"]

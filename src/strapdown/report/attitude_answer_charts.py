@@ -25,7 +25,8 @@ from strapdown.report.chart import (
     look,
 )
 from strapdown.report.label_places import place_labels
-from strapdown.results import AttitudeBench, PeerRun
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.runs import PeerRun
 
 # A logarithmic axis has no zero; what is less is drawn here.
 LEAST_ERROR, LEAST_WORDS = 1e-6, "10⁻⁶°"

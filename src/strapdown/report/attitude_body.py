@@ -13,7 +13,7 @@ from strapdown.evaluation.differences import attitude_at
 from strapdown.report.attitude_numbers import chosen_run
 from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY
 from strapdown.report.plotly_chart import FONT
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 
 __all__ = ["MOST_FRAMES", "body_caption", "body_figure"]
 

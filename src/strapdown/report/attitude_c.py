@@ -7,7 +7,7 @@ from pathlib import Path
 from strapdown.attitude import make_algorithm
 from strapdown.exceptions import ConfigError
 from strapdown.export_c import export_c
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.tables import GYRO, QUATERNION
 
 # What an embedded test needs: a second or so of motion, in a file that can still be read.

@@ -24,7 +24,7 @@ from strapdown.report.chart import (
     curve,
     look,
 )
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.tables import EULER, GYRO
 
 _TIME = "time, s"

@@ -9,7 +9,9 @@ from strapdown.report import attitude_words as words
 from strapdown.report.attitude_answer_charts import share_basis
 from strapdown.report.attitude_places import places_json
 from strapdown.report.attitude_tables import source_of
-from strapdown.results import AttitudeBench, Cost, Score, Share
+from strapdown.results.answer import Cost, Share
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.scores import Score
 from strapdown.tables import EULER, QUATERNION
 
 __all__ = ["attitude_json"]

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from strapdown.results import AttitudeBench, AttitudeRun, PeerRun, Score
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.runs import AttitudeRun, PeerRun
+from strapdown.results.scores import Score
 
 __all__ = [
     "MEANINGS",

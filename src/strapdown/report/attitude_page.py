@@ -15,7 +15,7 @@ from strapdown.report.attitude_places import offer_lines, place_table
 from strapdown.report.chart import Chart
 from strapdown.report.page import embedded, render
 from strapdown.report.plotly_chart import figure
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 
 __all__ = ["attitude_page"]
 

@@ -6,7 +6,8 @@ from dataclasses import asdict
 from typing import Any
 
 from strapdown.report.attitude_tables import TextTable
-from strapdown.results import AttitudeBench, SecondLog
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.second_log import SecondLog
 
 
 def place_table(bench: AttitudeBench) -> TextTable | None:

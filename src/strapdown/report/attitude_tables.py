@@ -15,7 +15,9 @@ from strapdown.report.attitude_numbers import (
     sweep_grid,
 )
 from strapdown.report.attitude_words import condition, degrees
-from strapdown.results import AttitudeBench, AttitudeRun, PeerRun, Score
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.runs import AttitudeRun, PeerRun
+from strapdown.results.scores import Score
 
 __all__ = [
     "TextTable",

@@ -10,7 +10,7 @@ from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_tables import TextTable, result_tables
 from strapdown.report.svg_chart import notebook_figure
-from strapdown.results import AttitudeBench
+from strapdown.results.attitude_bench import AttitudeBench
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle import names_file
+from strapdown.bundle.configuration_paths import names_file
 from strapdown.config.changed_options import changed_options
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.exceptions import StrapdownError

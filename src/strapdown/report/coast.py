@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle import (
-    Seal,
-    check_destination,
-    read_manifest,
-    resolved,
-    to_json,
-    unsealed_changes,
-)
+from strapdown.bundle.configuration_paths import resolved
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.reading import read_manifest, unsealed_changes
+from strapdown.bundle.seal import Seal
 from strapdown.config.coast import coast_spec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec

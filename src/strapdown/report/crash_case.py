@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle import Seal, check_destination, to_json
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.formats.mme_writer import write_mme

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from strapdown import __version__
-from strapdown.bundle import names_file
+from strapdown.bundle.configuration_paths import names_file
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.crash_type import CrashType

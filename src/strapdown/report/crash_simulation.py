@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.writing import write_bundle
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.exceptions import ConfigError, nearest

@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle import Seal, check_destination, to_json
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
 from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text

@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Protocol
 
-from strapdown.bundle import Seal, write_bundle
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.writing import write_bundle
 from strapdown.config.spec import Spec
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 
 __all__ = ["report_bundle"]
 

@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from strapdown import __version__
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.writing import write_bundle
 from strapdown.config import ReproduceSpec, specify
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.report.page import embedded, render

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.writing import write_bundle
 from strapdown.config import (
     CrashSimulationSpec,
     ScenarioSpec,

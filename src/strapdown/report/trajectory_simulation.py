@@ -7,7 +7,10 @@ from typing import Any
 
 import pandas as pd
 
-from strapdown.bundle import Seal, check_destination, to_json, write_bundle
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.json_text import to_json
+from strapdown.bundle.seal import Seal
+from strapdown.bundle.writing import write_bundle
 from strapdown.config import TrajectorySpec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, nearest

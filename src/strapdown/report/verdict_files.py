@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.bundle import to_json
+from strapdown.bundle.json_text import to_json
 from strapdown.evaluation.heading_light import COLOURS, REASONS
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv

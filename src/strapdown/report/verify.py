@@ -15,16 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from strapdown.bundle import (
-    MANIFEST,
-    Seal,
-    machine,
-    read_manifest,
-    resolved,
-    sha256,
-    unsealed_changes,
-    versions,
-)
+from strapdown.bundle.configuration_paths import resolved
+from strapdown.bundle.environment import machine, versions
+from strapdown.bundle.reading import read_manifest, unsealed_changes
+from strapdown.bundle.seal import MANIFEST, Seal, sha256
 from strapdown.config import (
     AttitudeSpec,
     CrashSimulationSpec,

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.rest import (
     LEAST_LENGTH,
     MAX_GYRO_SD,

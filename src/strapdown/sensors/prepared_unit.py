@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import Finding
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.triad_errors import Triad
 

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
 

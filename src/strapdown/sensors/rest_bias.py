@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.exceptions import DataError
-from strapdown.results import GyroBiasCourse, RestStretch
+from strapdown.results.rests import GyroBiasCourse, RestStretch
 from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]

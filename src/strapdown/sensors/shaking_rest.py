@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.rest import MAX_MEAN_RATE, find_rests, of_one_bias, rest_between
 from strapdown.tables import ACCEL, GYRO
 

@@ -21,7 +21,7 @@ from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu

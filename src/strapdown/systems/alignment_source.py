@@ -17,7 +17,7 @@ from strapdown.formats import read_log
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import ReadOptions, Recording, StatedStart
-from strapdown.results import InputFiles, Reading
+from strapdown.results.inputs import InputFiles, Reading
 from strapdown.rotation import euler_from_dcm
 from strapdown.sensors.axes_matrix import (
     NAMED_AXES,

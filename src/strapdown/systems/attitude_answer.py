@@ -10,7 +10,7 @@ import pandas as pd
 
 from strapdown.attitude import AttitudeAlgorithm
 from strapdown.evaluation.known import Errors
-from strapdown.results import Answer, Cost
+from strapdown.results.answer import Answer, Cost
 
 # Where the sensor's error is beyond the tolerance, an algorithm's own error of this share of it
 # changes nothing that could be seen.

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown.attitude import AttitudeAlgorithm, RotationVector, make_algorithm, run_attitude
 from strapdown.attitude.cost import count_cost
 from strapdown.config import AttitudeSpec, specify
@@ -20,7 +19,9 @@ from strapdown.evaluation.place_scores import score_places
 from strapdown.evaluation.reference_points import score_references
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeBench, RestStretch
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.results.rests import RestStretch
+from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_answer import Evidence, find_answer
 from strapdown.systems.attitude_judgement import judge_runs, judge_truth, judge_turns, truth_score
@@ -424,7 +425,7 @@ def _start_error(known: Known | None, q_nb: Array) -> float:
     """What the run's first attitude is off by, in deg, where that is known."""
     if known is None or not known.counts[0]:
         return 0.0
-    return float(rotation.unit_rotation_angle(q_nb[None], known.q_nb[:1])[0])
+    return float(unit_rotation_angle(q_nb[None], known.q_nb[:1])[0])
 
 
 def _without_bias(

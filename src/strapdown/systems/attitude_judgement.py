@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from strapdown.evaluation.differences import error_angles
 from strapdown.exceptions import Finding
-from strapdown.results import AttitudeRun, Score
+from strapdown.results.runs import AttitudeRun
+from strapdown.results.scores import Score
 from strapdown.systems.attitude_source import Source
 from strapdown.tables import THETA, find_gaps
 

@@ -18,7 +18,8 @@ from strapdown.evaluation.second_log_truth import second_clock, truth_from_secon
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.recording import Recording
-from strapdown.results import RestStretch, SamePose, SecondLog
+from strapdown.results.rests import RestStretch, SamePose
+from strapdown.results.second_log import SecondLog
 from strapdown.sensors.rest import find_rests
 from strapdown.simulation import find_scenario
 from strapdown.systems.attitude_source import Source, input_files

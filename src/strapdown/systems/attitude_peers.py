@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.evaluation.reference_points import score_references
 from strapdown.exceptions import Finding
 from strapdown.peers import PEERS, align_heading, run_peers
-from strapdown.results import AttitudeRun, PeerRun
+from strapdown.results.runs import AttitudeRun, PeerRun
 from strapdown.systems.attitude_judgement import truth_score
 from strapdown.systems.attitude_source import Source
 from strapdown.tables import QUATERNION, attitude_table

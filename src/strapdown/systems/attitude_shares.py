@@ -18,7 +18,9 @@ from strapdown.attitude import (
 from strapdown.attitude.single import run_single, single_increments
 from strapdown.evaluation.known import Errors, Known, angles_to_errors
 from strapdown.increments import increments_from_imu
-from strapdown.results import AttitudeRun, Share
+from strapdown.results.answer import Share
+from strapdown.results.runs import AttitudeRun
+from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.tables import QUATERNION
 
 Array = NDArray[np.float64]
@@ -105,7 +107,7 @@ def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | Non
         attitude_history(MOST_ACCURATE, increments_from_imu(imu, how), q_nb)
         for how in ("linear", "cubic")
     )
-    final, _, largest = angles_to_errors(rotation.unit_rotation_angle(chord, cubic))
+    final, _, largest = angles_to_errors(unit_rotation_angle(chord, cubic))
     return final, largest
 
 
@@ -151,9 +153,9 @@ def find_shares(
         else:
             q_clean = attitude_history(algorithm, clean, q_nb)
             mine = own.known.errors(q_clean)
-            sensor = angles_to_errors(rotation.unit_rotation_angle(q, q_clean))
+            sensor = angles_to_errors(unit_rotation_angle(q, q_clean))
         assert mine is not None
-        apart = rotation.unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
+        apart = unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
         shares.append(Share(run.algorithm, mine, sensor, angles_to_errors(apart)))
     return tuple(shares)
 

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.attitude import Quaternion, run_attitude
-from strapdown.bundle import sha256
+from strapdown.bundle.seal import sha256
 from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
 from strapdown.evaluation.differences import error_angles
 from strapdown.exceptions import ConfigError, DataError, Finding
@@ -18,7 +18,7 @@ from strapdown.formats import read_log
 from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.increments import increments_from_imu
-from strapdown.results import InputFiles, Reading
+from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION

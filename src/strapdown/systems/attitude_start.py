@@ -17,7 +17,8 @@ from strapdown.evaluation.known import known_at
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.columns import parse_unit
-from strapdown.results import InputFiles, RestStretch
+from strapdown.results.inputs import InputFiles
+from strapdown.results.rests import RestStretch
 from strapdown.sensors.rest import find_rests
 from strapdown.sensors.rest_bias import gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.attitude_source import Source, input_files, read_options

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.exceptions import ConfigError
-from strapdown.results import AttitudeBench, Trials
+from strapdown.results.answer import Trials
+from strapdown.results.attitude_bench import AttitudeBench
 
 Array = NDArray[np.float64]
 

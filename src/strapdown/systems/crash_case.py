@@ -17,7 +17,7 @@ from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.named_columns import read_reference_path
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.case_references import ReferenceAnswer, compare_reference

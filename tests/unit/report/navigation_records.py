@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from strapdown import rotation
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.report.navigation_told import NavigationTold
+from strapdown.rotation.euler_angles import euler_sd
 from strapdown.tables import gnss_table, trajectory_error_table, trajectory_table
 
 #: Of an ellipse turned by 30 deg from north toward east, 3 m along and 1 m across.
@@ -78,9 +78,7 @@ def record(
             marks,
             sd[:, :3],
             sd[:, 3:6],
-            rotation.euler_sd(
-                np.tile([0.0, 0.0, course % 360.0], (marks.size, 1)), covariance[:, 6:, 6:]
-            ),
+            euler_sd(np.tile([0.0, 0.0, course % 360.0], (marks.size, 1)), covariance[:, 6:, 6:]),
         ),
         covariance=covariance,
         sensors=pd.DataFrame(

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown.bundle import to_json
+from strapdown.bundle.json_text import to_json
 from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
 from strapdown.config.crash_case_file import read_case_spec
 from strapdown.exceptions import ConfigError, DataError

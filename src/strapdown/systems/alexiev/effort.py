@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from strapdown.attitude import make_algorithm
 from strapdown.attitude.cost import count_cost
-from strapdown.results import Cost
+from strapdown.results.answer import Cost
 from strapdown.systems.alexiev.sampling import FOUR
 from strapdown.systems.reproduction import (
     CANNOT_BE_JUDGED,

@@ -12,7 +12,7 @@ from strapdown.attitude import make_algorithm, run_attitude
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.evaluation.dead_reckoning import dead_reckon
 from strapdown.increments import increments_from_imu
-from strapdown.results import RestStretch
+from strapdown.results.rests import RestStretch
 from strapdown.simulation import ImuErrors, Motion, Pulse, PulseMotion, TriadErrors, simulate_imu
 from strapdown.systems.reproduction import (
     DOES_NOT_HOLD,

@@ -9,7 +9,7 @@ from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import uncertainty_of
 from strapdown.exceptions import ConfigError, Finding
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.attitude_source import input_files, sensor_file

@@ -26,6 +26,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.piece import Mark, NavigationPiece
 from strapdown.navigation.record import NavigationRecord
+from strapdown.rotation.euler_angles import euler_sd
 from strapdown.systems.sins.witness_source import Witnesses
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import index_of
@@ -188,7 +189,7 @@ class _Witness:
         apart = rotation.within_half_turn(heading - own["heading"].to_numpy(dtype=np.float64))[back]
         euler = own[EULER].to_numpy(dtype=np.float64)[back]
         scale = self._scale(seconds)
-        sd = rotation.euler_sd(euler, covariance[:, 6:, 6:])[:, 2] if len(seconds) else seconds
+        sd = euler_sd(euler, covariance[:, 6:, 6:])[:, 2] if len(seconds) else seconds
         sd = np.hypot(scale * sd, LEAST_HEADING)
         return Evidence(self.since, seconds, apart, sd, scale, covariance)
 

@@ -15,6 +15,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter, FilterState
 from strapdown.estimation.observation import Observation
 from strapdown.nav_state import NavState
+from strapdown.rotation.euler_angles import euler_sd
 
 __all__ = ["Manoeuvre", "manoeuvres_from", "sd_after"]
 
@@ -103,7 +104,7 @@ def sd_after(
     turn = np.kron(np.eye(3), mechanization.level_from_ned(state.row))
     whole = turn.T @ filter_.physical_covariance(state)[:9, :9] @ turn
     euler = rotation.euler_from_quaternion(start.q_nb)
-    return float(rotation.euler_sd(euler, whole[6:, 6:])[2])
+    return float(euler_sd(euler, whole[6:, 6:])[2])
 
 
 def _row(filter_: ErrorFilter, start: NavState, m: Manoeuvre, begin: float, dt: float) -> Array:

@@ -14,7 +14,7 @@ from strapdown.evaluation.control_points import ControlPointScore
 from strapdown.evaluation.trajectory_summary import DifferenceSummary
 from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
-from strapdown.results import InputFiles
+from strapdown.results.inputs import InputFiles
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.source import NavigationSource
 from strapdown.systems.sins.trust import Trust

@@ -17,7 +17,7 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.control_points import read_control_points
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
-from strapdown.results import InputFiles, Reading
+from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_draws import child
 from strapdown.simulation import simulate_imu

@@ -1,0 +1,120 @@
+"""Read the manifest of a bundle, and tell what is no longer as it was sealed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from strapdown.bundle.configuration_paths import named_paths
+from strapdown.bundle.seal import MANIFEST, SCHEMA, UNSEALED, files_of, sha256
+from strapdown.exceptions import DataError
+
+__all__ = ["read_manifest", "unsealed_changes"]
+
+KEPT = ("copy", "reference")
+
+
+def read_manifest(bundle: Path) -> dict[str, Any]:
+    """Read the manifest of a bundle.
+
+    Parameters
+    ----------
+    bundle : Path
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    DataError
+        There is none, or it is damaged.
+    """
+    path = bundle / MANIFEST
+    if not path.is_file():
+        raise DataError(
+            "no manifest.json in it: this is no bundle of strapdown",
+            file=str(bundle),
+            remedy="name the folder that a run wrote",
+        )
+    try:
+        manifest = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise DataError(
+            f"no JSON any more: {error}",
+            file=MANIFEST,
+            remedy="the bundle was changed after it was sealed; get it again",
+        ) from None
+    wanted = {"schema", "command", "configuration", "inputs", "outputs", "versions", "platform"}
+    if not isinstance(manifest, dict) or wanted - set(manifest) or manifest["schema"] != SCHEMA:
+        raise DataError(
+            f"not a manifest of the form '{SCHEMA}'",
+            file=MANIFEST,
+            remedy="use the version of strapdown that wrote it",
+        )
+    _refuse_escape(manifest)
+    return manifest
+
+
+def _refuse_escape(manifest: dict[str, Any]) -> None:
+    """Refuse a manifest that is malformed, or whose own files lie outside its folder."""
+    try:
+        for item in [*manifest["inputs"], *manifest["outputs"]]:
+            path, refers = Path(item["name"]), item.get("kept") == "reference"
+            if not isinstance(item["sha256"], str) or path.is_absolute() != refers:
+                raise ValueError
+            if not isinstance(item["bytes"], int) or item.get("kept", "copy") not in KEPT:
+                raise ValueError
+            if ".." in path.parts:
+                raise ValueError
+        _refuse_unsealed_paths(manifest)
+        for part in ("versions", "platform"):
+            if not all(isinstance(v, str) for v in manifest[part].values()):
+                raise ValueError
+        if not isinstance(manifest["command"], str):
+            raise ValueError
+    except (TypeError, KeyError, ValueError, AttributeError):
+        raise DataError(
+            "it is malformed, or names files outside the folder or outside the seal",
+            file=MANIFEST,
+            remedy="do not trust this bundle; get it again from its source",
+        ) from None
+
+
+def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
+    """Refuse a configuration that reads what the seal does not hold."""
+    sealed = {item["name"] for item in manifest["inputs"]}
+    sealed |= {str(Path(name).parent) for name in sealed}
+    for path in named_paths(manifest["configuration"]):
+        if path not in sealed:
+            raise ValueError
+
+
+def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
+    """Say which files of a bundle are not as they were sealed.
+
+    Parameters
+    ----------
+    bundle : Path
+    manifest : dict
+        From `read_manifest`.
+
+    Returns
+    -------
+    list of str
+        One sentence a file: changed, missing, or not in the manifest.
+    """
+    changes = []
+    expected: set[str] = {MANIFEST, *UNSEALED}
+    for item in [*manifest["inputs"], *manifest["outputs"]]:
+        path = bundle / item["name"]  # an absolute path stays what it is
+        expected.add(item["name"])
+        if not path.is_file():
+            changes.append(f"{item['name']}: missing")
+        elif sha256(path) != item["sha256"]:
+            changes.append(f"{item['name']}: changed after it was sealed")
+        elif path.stat().st_size != item["bytes"]:
+            changes.append(f"{item['name']}: not of the {item['bytes']} bytes of the manifest")
+    changes += [f"{name}: not in the manifest" for name in files_of(bundle) if name not in expected]
+    return changes

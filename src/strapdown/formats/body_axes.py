@@ -1,0 +1,86 @@
+"""Which axis of a sensor is which of the body's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import Finding
+from strapdown.formats.columns import parse_axes
+from strapdown.formats.find_columns import AXES
+from strapdown.formats.inference import Inference
+from strapdown.formats.judge import report_upside_down, told_of_up
+from strapdown.formats.recording import RawLog, ReadOptions
+
+__all__ = ["Axes", "axes_matrix", "body_axes", "mirrored"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Which sensor axis each body axis is, with its sign, and why."""
+
+    axis: list[int]
+    sign: list[float]
+    why: str
+
+
+def axes_matrix(axis: list[int], sign: list[float]) -> Array:
+    """Matrix ``C_bs`` from sensor axes to body axes."""
+    return np.asarray(np.eye(3)[axis] * np.array(sign)[:, None])
+
+
+def mirrored(axis: list[int], sign: list[float]) -> bool:
+    """Tell whether axes are a mirror image of the sensor's."""
+    return bool(np.linalg.det(axes_matrix(axis, sign)) < 0)
+
+
+def body_axes(
+    raw: RawLog, options: ReadOptions, said: dict[str, Inference], findings: list[Finding]
+) -> Axes:
+    """Axes as stated by the user, else by the file, else as they are.
+
+    Parameters
+    ----------
+    raw : RawLog
+    options : ReadOptions
+    said : dict of str to Inference
+        What the numbers say.
+    findings : list of Finding
+        What was assumed, or is doubtful, is added.
+    """
+    text = options.axes or raw.axes
+    if text is None:
+        up = None if options.accel_unit else told_of_up(said)
+        what, remedy = up or (
+            "",
+            "state them with --axes, as in --axes x,-y,-z for forward, left, up",
+        )
+        findings.append(
+            Finding(
+                "the sensor's x, y, z are taken as the body's forward, right, down: nothing says "
+                f"otherwise{what}",
+                file=raw.name,
+                quantity="axes",
+                remedy=remedy,
+            )
+        )
+        return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are")
+    axis, sign = parse_axes(text)
+    if options.axes and not options.accel_unit:
+        down = ("-" if sign[2] < 0 else "") + AXES[axis[2]]
+        report_upside_down(said, down, raw.name, findings)
+    if options.axes and mirrored(axis, sign):
+        findings.append(
+            Finding(
+                f"--axes {text} is a mirror image, which turns no right-handed sensor into "
+                "another; it is right only for a sensor whose own axes are left-handed",
+                file=raw.name,
+                quantity="axes",
+            )
+        )
+    why = f"{text} {'by --axes' if options.axes else 'of this kind of recording'}"
+    return Axes(axis, sign, why)

@@ -1,0 +1,155 @@
+"""Units of gyro, accelerometer and magnetometer: stated, named, or told by the numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats.body_axes import mirrored
+from strapdown.formats.columns import parse_axes, parse_unit, says_increment
+from strapdown.formats.find_columns import AXES, Column
+from strapdown.formats.inference import Inference, Signals, infer_signals
+from strapdown.formats.judge import UNITS, inferred_unit, report_contradictions
+from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.summed import OPEN, SUMS
+from strapdown.formats.triad_values import left_out
+
+__all__ = ["told_by_numbers", "units_of_triads"]
+
+Array = NDArray[np.float64]
+
+
+def told_by_numbers(
+    raw: RawLog,
+    found: dict[str, Column],
+    options: ReadOptions,
+    values: dict[str, Array],
+    ticks: NDArray[Any] | None,
+    dated: bool,
+) -> dict[str, Inference]:
+    """What the numbers say; of a gyro alone whose unit is stated, nothing is asked.
+
+    Parameters
+    ----------
+    raw : RawLog
+    found : dict of str to Column
+    options : ReadOptions
+    values : dict of str to ndarray, (n, 3)
+        From `values_of_triads`.
+    ticks : ndarray or None, (n,)
+        Stamps as they stand in the file.
+    dated : bool
+        They were dates, and are ns now.
+
+    Returns
+    -------
+    dict of str to Inference
+        By quantity.
+    """
+    if set(values) == {"gyro"} and _stated_unit(found, "gyro", options):
+        return {}
+    unit = "ns" if dated else None
+    if ticks is not None and not dated:
+        asked = options.time_unit
+        unit = parse_unit(asked, "time") if asked else found["time"].unit
+    signals = Signals(
+        ticks,
+        values["gyro"],
+        values.get("accel"),
+        values.get("mag"),
+        time_unit=unit,
+        rate=options.rate or raw.rate,
+    )
+    return {i.quantity: i for i in infer_signals(signals)}
+
+
+def units_of_triads(
+    raw: RawLog,
+    found: dict[str, Column],
+    options: ReadOptions,
+    values: dict[str, Array],
+    said: dict[str, Inference],
+    findings: list[Finding],
+) -> dict[str, tuple[str, str]]:
+    """The unit of each triad that can be used, with its reason.
+
+    Parameters
+    ----------
+    raw : RawLog
+    found : dict of str to Column
+    options : ReadOptions
+    values : dict of str to ndarray, (n, 3)
+    said : dict of str to Inference
+        From `told_by_numbers`.
+    findings : list of Finding
+        What is left out, inferred or contradicted is added.
+
+    Returns
+    -------
+    dict of str to (str, str)
+
+    Raises
+    ------
+    DataError
+        That of the gyro is not known.
+    """
+    units: dict[str, tuple[str, str]] = {}
+    asked: set[str] = set()
+    for triad, block in values.items():
+        stated = _stated_unit(found, triad, options)
+        if stated is None or stated[1].startswith("stated by --"):
+            asked.add(triad)
+        try:
+            if stated is None:
+                _refuse_open(raw, found, triad)
+            units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
+        except DataError as error:
+            if triad == "gyro":
+                raise
+            findings.append(left_out(raw, triad, error))
+    mirror = options.axes is not None and mirrored(*parse_axes(options.axes))
+    plain = {t: u for t, (u, _) in units.items()}
+    report_contradictions(said, plain, asked, mirror, raw.name, findings)
+    return units
+
+
+def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
+    """Refuse a unit that the file leaves open: of f and -f the numbers cannot tell which.
+
+    Raises
+    ------
+    DataError
+    """
+    column = found[f"{triad}_x"]
+    unit = column.unit
+    if unit is None and says_increment(column.source):
+        unit = OPEN[triad]
+    if unit and " or " in unit:
+        raise DataError(
+            f"the file leaves open whether it is in {unit}",
+            file=raw.name,
+            quantity=triad,
+            remedy=f"state it with --{triad}-unit",
+        )
+
+
+def _stated_unit(
+    found: dict[str, Column], triad: str, options: ReadOptions
+) -> tuple[str, str] | None:
+    asked = {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
+    if asked:
+        return parse_unit(asked, triad), f"stated by --{triad}-unit"
+    columns = [found[f"{triad}_{a}"] for a in AXES]
+    units = {c.unit for c in columns}
+    known = set(UNITS[triad])
+    # Degrees in a name are often meant a second: only a name that says increments is believed.
+    if all(says_increment(c.source) for c in columns):
+        known |= set(SUMS[triad])
+    unit = columns[0].unit
+    if len(units) == 1 and unit is not None and unit in known:
+        stated = columns[0].why == "stated by the file"
+        return unit, "stated by the file" if stated else "in its name"
+    return None
