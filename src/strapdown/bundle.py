@@ -231,20 +231,28 @@ def _manifest(
     kept: list[dict[str, Any]] = []
     moved: dict[str, str] = {}
     places: dict[Path, Path] = {}
+    names: set[Path] = set()
     for item in inputs:
         # The name that was given; a link's target may have lost its ending.
         own = item.path.name or item.path.resolve().name
         place = Path("inputs") / item.role / own
+        # What two roles took of one folder stands in one: a path is of one place.
+        first = next((p for p, path in places.items() if path == item.path), None)
+        if first is not None and item.path.is_dir():
+            place = first
         # Several logs may have one name, and one file may have been read for each of them.
         number = 2
         while places.get(place, item.path) != item.path:
             place = Path("inputs") / f"{item.role}-{number}" / own
             number += 1
-        if place in places:
+        if place in places and not item.path.is_dir():
             continue
         places[place] = item.path
         for file, digest in zip(item.files, item.digests, strict=True):
             name = place / file.relative_to(item.path) if item.path.is_dir() else place
+            if name in names:
+                continue
+            names.add(name)
             if copy:
                 (staging / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(file, staging / name)
