@@ -199,7 +199,7 @@ ALIGNMENT_CASES = (
     AlignmentCase("An unknown sensor", record(), options=(*PLACE, "--sensor", "fog"), code=4),
     AlignmentCase("An unknown method", record(), options=(*USUAL, "--method", "inertial"), code=4),
     AlignmentCase("A second of it", record(), options=(*USUAL, "--duration", "1")),
-    AlignmentCase("A part that is not there", record(), options=(*USUAL, "--from", "200")),
+    AlignmentCase("A part that is not there", record(), options=(*USUAL, "--from", "200"), code=4),
     AlignmentCase(
         "A SIMU log whose header is cut",
         psins("\n".join(PSINS.splitlines()[:3]) + "\n"),

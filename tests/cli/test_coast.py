@@ -132,6 +132,29 @@ def test_one_outage_at_a_stamp(drive, run_cli):
     assert [one["begin_s"] for one in told["drifts"]] == [50.0]
 
 
+@pytest.mark.parametrize("end", [("--to", "65"), ("--duration", "20")])
+def test_outages_lie_within_the_part_that_flags_name(drive, run_cli, tmp_path, end):
+    flags = ("--outage", "10", "--places", "3", "--from", "45", *end)
+    done = run_cli("coast", drive / DRIVE, *flags, "-q", "--out", tmp_path / "part")
+    assert done.code == 0, done.err
+    told = json.loads((tmp_path / "part" / "coast.json").read_text())
+    assert [one["begin_s"] for one in told["drifts"]] == [45.0, 50.0, 55.0]
+
+
+@pytest.mark.parametrize(
+    ("flags", "what"),
+    [
+        (("--from", "45", "--to", "50"), "longer than the 5 s between 45 and 50 s"),
+        (("--from", "45", "--at", "50"), "--from: --at says where the one outage is"),
+    ],
+)
+def test_a_part_without_room_for_an_outage_is_refused(drive, run_cli, tmp_path, flags, what):
+    done = run_cli("coast", drive / DRIVE, "--outage", "10", *flags, "--out", tmp_path / "none")
+    assert done.code == 4
+    assert what in done.err
+    assert not (tmp_path / "none").exists()
+
+
 def test_from_python(tmp_path):
     seal = strapdown.coast(
         "hg1700",

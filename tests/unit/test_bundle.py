@@ -11,6 +11,7 @@ from strapdown import bench_attitude, simulate, verify, write_attitude
 from strapdown.bundle import sha256, write_bundle
 from strapdown.bundle.seal import MANIFEST
 from strapdown.exceptions import ConfigError, DataError
+from strapdown.results import InputFiles
 
 pytestmark = pytest.mark.usefixtures("sketched_module")
 
@@ -320,3 +321,37 @@ def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, log, mon
         write_attitude(bench, tmp_path / "out", force=True)
     monkeypatch.undo()
     assert verify(seal.path).verdict == "identical"
+
+
+def test_one_folder_in_two_roles_is_kept_whole_in_one_place(tmp_path):
+    """A log and the fixes of one recording: each role has files of its own, and one of both."""
+    folder = tmp_path / "drive"
+    folder.mkdir()
+    for name in ("imu.npy", "fixes.npy", "clock.npy"):
+        (folder / name).write_bytes(name.encode())
+
+    def of(role, *names):
+        files = tuple(folder / name for name in names)
+        return InputFiles(role, folder, files, tuple(sha256(file) for file in files))
+
+    seals = []
+    inputs = (of("log", "imu.npy", "clock.npy"), of("aid-gnss", "fixes.npy", "clock.npy"))
+    configuration = {"log": {"path": str(folder)}, "gnss": {"path": str(folder)}}
+    with write_bundle(
+        tmp_path / "out",
+        command="navigate",
+        configuration=configuration,
+        inputs=inputs,
+        seals=seals,
+    ):
+        pass
+    manifest = json.loads((seals[0].path / MANIFEST).read_text())
+    paths = {part["path"] for part in manifest["configuration"].values()}
+    assert paths == {"inputs/log/drive"}
+    kept = {item["name"]: item["role"] for item in manifest["inputs"]}
+    assert kept == {
+        "inputs/log/drive/imu.npy": "log",
+        "inputs/log/drive/clock.npy": "log",
+        "inputs/log/drive/fixes.npy": "aid-gnss",
+    }
+    assert all((seals[0].path / name).is_file() for name in kept)

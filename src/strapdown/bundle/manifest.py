@@ -77,13 +77,17 @@ def _keep(
     kept: list[dict[str, Any]] = []
     moved: dict[str, str] = {}
     places: dict[Path, Path] = {}
+    names: set[Path] = set()
     for item in inputs:
         place = _place(item, places)
-        if place in places:
+        if place in places and not item.path.is_dir():
             continue
         places[place] = item.path
         for file, digest in zip(item.files, item.digests, strict=True):
             name = place / file.relative_to(item.path) if item.path.is_dir() else place
+            if name in names:
+                continue
+            names.add(name)
             if copy:
                 (folder / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copyfile(file, folder / name)
@@ -102,6 +106,10 @@ def _keep(
 
 def _place(item: InputFiles, places: dict[Path, Path]) -> Path:
     """A place of its own for each path; the same for a path that has one."""
+    # What two roles took of one folder stands in one: a path is of one place.
+    first = next((p for p, path in places.items() if path == item.path), None)
+    if first is not None and item.path.is_dir():
+        return first
     # The name that was given; a link's target may have lost its ending.
     own = item.path.name or item.path.resolve().name
     place = Path("inputs") / item.role / own

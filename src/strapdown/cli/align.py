@@ -7,15 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from strapdown.cli.log_options import (
-    AccelUnit,
-    Axes,
-    Columns,
-    GyroUnit,
-    Rate,
-    Repair,
-    Sampling,
-    TimeUnit,
+from strapdown.cli.shared_options import (
+    RUN_PANEL,
+    WITH_PANEL,
+    LogFlags,
+    OutFlags,
+    folder_to_make,
+    spread,
 )
 
 EPILOG = (
@@ -23,9 +21,9 @@ EPILOG = (
     "Example: strapdown align align.toml (strapdown init align LOG writes one)"
 )
 MOST = 6  # findings on the terminal
-_WHERE, _RUN, _OUT = "Where it stands, and with what", "What to run", "What to write"
 
 
+@spread
 def align(
     source: Annotated[
         Path,
@@ -37,15 +35,17 @@ def align(
     ],
     lat: Annotated[
         float | None,
-        typer.Option(metavar="DEG", help="Latitude, north positive.", rich_help_panel=_WHERE),
+        typer.Option(metavar="DEG", help="Latitude, north positive.", rich_help_panel=WITH_PANEL),
     ] = None,
     lon: Annotated[
         float | None,
-        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=_WHERE),
+        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=WITH_PANEL),
     ] = None,
     alt: Annotated[
         float | None,
-        typer.Option(metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=_WHERE),
+        typer.Option(
+            metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=WITH_PANEL
+        ),
     ] = None,
     sensor: Annotated[
         str | None,
@@ -53,7 +53,7 @@ def align(
             metavar="NAME|FILE",
             help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
             ".toml file of your own.",
-            rich_help_panel=_WHERE,
+            rich_help_panel=WITH_PANEL,
         ),
     ] = None,
     method: Annotated[
@@ -61,20 +61,24 @@ def align(
         typer.Option(
             metavar="NAME",
             help="Coarse alignment, with options after a colon: inertial_frame (the body may "
-            "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course.",
-            rich_help_panel=_RUN,
+            "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course "
+            "(inertial_frame).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "inertial_frame",
     coarse_only: Annotated[
         bool,
-        typer.Option("--coarse-only", help="No fine alignment after it.", rich_help_panel=_RUN),
+        typer.Option(
+            "--coarse-only", help="No fine alignment after it.", rich_help_panel=RUN_PANEL
+        ),
     ] = False,
     gnss: Annotated[
         Path | None,
         typer.Option(
             metavar="FIXES",
             help="Fixes of a satellite receiver, for --method gnss_course.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     prefilter: Annotated[
@@ -82,42 +86,15 @@ def align(
         typer.Option(
             metavar="NAME",
             help="What the samples pass first, with options after a colon, as "
-            "robust_fir:rate_hz=100.",
-            rich_help_panel=_RUN,
+            "robust_fir:rate_hz=100 (none).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "none",
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
-    ] = None,
-    rate: Rate = None,
-    sampling: Sampling = None,
-    columns: Columns = None,
-    gyro_unit: GyroUnit = None,
-    accel_unit: AccelUnit = None,
-    time_unit: TimeUnit = None,
-    axes: Axes = None,
-    repair: Repair = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (LOG-align).", rich_help_panel=_OUT),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    *,
+    log: LogFlags,
+    out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
+    write: OutFlags,
 ) -> None:
     """Find roll, pitch and heading of a body that stands, from its gyros and accelerometers.
 
@@ -130,12 +107,11 @@ def align(
     from strapdown.cli.align_options import flag_words, spec_of_flags
     from strapdown.cli.align_tables import print_alignment
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.alignment_file import read_alignment_spec
     from strapdown.report.alignment import write_alignment
     from strapdown.systems.alignment_run import run_alignment
 
-    folder = out or Path(f"{source.resolve().stem}-align")
-    check_destination(folder, force)
     given: dict[str, Any] = {
         "lat": lat,
         "lon": lon,
@@ -145,33 +121,26 @@ def align(
         "coarse_only": coarse_only or None,
         "gnss": gnss,
         "prefilter": None if prefilter == "none" else prefilter,
-        "from_s": from_s,
-        "duration": duration,
-        "rate": rate,
-        "sampling": sampling,
-        "columns": columns,
-        "gyro_unit": gyro_unit,
-        "accel_unit": accel_unit,
-        "time_unit": time_unit,
-        "axes": axes,
-        "repair": repair or None,
+        **log.given(),
     }
+    refuse_result(source, "log")
     own = source.suffix.lower() == ".toml"
-    with progress(quiet or json) as show:
+    if own:
+        flag_words(source, given)
+    asked = read_alignment_spec(source) if own else None
+    folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
+    check_destination(folder, write.force)
+    with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        if own:
-            flag_words(source, given)
-            spec = read_alignment_spec(source)
-        else:
-            spec = spec_of_flags(source, given)
+        spec = spec_of_flags(source, given) if asked is None else asked
         result = run_alignment(spec, source if own else None, report)
-        seal = write_alignment(result, folder, force=force, progress=report)
+        seal = write_alignment(result, folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
-    if json:
+    if write.json:
         typer.echo((seal.path / "align.json").read_text(encoding="utf-8"), nl=False)
         return
-    if quiet:
+    if write.quiet:
         return
     print_alignment(result)
     print_findings(result.findings, MOST)

@@ -8,29 +8,45 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.alignment_checks import NOT_BEFORE_FINE
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.exceptions import ConfigError, StrapdownError
 from strapdown.formats import read_raw
-from strapdown.formats.columns import parse_column_option
 
-__all__ = ["as_flag", "flag_words", "module_of_flag", "refused_flag", "spec_of_flags"]
+__all__ = [
+    "LOG_FLAGS",
+    "as_flag",
+    "flag_of",
+    "flag_words",
+    "module_of_flag",
+    "refused_flag",
+    "spec_of_flags",
+]
 
+#: Of how a log is read; the same of every command.
+LOG_FLAGS = {
+    "axes, axes": "--axes",
+    "log, from_s": "--from",
+    "log, to_s": "--to",
+    "log, duration_s": "--duration",
+    "log, sampling": "--sampling",
+    "log, rate_hz": "--rate",
+    "log, columns": "--columns",
+    "log, repair": "--repair",
+    "log, gyro_unit": "--gyro-unit",
+    "log, accel_unit": "--accel-unit",
+    "log, time_unit": "--time-unit",
+}
 #: Flags by the place in a specification.
 FLAGS = {
     "site, lat_deg": "--lat",
     "site, lon_deg": "--lon",
     "site, alt_m": "--alt",
     "sensors, sensor": "--sensor",
-    "axes, axes": "--axes",
     "gnss, path": "--gnss",
-    "log, sampling": "--sampling",
-    "log, rate_hz": "--rate",
-    "log, duration_s": "--duration",
-    "log, gyro_unit": "--gyro-unit",
-    "log, accel_unit": "--accel-unit",
-    "log, time_unit": "--time-unit",
+    **LOG_FLAGS,
 }
 _STAGES = {"coarse": "--method", "prefilter": "--prefilter"}
 
@@ -60,7 +76,7 @@ def flag_words(
     written = [name for name, value in given.items() if value is not None]
     if not written:
         return
-    flag = "--" + written[0].removesuffix("_s").replace("_", "-")
+    flag = flag_of(written[0])
     raise ConfigError(
         f"{what} says how it is run, and this is said beside it",
         file=source.name,
@@ -68,6 +84,11 @@ def flag_words(
         remedy=f"write {_key(flag, flags)} in the file; --out, --force, --json and --quiet go "
         "with both",
     )
+
+
+def flag_of(name: str) -> str:
+    """The flag of a parameter of a command."""
+    return "--" + name.removesuffix("_s").replace("_", "-")
 
 
 def _key(flag: str, flags: Mapping[str, str]) -> str:
@@ -100,11 +121,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     DataError
         The log cannot be read.
     """
-    first, duration = given["from_s"], given["duration"]
-    if duration is not None and not duration > 0.0:
-        raise ConfigError(
-            f"{duration:g} s is no duration", quantity="--duration", remedy="give seconds above 0"
-        )
+    keys = log_keys(given)
     if given["sensor"] is None:
         raise ConfigError(
             "nothing says how good the sensors are, and without that no attitude has a bound: a "
@@ -113,23 +130,11 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             remedy="name one of the catalogue (strapdown modules) or a .toml file of your own; or "
             "state bias and noise in the file of an alignment (strapdown init align)",
         )
-    options = {
-        "path": str(log),
-        "columns": parse_column_option(given["columns"] or []),
-        "gyro_unit": given["gyro_unit"],
-        "accel_unit": given["accel_unit"],
-        "time_unit": given["time_unit"],
-        "sampling": given["sampling"],
-        "rate_hz": given["rate"],
-        "repair": bool(given["repair"]),
-        "from_s": first,
-        "duration_s": duration,
-    }
     coarse = module_of_flag(given["method"] or "inertial_frame")
     alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
     table = {
         "name": log.resolve().stem,
-        "log": options,
+        "log": {"path": str(log), **keys},
         "axes": {"axes": given["axes"]},
         "site": _site(log, given),
         "sensors": {"sensor": given["sensor"]},

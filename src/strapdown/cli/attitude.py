@@ -8,30 +8,28 @@ from typing import Annotated
 
 import typer
 
-from strapdown.cli.log_options import (
-    LOG_PANEL,
-    AccelUnit,
-    Axes,
-    Columns,
-    GyroUnit,
-    Repair,
-    Sampling,
-    TimeUnit,
+from strapdown.cli.shared_options import (
+    OUT_PANEL,
+    RUN_PANEL,
+    LogFlags,
+    OutFlags,
+    folder_to_make,
+    spread,
 )
 
 EPILOG = (
     "Example: strapdown attitude alexiev-fig4 --rate 100\n\n"
     "Example: strapdown attitude log.csv --gyro-unit deg/s --reference 'end same as start'"
 )
-_RUN, _OUT = "What to run", "What to write"
 
 
+@spread
 def attitude(
     sources: Annotated[
         list[str],
         typer.Argument(
             metavar="LOG|SCENARIO",
-            help="A log (a file or a folder; see: strapdown modules), or the name of a scenario. "
+            help="A log (a file or a folder), or the name of a scenario (strapdown modules). "
             "Several are trials of one question.",
         ),
     ],
@@ -40,8 +38,10 @@ def attitude(
         typer.Option(
             metavar="NAMES",
             help="Names joined by blanks or commas, with options after a colon: 'naive "
-            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all.",
-            rich_help_panel=_RUN,
+            "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all (naive euler dcm quaternion rk4 "
+            "rotvec).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "naive euler dcm quaternion rk4 rotvec",
     rates: Annotated[
@@ -49,26 +49,35 @@ def attitude(
         typer.Option(
             metavar="HZ,HZ,…",
             help="Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     tolerance_deg: Annotated[
         float,
         typer.Option(
-            metavar="DEG", help="What is accurate enough: the largest error.", rich_help_panel=_RUN
+            metavar="DEG",
+            help="What is accurate enough: the largest error (1).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = 1.0,
     interpolation: Annotated[
         str,
         typer.Option(
             metavar="KIND",
-            help="How rates run between their stamps: linear (the trapezoid), or cubic.",
-            rich_help_panel=_RUN,
+            help="How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "linear",
     trials: Annotated[
         int,
-        typer.Option(metavar="N", help="Of a scenario: so many seeds.", rich_help_panel=_RUN),
+        typer.Option(
+            metavar="N",
+            help="Of a scenario: so many seeds (1).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
     ] = 1,
     reference: Annotated[
         list[str] | None,
@@ -77,7 +86,7 @@ def attitude(
             help="What is known, as often as you like: 'end same as start', 'end 2 turns about z "
             "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
             "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     reference_log: Annotated[
@@ -85,15 +94,16 @@ def attitude(
         typer.Option(
             metavar="LOG",
             help="Log of a second, better sensor on the same body, to be taken for the truth.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     initial: Annotated[
         str,
         typer.Option(
             metavar="ATTITUDE",
-            help="auto, truth, level, zero, or roll,pitch,heading in deg.",
-            rich_help_panel=_RUN,
+            help="auto, truth, level, zero, or roll,pitch,heading in deg (auto).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "auto",
     gyro_bias: Annotated[
@@ -101,8 +111,10 @@ def attitude(
         typer.Option(
             metavar="BIAS",
             help="none; rest (mean of the first stationary stretch); rests (course through all of "
-            "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still.",
-            rich_help_panel=_RUN,
+            "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still "
+            "(none).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "none",
     peers: Annotated[
@@ -110,80 +122,48 @@ def attitude(
         typer.Option(
             metavar="NAMES",
             help="Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
-    from_s: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
-    ] = None,
-    to_s: Annotated[
-        float | None, typer.Option("--to", metavar="S", help="End here.", rich_help_panel=_RUN)
-    ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ",
-            help="Rate of a scenario (100), or of a log without a time column.",
-            rich_help_panel=LOG_PANEL,
-        ),
-    ] = None,
-    sampling: Sampling = None,
-    columns: Columns = None,
-    gyro_unit: GyroUnit = None,
-    accel_unit: AccelUnit = None,
-    time_unit: TimeUnit = None,
-    axes: Axes = None,
-    repair: Repair = False,
     seed: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Of a scenario's noise (0).", rich_help_panel=_RUN),
+        typer.Option(
+            metavar="N", help="Of a scenario's simulated errors (0).", rich_help_panel=RUN_PANEL
+        ),
     ] = None,
     sensor: Annotated[
         str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help="Of a scenario: a sensor of the catalogue, with its errors.",
-            rich_help_panel=_RUN,
+            help="Of a scenario: its errors are those of a unit of this sensor of the catalogue "
+            "(strapdown modules), or of a .toml file of your own.",
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
+    *,
+    log: LogFlags,
     export_c: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.c",
             help="Write the algorithm that the answer chose (or the only one named) as C99, with "
             "a test vector of this log.",
-            rich_help_panel=_OUT,
+            rich_help_panel=OUT_PANEL,
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder to make (LOG-attitude).",
-            rich_help_panel=_OUT,
-        ),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    speed: Annotated[
+    timing: Annotated[
         bool,
         typer.Option(
-            "--speed",
+            "--timing",
             help="Print how long a sample takes on this machine (it is in timing.json, too).",
-            rich_help_panel=_OUT,
+            rich_help_panel=OUT_PANEL,
         ),
     ] = False,
     png: Annotated[
-        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=_OUT)
+        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=OUT_PANEL)
     ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    out: Annotated[Path | None, folder_to_make("LOG-attitude")] = None,
+    write: OutFlags,
 ) -> None:
     """Name the simplest attitude algorithm, and the lowest rate, that are accurate enough.
 
@@ -197,15 +177,18 @@ def attitude(
     from strapdown.bundle.timing import write_timing
     from strapdown.cli.attitude_tables import print_bench, print_speed
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
+    from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.formats.columns import parse_column_option
     from strapdown.report.attitude import attitude_json, write_attitude
     from strapdown.report.attitude_c import check_c, chosen_for_c, write_c
     from strapdown.systems.attitude_bench import bench_attitude
 
-    folder = out or Path(f"{Path(sources[0]).resolve().stem}-attitude")
-    check_destination(folder, force)
-    check_c(export_c, force)
-    with progress(quiet or json) as show:
+    for source in sources:
+        refuse_result(source, "log")
+    folder = out or default_folder(sources[0], "attitude")
+    check_destination(folder, write.force)
+    check_c(export_c, write.force)
+    with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         bench = bench_attitude(
             sources,
@@ -219,26 +202,27 @@ def attitude(
             peers=(peers or "").replace(",", " ").split(),
             initial=initial,
             gyro_bias=gyro_bias,
-            rate=rate,
-            sampling=sampling,
+            rate=log.rate,
+            sampling=log.sampling,
             seed=seed,
             sensor=sensor,
-            columns=parse_column_option(columns or []),
-            gyro_unit=gyro_unit,
-            accel_unit=accel_unit,
-            time_unit=time_unit,
-            axes=axes,
-            repair=repair,
-            from_s=from_s,
-            to_s=to_s,
+            columns=parse_column_option(log.columns or []),
+            gyro_unit=log.gyro_unit,
+            accel_unit=log.accel_unit,
+            time_unit=log.time_unit,
+            axes=log.axes,
+            repair=log.repair,
+            from_s=log.from_s,
+            to_s=log.to_s,
+            duration_s=log.duration,
             progress=report,
         )
         if export_c is not None:
             chosen_for_c(bench)
         report("writing", 0.95)
-        seal = write_attitude(bench, folder, force=force, png=png)
+        seal = write_attitude(bench, folder, force=write.force, png=png)
         if export_c is not None:
-            exported = write_c(bench, export_c, force=force)
+            exported = write_c(bench, export_c, force=write.force)
         report("timing", 0.99)
         taken = time_algorithms([make_algorithm(run.algorithm) for run in bench.runs])
         report.stop()
@@ -247,13 +231,13 @@ def attitude(
             for name, double, single in taken.itertuples(index=False)
         }
         write_timing(seal, report.seconds, of_sample)
-    if json:
+    if write.json:
         typer.echo(json_module.dumps(attitude_json(bench), indent=2, ensure_ascii=False))
         return
-    if quiet:
+    if write.quiet:
         return
     print_bench(bench)
-    if speed:
+    if timing:
         print_speed(taken)
     print_findings(bench.findings)
     print_seal(seal, "report.html")

@@ -7,18 +7,20 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.shared_options import RUN_PANEL, OutFlags, folder_to_make, spread
+
 EPILOG = (
     "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
     "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
 )
-_WHAT, _START, _RUN, _OUT = (
+_WHAT, _START, _WHERE = (
     "How it moves, of a sensor",
     "What is known at the start, of a sensor",
     "Where, of a run of navigation",
-    "What to write",
 )
 
 
+@spread
 def coast(
     source: Annotated[
         str,
@@ -30,7 +32,13 @@ def coast(
         ),
     ],
     outage: Annotated[
-        float, typer.Option(metavar="S", help="How long nothing aids it (60).")
+        float,
+        typer.Option(
+            metavar="S",
+            help="How long nothing aids it (60).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
     ] = 60.0,
     speed: Annotated[
         float | None,
@@ -114,27 +122,40 @@ def coast(
         typer.Option(
             metavar="S",
             help="The outage begins at this stamp of the log; even places, if not given.",
-            rich_help_panel=_RUN,
+            rich_help_panel=_WHERE,
         ),
     ] = None,
     places: Annotated[
         int | None,
-        typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_RUN),
+        typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_WHERE),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (SOURCE-coast).", rich_help_panel=_OUT),
+    from_s: Annotated[
+        float | None,
+        typer.Option(
+            "--from",
+            metavar="S",
+            help="Begin at this stamp; where the filter has settled, if not given.",
+            rich_help_panel=_WHERE,
+        ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    to_s: Annotated[
+        float | None,
+        typer.Option(
+            "--to",
+            metavar="S",
+            help="End at this stamp; the last, if not given.",
+            rich_help_panel=_WHERE,
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=_WHERE
+        ),
+    ] = None,
+    *,
+    out: Annotated[Path | None, folder_to_make("SENSOR-coast, or DRIVE-coast")] = None,
+    write: OutFlags,
 ) -> None:
     """Foretell how far it drifts when its aids are away, and what makes the drift.
 
@@ -146,14 +167,18 @@ def coast(
     from strapdown.cli.coast_options import coast_of_flags
     from strapdown.cli.coast_tables import print_coast
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.result_folder import default_folder, source_name
     from strapdown.report.coast import read_coasting_run, write_coast
     from strapdown.systems.coasting.run import run_coast
+    from strapdown.systems.part_of_log import check_part
 
-    folder = out or Path(f"{Path(source).resolve().stem}-coast")
-    check_destination(folder, force)
-    with progress(quiet or json) as show:
+    check_part(from_s, to_s, duration)
+    navigation, file = read_coasting_run(source)
+    named = None if navigation is None or file is None else source_name(navigation)
+    folder = out or default_folder(source, "coast", named)
+    check_destination(folder, write.force)
+    with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        navigation, file = read_coasting_run(source)
         spec = coast_of_flags(
             source,
             outage,
@@ -176,16 +201,22 @@ def coast(
                 "accel_bias_sd_ug": accel_bias_sd,
             },
             keep=keep or [],
-            run={"at_s": at, "places": places},
+            run={
+                "at_s": at,
+                "places": places,
+                "from_s": from_s,
+                "to_s": to_s,
+                "duration_s": duration,
+            },
         )
         result = run_coast(spec, navigation, file, report)
-        seal = write_coast(result, folder, force=force, progress=report)
+        seal = write_coast(result, folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
-    if json:
+    if write.json:
         typer.echo((seal.path / "coast.json").read_text(encoding="utf-8"), nl=False)
         return
-    if quiet:
+    if write.quiet:
         return
     print_coast(result)
     print_findings(result.findings)

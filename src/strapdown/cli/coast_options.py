@@ -17,6 +17,9 @@ FLAGS = {
     "outage_s": "--outage",
     "places": "--places",
     "at_s": "--at",
+    "from_s": "--from",
+    "to_s": "--to",
+    "duration_s": "--duration",
     "sensor": "SENSOR|BUNDLE",
     "motion, speed_m_per_s": "--speed",
     "motion, to_speed_m_per_s": "--to-speed",
@@ -68,6 +71,13 @@ def coast_of_flags(
         A value does not fit, or goes with the other kind of source; the message names the flag.
     """
     _refuse_others(source, of_run, motion, start, keep, run)
+    parts = [key for key in ("from_s", "to_s", "duration_s") if run.get(key) is not None]
+    if run.get("at_s") is not None and parts:
+        raise ConfigError(
+            "--at says where the one outage is",
+            quantity=FLAGS[parts[0]],
+            remedy="keep one of the two",
+        )
     aiding: dict[str, Any] = {}
     for text in keep:
         module = module_of_flag(text)

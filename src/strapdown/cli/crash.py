@@ -7,19 +7,19 @@ from typing import Annotated
 
 import typer
 
-EPILOG = "Example: strapdown init crash record.csv, then strapdown crash case.toml"
+from strapdown.cli.shared_options import OutFlags, folder_to_make, spread
+
+EPILOG = "Example: strapdown crash case.toml (strapdown init crash RECORD writes one)"
 
 
+@spread
 def crash(
     case: Annotated[
         Path, typer.Argument(metavar="CASE.toml", help="The case; strapdown init crash writes one.")
     ],
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to make (CASE-crash).")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON alone.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    *,
+    out: Annotated[Path | None, folder_to_make("CASE-crash")] = None,
+    write: OutFlags,
 ) -> None:
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.
 
@@ -30,23 +30,25 @@ def crash(
     from strapdown.bundle.timing import write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.crash_tables import print_crash
+    from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.config.crash_case_file import read_case_spec
     from strapdown.report.crash_case import write_crash
     from strapdown.systems.crash_case import run_case
 
-    folder = out or Path(f"{case.resolve().stem}-crash")
-    check_destination(folder, force)
+    refuse_result(case, "case")
+    folder = out or default_folder(case, "crash")
+    check_destination(folder, write.force)
     spec = read_case_spec(case)
-    with progress(quiet or json) as show:
+    with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         result = run_case(spec, case, report)
-        seal = write_crash(result, folder, force=force, progress=report)
+        seal = write_crash(result, folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
-    if json:
+    if write.json:
         typer.echo((seal.path / "crash.json").read_text(encoding="utf-8"), nl=False)
         return
-    if quiet:
+    if write.quiet:
         return
     console().print(spec.title, style="bold")
     print_crash(result)

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from strapdown.cli.shared_options import WriteFlags, folder_to_make, spread
 
 if TYPE_CHECKING:
     from strapdown.systems.progress import Progress
@@ -15,12 +15,11 @@ EPILOG = "Example: strapdown demo --out demo"
 _PAGE = "index.html"
 
 
+@spread
 def demo(
-    out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder to make (demo).", show_default=False)
-    ] = Path("demo"),
-    force: Annotated[bool, typer.Option("--force", help="Replace results that are there.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    *,
+    out: Annotated[Path, folder_to_make("demo")] = Path("demo"),
+    write: WriteFlags,
 ) -> None:
     """Show what all of it answers, in one page: attitude, a crash, navigation.
 
@@ -42,7 +41,7 @@ def demo(
         if absent
         else None
     )
-    _check(out, [name for run in there for name in run.folders], force)
+    _check(out, [name for run in there for name in run.folders], write.force)
     # What it says is of the results before.
     (out / _PAGE).unlink(missing_ok=True)
     page = console()
@@ -50,10 +49,10 @@ def demo(
     done = 0.0
     for run in there:
         shown = run.shown
-        with progress(quiet) as show:
-            run.make(out, force, _part_of(show, shown.title, done / whole, run.takes / whole))
+        with progress(write.quiet) as show:
+            run.make(out, write.force, _part_of(show, shown.title, done / whole, run.takes / whole))
         done += run.takes
-        if quiet:
+        if write.quiet:
             continue
         page.print(f"{shown.part}  {shown.title}", style="bold")
         page.print(f"   {shown_answer(out / shown.slug)}")
@@ -63,7 +62,7 @@ def demo(
         if truth:
             page.print(f"   {truth}", style="green")
     _write_whole(out / _PAGE, demo_page([run.shown for run in there], out, missing))
-    if quiet:
+    if write.quiet:
         return
     if missing:
         console(err=True).print(f"note: {missing}")

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from strapdown.cli.log_options import (
-    AccelUnit,
-    Axes,
-    Columns,
-    GyroUnit,
-    Rate,
-    Repair,
-    Sampling,
-    TimeUnit,
+from strapdown.cli.shared_options import (
+    OUT_PANEL,
+    RUN_PANEL,
+    WITH_PANEL,
+    LogFlags,
+    Quiet,
+    log_keys,
+    spread,
 )
 
 if TYPE_CHECKING:
@@ -40,6 +39,20 @@ app = typer.Typer(
 )
 
 
+def _file_to_write(name: str) -> Any:
+    return typer.Option(
+        metavar="FILE",
+        help=f"File to write ({name}).",
+        rich_help_panel=OUT_PANEL,
+        show_default=False,
+    )
+
+
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace a file that is there.", rich_help_panel=OUT_PANEL)
+]
+
+
 @app.callback(epilog=EPILOG)
 def init() -> None:
     """Write a file to begin with, from your records: what they tell, and what only you know."""
@@ -56,11 +69,9 @@ def crash(
             show_default=False,
         ),
     ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The case file to write.")] = Path(
-        "case.toml"
-    ),
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    out: Annotated[Path, _file_to_write("case.toml")] = Path("case.toml"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the case file of a crash: records are looked through, and what is not in them is asked.
 
@@ -68,10 +79,13 @@ def crash(
     strapdown crash case.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.result_folder import refuse_result
     from strapdown.systems.crash_draft import draft_case, read_records
     from strapdown.systems.crash_draft.file import check_free, write_file
 
     check_free(out, force)
+    for record in records:
+        refuse_result(record, "record")
     with progress(quiet) as report:
         report("reading", 0.1)
         there = read_records(records)
@@ -95,6 +109,7 @@ def crash(
 
 
 @app.command("align", epilog=ALIGN_EPILOG)
+@spread
 def align(
     log: Annotated[
         Path,
@@ -102,42 +117,30 @@ def align(
             metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
         ),
     ],
-    columns: Columns = None,
-    gyro_unit: GyroUnit = None,
-    accel_unit: AccelUnit = None,
-    time_unit: TimeUnit = None,
-    axes: Axes = None,
-    rate: Rate = None,
-    sampling: Sampling = None,
-    repair: Repair = False,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
-        "align.toml"
-    ),
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    *,
+    flags: LogFlags,
+    out: Annotated[Path, _file_to_write("align.toml")] = Path("align.toml"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the file of an alignment: what a log tells is filled in, and what it does not is asked.
 
     Then: strapdown align align.toml
     """
-    from strapdown.formats import ReadOptions
-    from strapdown.formats.columns import parse_column_option
+    from strapdown.cli.console import progress
+    from strapdown.cli.result_folder import refuse_result
+    from strapdown.config.alignment import LogTable
+    from strapdown.config.spec import specify
     from strapdown.systems.alignment_draft import draft_alignment
     from strapdown.systems.crash_draft.file import check_free, write_file
 
     check_free(out, force)
-    options = ReadOptions(
-        columns=parse_column_option(columns or []),
-        gyro_unit=gyro_unit,
-        accel_unit=accel_unit,
-        time_unit=time_unit,
-        axes=axes,
-        rate=rate,
-        sampling=sampling,
-        repair=repair,
-    )
-    draft = draft_alignment(log, folder=out.absolute().parent, options=options)
-    write_file(out, draft.text, force=force)
+    refuse_result(log, "log")
+    with progress(quiet) as report:
+        report("reading", 0.3)
+        table = specify(LogTable, path=str(log), **log_keys(flags.given()))
+        draft = draft_alignment(table, folder=out.absolute().parent, axes=flags.axes)
+        write_file(out, draft.text, force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -147,6 +150,7 @@ def align(
 
 
 @app.command("navigate", epilog=NAVIGATE_EPILOG)
+@spread
 def navigate(
     log: Annotated[
         Path,
@@ -156,59 +160,53 @@ def navigate(
     ],
     gnss: Annotated[
         Path | None,
-        typer.Option(metavar="FIXES", help="Fixes of a satellite receiver."),
+        typer.Option(
+            metavar="FIXES", help="Fixes of a satellite receiver.", rich_help_panel=WITH_PANEL
+        ),
     ] = None,
     sensor: Annotated[
         str | None,
-        typer.Option(metavar="NAME|FILE", help="The sensor; the nearest by noise, if not given."),
+        typer.Option(
+            metavar="NAME|FILE",
+            help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
+            ".toml file of your own; the nearest by noise, if not given.",
+            rich_help_panel=WITH_PANEL,
+        ),
     ] = None,
     foot: Annotated[
         bool,
-        typer.Option("--foot", help="It is of a unit on a shoe: zero velocity at its stances."),
+        typer.Option(
+            "--foot",
+            help="It is of a unit on a shoe: zero velocity at its stances.",
+            rich_help_panel=RUN_PANEL,
+        ),
     ] = False,
-    columns: Columns = None,
-    gyro_unit: GyroUnit = None,
-    accel_unit: AccelUnit = None,
-    time_unit: TimeUnit = None,
-    axes: Axes = None,
-    rate: Rate = None,
-    sampling: Sampling = None,
-    repair: Repair = False,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The file to write.")] = Path(
-        "navigate.toml"
-    ),
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    *,
+    flags: LogFlags,
+    out: Annotated[Path, _file_to_write("navigate.toml")] = Path("navigate.toml"),
+    force: Force = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the file of a run of navigation: what log and fixes tell is filled in.
 
     Then: strapdown navigate navigate.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.result_folder import refuse_result
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
-    from strapdown.formats.columns import parse_column_option
     from strapdown.systems.crash_draft.file import check_free, write_file
     from strapdown.systems.sins.draft import draft_navigation
 
     check_free(out, force)
-    table = specify(
-        LogTable,
-        path=str(log),
-        columns=parse_column_option(columns or []),
-        gyro_unit=gyro_unit,
-        accel_unit=accel_unit,
-        time_unit=time_unit,
-        sampling=sampling,
-        rate_hz=rate,
-        repair=repair,
-    )
+    refuse_result(log, "log")
+    table = specify(LogTable, path=str(log), **log_keys(flags.given()))
     with progress(quiet) as report:
         report("reading", 0.3)
         draft = draft_navigation(
             table,
             folder=out.absolute().parent,
-            axes=axes,
+            axes=flags.axes,
             gnss=gnss,
             sensor=sensor,
             foot=foot,

@@ -7,15 +7,13 @@ from typing import Annotated, Any
 
 import typer
 
-from strapdown.cli.log_options import (
-    AccelUnit,
-    Axes,
-    Columns,
-    GyroUnit,
-    Rate,
-    Repair,
-    Sampling,
-    TimeUnit,
+from strapdown.cli.shared_options import (
+    RUN_PANEL,
+    WITH_PANEL,
+    LogFlags,
+    OutFlags,
+    folder_to_make,
+    spread,
 )
 
 EPILOG = (
@@ -23,9 +21,9 @@ EPILOG = (
     "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
 )
 MOST = 6  # findings on the terminal
-_WITH, _RUN, _OUT = "With what", "What to run", "What to write"
 
 
+@spread
 def navigate(
     source: Annotated[
         Path,
@@ -36,14 +34,16 @@ def navigate(
     ],
     gnss: Annotated[
         Path | None,
-        typer.Option(metavar="FIXES", help="Fixes of a satellite receiver.", rich_help_panel=_WITH),
+        typer.Option(
+            metavar="FIXES", help="Fixes of a satellite receiver.", rich_help_panel=WITH_PANEL
+        ),
     ] = None,
     lever_arm: Annotated[
         str | None,
         typer.Option(
             metavar="X,Y,Z",
             help="Of its antenna from the sensors, forward, right, down, m (0,0,0).",
-            rich_help_panel=_WITH,
+            rich_help_panel=WITH_PANEL,
         ),
     ] = None,
     sensor: Annotated[
@@ -52,34 +52,38 @@ def navigate(
             metavar="NAME|FILE",
             help="How good the sensors are: a sensor of the catalogue (strapdown modules), or a "
             ".toml file of your own.",
-            rich_help_panel=_WITH,
+            rich_help_panel=WITH_PANEL,
         ),
     ] = None,
     lat: Annotated[
         float | None,
         typer.Option(
-            metavar="DEG", help="Latitude at the start, without fixes.", rich_help_panel=_WITH
+            metavar="DEG", help="Latitude at the start, without fixes.", rich_help_panel=WITH_PANEL
         ),
     ] = None,
     lon: Annotated[
         float | None,
-        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=_WITH),
+        typer.Option(metavar="DEG", help="Longitude, east positive.", rich_help_panel=WITH_PANEL),
     ] = None,
     alt: Annotated[
         float | None,
-        typer.Option(metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=_WITH),
+        typer.Option(
+            metavar="M", help="Height over the ellipsoid (0).", rich_help_panel=WITH_PANEL
+        ),
     ] = None,
     heading: Annotated[
         float | None,
         typer.Option(
             metavar="DEG",
             help="Heading at the start, where neither the gyros nor a course can tell it.",
-            rich_help_panel=_WITH,
+            rich_help_panel=WITH_PANEL,
         ),
     ] = None,
     truth: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="A trajectory to compare with.", rich_help_panel=_WITH),
+        typer.Option(
+            metavar="FILE", help="A trajectory to compare with.", rich_help_panel=WITH_PANEL
+        ),
     ] = None,
     points: Annotated[
         Path | None,
@@ -87,7 +91,7 @@ def navigate(
             metavar="FILE",
             help="Control points (time, north, east) to score the path by, after the origin and "
             "heading that fit best.",
-            rich_help_panel=_WITH,
+            rich_help_panel=WITH_PANEL,
         ),
     ] = None,
     smooth: Annotated[
@@ -95,26 +99,16 @@ def navigate(
         typer.Option(
             "--smooth",
             help="When it has ended, tell every state by all observations, later ones too.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = False,
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
-    ] = None,
     pace: Annotated[
         str | None,
         typer.Option(
             metavar="N|max",
             help="Play the record sample by sample, N times as fast as it was taken, and tell how "
             "long each sample takes.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     live: Annotated[
@@ -123,57 +117,47 @@ def navigate(
             metavar="-|udp://HOST:PORT",
             help="Take samples as they come, as lines of standard input or of datagrams, by the "
             "file of a run.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     every: Annotated[
         float,
         typer.Option(
-            metavar="S", help="With --live: a line of the state so often.", rich_help_panel=_RUN
+            metavar="S",
+            help="With --live: a line of the state so often (1).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = 1.0,
     lines: Annotated[
         str,
-        typer.Option(metavar="json|csv", help="With --live: as what.", rich_help_panel=_RUN),
+        typer.Option(
+            metavar="json|csv",
+            help="With --live: as what (json).",
+            show_default=False,
+            rich_help_panel=RUN_PANEL,
+        ),
     ] = "json",
-    rate: Rate = None,
-    sampling: Sampling = None,
-    columns: Columns = None,
-    gyro_unit: GyroUnit = None,
-    accel_unit: AccelUnit = None,
-    time_unit: TimeUnit = None,
-    axes: Axes = None,
-    repair: Repair = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (LOG-navigate).", rich_help_panel=_OUT),
-    ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    *,
+    log: LogFlags,
+    out: Annotated[Path | None, folder_to_make("LOG-navigate")] = None,
+    write: OutFlags,
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_latency, write_timing
-    from strapdown.cli.align_options import flag_words
+    from strapdown.cli.align_options import flag_of, flag_words
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency
     from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
+    from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.navigation_file import read_navigation_spec
     from strapdown.live.replay import Replay, parse_pace
     from strapdown.report.navigation import write_navigation
     from strapdown.systems.sins.run import run_navigation
 
-    folder = out or Path(f"{source.resolve().stem}-navigate")
-    check_destination(folder, force)
+    refuse_result(source, "log")
     played = None if pace is None else Replay(parse_pace(pace))
     given: dict[str, Any] = {
         "gnss": gnss,
@@ -186,53 +170,47 @@ def navigate(
         "truth": truth,
         "points": points,
         "smooth": smooth or None,
-        "from_s": from_s,
-        "duration": duration,
-        "rate": rate,
-        "sampling": sampling,
-        "columns": columns,
-        "gyro_unit": gyro_unit,
-        "accel_unit": accel_unit,
-        "time_unit": time_unit,
-        "axes": axes,
-        "repair": repair or None,
+        **log.given(),
     }
+    own = source.suffix.lower() == ".toml"
+    if own and live is None:
+        flag_words(source, given, "the file of a run", FLAGS)
+    asked = read_navigation_spec(source) if own else None
+    folder = out or default_folder(
+        source, "navigate", None if asked is None else source_name(asked)
+    )
+    check_destination(folder, write.force)
     if live is not None:
         from strapdown.cli.navigate_live import navigate_live
 
-        refused = {f"--{name.replace('_', '-')}": value for name, value in given.items()}
+        refused = {flag_of(name): value for name, value in given.items()}
         navigate_live(
             source,
             live,
             folder,
             lines=lines,
             every=every,
-            force=force,
-            quiet=quiet,
-            given={**refused, "--pace": pace, "--json": json or None},
+            force=write.force,
+            quiet=write.quiet,
+            given={**refused, "--pace": pace, "--json": write.json or None},
         )
         return
-    own = source.suffix.lower() == ".toml"
-    with progress(quiet or json) as show:
+    with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        if own:
-            flag_words(source, given, "the file of a run", FLAGS)
-            spec = read_navigation_spec(source)
-        else:
-            report("looking through", 0.01)
-            spec = navigation_of_flags(source, given)
+        report("looking through", 0.01)
+        spec = navigation_of_flags(source, given) if asked is None else asked
         drive: dict[str, Any] = {} if played is None else {"drive": played}
         result = run_navigation(spec, source if own else None, report, **drive)
-        seal = write_navigation(result, folder, force=force, progress=report)
+        seal = write_navigation(result, folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
         latency = None if played is None else played.tape.latency()
         if latency is not None:
             write_latency(seal, {"pace": pace, **latency.told()})
-    if json:
+    if write.json:
         typer.echo((seal.path / "navigation.json").read_text(encoding="utf-8"), nl=False)
         return
-    if quiet:
+    if write.quiet:
         return
     print_navigation(result)
     if latency is not None:

@@ -7,9 +7,12 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.shared_options import OutFlags, folder_to_make, spread
+
 EPILOG = "Example: strapdown reproduce alexiev --out alexiev"
 
 
+@spread
 def reproduce(
     paper: Annotated[
         str,
@@ -18,12 +21,9 @@ def reproduce(
             help="alexiev: Alexiev (2021); tadic: Tadic (2016); chernodarov: Chernodarov (2009).",
         ),
     ],
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder to make (PAPER-reproduced).")
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON alone.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    *,
+    out: Annotated[Path | None, folder_to_make("PAPER-reproduced")] = None,
+    write: OutFlags,
 ) -> None:
     """Re-make a paper: its figures, and a verdict on each of its statements.
 
@@ -41,18 +41,18 @@ def reproduce(
 
     spec = reproduction_specification(paper)
     folder = out or Path(f"{spec.paper}-reproduced")
-    check_destination(folder, force)
-    with progress(quiet or json) as show:
+    check_destination(folder, write.force)
+    with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         made = make_reproduction(spec, report)
         report("writing", 0.9)
-        seal = write_reproduction(made, folder, force=force)
+        seal = write_reproduction(made, folder, force=write.force)
         report.stop()
         write_timing(seal, report.seconds)
-    if json:
+    if write.json:
         typer.echo((seal.path / "reproduction.json").read_text(encoding="utf-8"), nl=False)
         return
-    if quiet:
+    if write.quiet:
         return
     page = console()
     page.print(made.paper)

@@ -7,28 +7,42 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.shared_options import (
+    OUT_PANEL,
+    RUN_PANEL,
+    OutFlags,
+    folder_to_make,
+    spread,
+)
+
 EPILOG = "Example: strapdown simulate alexiev-fig4 --rate 100 --format all --out fig4"
 
 
+@spread
 def simulate(
     name: Annotated[
         str,
         typer.Argument(
             metavar="NAME|FILE",
-            help="A scenario or a crash (see: strapdown modules), or a trajectory's file (.toml), "
+            help="A scenario or a crash (strapdown modules), or a trajectory's file (.toml), "
             "whose values the options replace.",
         ),
     ],
     rate: Annotated[
         float | None,
-        typer.Option(metavar="HZ", help="Samples a second (100; of a crash each recorder's own)."),
+        typer.Option(
+            metavar="HZ",
+            help="Samples a second (100; of a crash each recorder's own).",
+            rich_help_panel=RUN_PANEL,
+        ),
     ] = None,
     sampling: Annotated[
         str | None,
         typer.Option(
             metavar="KIND",
-            help="instantaneous (the rate at the stamp, as without it) or mean (over the interval "
-            "that ends there).",
+            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
+            "there); instantaneous, if not given.",
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     formats: Annotated[
@@ -37,15 +51,20 @@ def simulate(
             "--format",
             metavar="F",
             help="csv, npz, h5, mat (joined by commas), or all (csv); of a crash csv, mme.",
+            rich_help_panel=OUT_PANEL,
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(metavar="N", help="Of the errors (0).")] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Of the simulated errors (0).", rich_help_panel=RUN_PANEL),
+    ] = None,
     sensor: Annotated[
         str | None,
         typer.Option(
             metavar="NAME|FILE",
-            help="Errors of one unit of this sensor (see: strapdown modules), instead of the "
-            "scenario's own.",
+            help="The errors are those of a unit of this sensor of the catalogue (strapdown "
+            "modules), or of a .toml file of your own; the scenario's own, if not given.",
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     units: Annotated[
@@ -53,37 +72,36 @@ def simulate(
         typer.Option(
             metavar="NAMES",
             help="Recorders of a crash, joined by commas, or all (IMU1,IMU2).",
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (NAME-simulated)."),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a result that is there.")] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print the scenario as JSON alone.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors.")] = False,
+    *,
+    out: Annotated[Path | None, folder_to_make("NAME-simulated")] = None,
+    write: OutFlags,
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.cli.console import console, print_seal, progress
-    from strapdown.report.simulation import simulate as write
+    from strapdown.cli.result_folder import default_folder
+    from strapdown.report.simulation import simulate as simulate_and_write
 
     title = Path(name).stem if name.lower().endswith(".toml") else name
-    with progress(quiet or json) as report:
+    folder = out or default_folder(name, "simulated")
+    with progress(write.quiet or write.json) as report:
         report("simulating and writing", 0.5)
-        seal = write(
+        seal = simulate_and_write(
             name,
-            out or Path(f"{title}-simulated"),
+            folder,
             rate=rate,
             sampling=sampling,
             seed=seed,
             sensor=sensor,
             formats=None if formats is None else formats.replace(",", " ").split(),
             units=() if units is None else units.replace(",", " ").split(),
-            force=force,
+            force=write.force,
         )
-    if json:
+    if write.json:
         typer.echo((seal.path / "scenario.json").read_text(encoding="utf-8"), nl=False)
-    elif not quiet:
+    elif not write.quiet:
         files = sorted(p.name for p in seal.path.iterdir())
         console().print(f"{title}: {', '.join(files)}")
         case = (seal.path / "case.toml").is_file()

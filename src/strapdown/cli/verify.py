@@ -7,21 +7,21 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.shared_options import Json, Quiet
+
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
 CHANGED = 6
 
 
 def verify(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a run wrote.")],
-    json: Annotated[bool, typer.Option("--json", help="Print the verdict as JSON alone.")] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing; the exit code tells.")
-    ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Run a result again from its own configuration and compare it bit for bit.
 
     Answers identical, numerically equal within a number (another processor or version), or
-    changed, and names what. Exit code 6 where it has changed.
+    changed, and names what. Exit code 6 where it has changed, with --quiet, too.
     """
     from strapdown.bundle.json_text import to_json
     from strapdown.cli.console import console, progress

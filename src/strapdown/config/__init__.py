@@ -71,6 +71,7 @@ class AttitudeSpec(Spec):
     peers: tuple[str, ...] = ()
     from_s: FiniteFloat | None = None
     to_s: FiniteFloat | None = None
+    duration_s: FiniteFloat | None = None
 
 
 class SimulateSpec(Spec):

@@ -63,6 +63,10 @@ class CoastSpec(TableSpec):
     aiding: TableSpec = TableSpec()
     #: Of a run of navigation: where the outage begins; even places, if not given.
     at_s: Number | None = None
+    #: In its place the part of the log that they lie in; all of it, if not given.
+    from_s: Number | None = None
+    to_s: Number | None = None
+    duration_s: Positive | None = None
     places: StrictInt = Field(default=10, ge=1, le=100)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.exceptions import ConfigError, DataError, StrapdownError, nearest
 from strapdown.formats import (
     broad,
     comma2k19,
@@ -29,6 +29,7 @@ from strapdown.formats import (
     sensorstream,
 )
 from strapdown.formats.assemble import assemble
+from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog, ReadOptions, Recording
 
 __all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_joined", "read_log", "read_raw"]
@@ -121,18 +122,52 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
             return reader.read(path)
     kinds = "; ".join(r.title for r in READERS.values())
     if path.is_dir():
-        inside = sorted(p.name for p in path.iterdir())
-        shown = ", ".join(inside[:6]) + (" …" if len(inside) > 6 else "")
-        raise DataError(
-            f"the folder is no known recording; it holds: {shown or 'nothing'}",
-            file=path.resolve().name,
-            remedy="give one file of it",
-        )
+        raise _no_recording(path)
     raise DataError(
         f"the ending '{path.suffix}' is of no known format",
         file=path.name,
         remedy=f"give one of: {kinds}",
     )
+
+
+#: Names of a folder that are looked through, and that a message has at most.
+MOST_NAMES, MOST_SHOWN = 1000, 6
+#: Of files up to this size it is looked whether a gyro or an accelerometer is in them.
+MOST_BYTES = 64 * 1024 * 1024
+
+
+def _no_recording(path: Path) -> DataError:
+    """A folder is no recording of its own: name what in it is one."""
+    inside = sorted(path.iterdir())[:MOST_NAMES]
+    may_be = [p for p in inside if any(r.detect(p) for r in READERS.values())]
+    logs = [p.name for p in may_be if _has_sensors(p)]
+    shown = logs or [p.name for p in inside]
+    names = ", ".join(shown[:MOST_SHOWN]) + (" …" if len(shown) > MOST_SHOWN else "")
+    if not logs:
+        return DataError(
+            f"the folder is no known recording; it holds: {names or 'nothing'}",
+            file=path.resolve().name,
+            remedy="give one file of it, or the folder of a known recording (strapdown modules)",
+        )
+    return DataError(
+        "the folder is no recording by itself; "
+        + (f"it holds one: {names}" if len(logs) == 1 else f"it holds {len(logs)}: {names}"),
+        file=path.resolve().name,
+        remedy=f"give {'it' if len(logs) == 1 else 'one of them'}: {path / logs[0]}",
+    )
+
+
+def _has_sensors(path: Path) -> bool:
+    """Whether a log has a gyro or an accelerometer; a table of fixes has neither."""
+    if path.is_file() and path.stat().st_size > MOST_BYTES:
+        return True
+    try:
+        raw = read_raw(path)
+    except StrapdownError:
+        return False
+    said = [quantity for quantity, _ in raw.stated.values()]
+    said += [str(read_name(column).quantity) for column in raw.columns]
+    return any(quantity.startswith(("gyro", "accel")) for quantity in said)
 
 
 def read_joined(paths: Sequence[str | Path], options: ReadOptions | None = None) -> Recording:

@@ -9,10 +9,17 @@ from pathlib import Path
 import pandas as pd
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats import gnss_columns, gnss_kf_gins, gnss_nmea, gnss_pos, pyins
+from strapdown.formats import (
+    gnss_columns,
+    gnss_comma2k19,
+    gnss_kf_gins,
+    gnss_nmea,
+    gnss_pos,
+    pyins,
+)
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions, table_of_fixes
 
-__all__ = ["GNSS_READERS", "GnssOptions", "GnssReader", "read_gnss"]
+__all__ = ["GNSS_READERS", "GnssOptions", "GnssReader", "files_of_fixes", "read_gnss"]
 
 
 @dataclass(frozen=True)
@@ -26,6 +33,9 @@ class GnssReader:
 
 #: In the order in which they are tried.
 GNSS_READERS: dict[str, GnssReader] = {
+    "comma2k19": GnssReader(
+        "receiver of a comma2k19 segment, its folder", gnss_comma2k19.detect, gnss_comma2k19.read
+    ),
     "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
     "nmea": GnssReader("NMEA 0183: GGA, RMC, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
     "kf-gins": GnssReader(
@@ -40,6 +50,16 @@ GNSS_READERS: dict[str, GnssReader] = {
         gnss_columns.read,
     ),
 }
+
+
+def files_of_fixes(path: str | Path) -> tuple[Path, ...]:
+    """The files that fixes are read from: one, or several of a folder.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+    return gnss_comma2k19.files_of(Path(path)) or (Path(path),)
 
 
 def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:
@@ -68,13 +88,19 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     path, asked = Path(path), options or GnssOptions()
     if not path.exists():
         raise ConfigError("there is no such file", file=str(path), remedy="check the path")
-    if path.is_dir():
+    if path.is_dir() and not gnss_comma2k19.detect(path):
         raise DataError(
             "this is a folder, and fixes are read from one file",
             file=path.resolve().name,
             remedy="give one file of it",
         )
-    if path.stat().st_size == 0:
+    if path.is_file() and gnss_comma2k19.belongs(path):
+        raise DataError(
+            "fixes of a comma2k19 segment are two arrays, stamps and values",
+            file=path.name,
+            remedy=f"give the folder that has both: {path.parent}",
+        )
+    if path.is_file() and path.stat().st_size == 0:
         raise DataError(
             "the file is empty",
             file=path.name,

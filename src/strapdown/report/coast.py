@@ -54,7 +54,8 @@ def coast(
         Called with a stage and the share that is done.
     **options
         Tables and keys of `config.coast.CoastSpec`: ``motion={"speed_m_per_s": 15.0}``,
-        ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``, ``places``, ``at_s``.
+        ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``, ``places``, ``at_s``,
+        ``from_s``, ``to_s``, ``duration_s``.
 
     Returns
     -------

@@ -8,17 +8,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
+from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.alignment_file import MAY_BE_EMPTY, STAGES
 from strapdown.config.slots import SLOTS, Slot, options_of
-from strapdown.config.toml_text import ASK, Asked, Page, inline, number, string
+from strapdown.config.toml_text import ASK, Asked, Page, inline, string
 from strapdown.exceptions import Finding
-from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.recording import Recording
 from strapdown.sensors.axes_matrix import NAMED_AXES
 from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.systems.alignment_source import body_record
 
-__all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "toml_value"]
+__all__ = ["AlignmentDraft", "draft_alignment", "listed_kinds", "log_table_keys", "toml_value"]
 
 #: Of the catalogue those that can find north, or nearly.
 GRADES = ("navigation", "tactical")
@@ -45,18 +47,17 @@ class AlignmentDraft:
     findings: tuple[Finding, ...]
 
 
-def draft_alignment(
-    log: Path, *, folder: Path, options: ReadOptions | None = None
-) -> AlignmentDraft:
+def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> AlignmentDraft:
     """Write the file of an alignment of a log.
 
     Parameters
     ----------
-    log : Path
+    log : LogTable
+        With a path that can be opened.
     folder : Path
         Where the file will stand: the log is named from there.
-    options : ReadOptions, optional
-        What the user says about reading it.
+    axes : str, optional
+        How the sensor's axes lie, as `AxesTable.axes`.
 
     Returns
     -------
@@ -67,50 +68,45 @@ def draft_alignment(
     DataError, ConfigError
         The log cannot be read; the message names file, row and remedy.
     """
-    asked = options or ReadOptions()
-    recording = read_log(log, asked)
+    recording, imu, findings = body_record(log, AxesTable(axes=axes))
     page = Page()
     page.say(
         f"An alignment of {recording.name}: find roll, pitch and heading of a body that stands.",
         'Put what you know in place of each "?", then run: strapdown align on this file.',
     )
-    found = _log(page, log, folder, recording, asked)
+    found = _log(page, log, folder, recording.name, imu)
     found += _site(page, recording)
-    _axes(page, asked)
+    _axes(page, axes)
     _sensors(page)
     for name, (_, default) in STAGES.items():
         _stage(page, SLOTS[name], default, name in MAY_BE_EMPTY)
     _rest(page)
     text = "\n".join(page.lines) + "\n"
-    return AlignmentDraft(text, tuple(found), tuple(page.asked), recording.findings)
+    return AlignmentDraft(text, tuple(found), tuple(page.asked), findings)
 
 
-def _log(
-    page: Page, log: Path, folder: Path, recording: Recording, options: ReadOptions
-) -> list[str]:
-    time = recording.imu.index.to_numpy(dtype=np.float64)
+def _log(page: Page, log: LogTable, folder: Path, name: str, imu: pd.DataFrame) -> list[str]:
+    time = imu.index.to_numpy(dtype=np.float64)
     rate = 1.0 / float(np.median(np.diff(time)))
     span = f"{len(time)} samples, {time[0]:.6g} to {time[-1]:.6g} s, {rate:.4g} Hz"
-    page.table("[log]", f"Found: {span}, {recording.imu.attrs['sampling']} values.")
-    page.path("path", log, folder)
-    if options.columns:
-        page.key("columns", inline(options.columns))
-    for key, value in (
-        ("gyro_unit", options.gyro_unit),
-        ("accel_unit", options.accel_unit),
-        ("time_unit", options.time_unit),
-        ("sampling", options.sampling),
-    ):
-        if value:
-            page.key(key, string(value))
-    if options.rate:
-        page.key("rate_hz", number(options.rate))
-    if options.repair:
-        page.key("repair", "true")
-    page.say(
-        f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone, where the body stands"
-    )
-    return [f"{recording.name}: {span}"]
+    page.table("[log]", f"Found: {span}, {imu.attrs['sampling']} values.")
+    log_table_keys(page, log, folder)
+    if log.from_s is log.to_s is log.duration_s is None:
+        page.say(
+            f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone, where the body "
+            "stands"
+        )
+    return [f"{name}: {span}"]
+
+
+def log_table_keys(page: Page, log: LogTable, folder: Path) -> None:
+    """Write the keys of ``[log]`` that the user said, the log named from the file's folder."""
+    page.path("path", Path(log.path), folder)
+    if log.columns:
+        page.key("columns", inline(log.columns))
+    for key, value in log.model_dump(exclude={"path", "columns"}).items():
+        if value is not None and value is not False:
+            page.key(key, toml_value(value) or "")
 
 
 def _site(page: Page, recording: Recording) -> list[str]:
@@ -132,10 +128,10 @@ def _site(page: Page, recording: Recording) -> list[str]:
     return found
 
 
-def _axes(page: Page, options: ReadOptions) -> None:
+def _axes(page: Page, axes: str | None) -> None:
     page.table("[axes]", "How the sensor's axes lie in the body, where the log does not say it.")
-    if options.axes:
-        page.key("axes", string(options.axes))
+    if axes:
+        page.key("axes", string(axes))
     page.say(
         'axes = "forward-left-up": where x, y, z of the sensor point; or "x,-y,-z", the axes that '
         "point forward, right, down",

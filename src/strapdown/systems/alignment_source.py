@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import DataError, Finding
+from strapdown.exceptions import Finding
 from strapdown.formats import read_log
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.recording import ReadOptions, Recording, StatedStart
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.rotation import euler_from_dcm
@@ -28,6 +28,7 @@ from strapdown.sensors.axes_matrix import (
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion, Wave, rocking_stand, simulate_imu
 from strapdown.systems.attitude_source import input_files, sensor_file
+from strapdown.systems.part_of_log import part_of_log
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import values_of
 
@@ -142,11 +143,12 @@ def body_record(
         if ACCEL[0] in imu.columns:
             force = values_of(imu, ACCEL).mean(axis=0)
             findings += report_transposed(accel, force, recording.name)
-    return recording, _span(imu, log, recording.name), tuple(findings)
+    part = part_of_log(imu, log.from_s, log.to_s, log.duration_s, recording.name)
+    return recording, part, tuple(findings)
 
 
 def _fixes(path: str) -> InputFiles:
-    return input_files("gnss", path, (Path(path),))
+    return input_files("gnss", path, files_of_fixes(path))
 
 
 def _options(log: LogTable, axes: str | None) -> ReadOptions:
@@ -215,38 +217,6 @@ def _said(recording: Recording, gyro: Array, accel: Array) -> Sequence[Finding]:
             )
         )
     return out
-
-
-def _span(imu: pd.DataFrame, log: LogTable, name: str) -> pd.DataFrame:
-    time = imu.index.to_numpy(dtype=np.float64)
-    first = -np.inf if log.from_s is None else log.from_s
-    last = np.inf if log.to_s is None else log.to_s
-    if log.duration_s is not None:
-        last = (float(time[0]) if log.from_s is None else log.from_s) + log.duration_s
-    # A stamp that is a sum of steps may miss the instant by its rounding.
-    slack = 1e-6 * float(np.median(np.diff(time)))
-    kept = (time >= first - slack) & (time <= last + slack)
-    if kept.sum() < 2:
-        raise DataError(
-            f"nothing is recorded {_words(first, last)}: it goes from {time[0]:.9g} to "
-            f"{time[-1]:.9g} s",
-            file=name,
-            quantity="time",
-            remedy="give another span of the log's own stamps (from_s, to_s, duration_s; --from, "
-            "--duration)",
-        )
-    if kept.all():
-        return imu
-    out = imu[kept]
-    out.attrs = dict(imu.attrs)
-    if out.attrs.get("first_row") is not None:
-        out.attrs["first_row"] += int(np.argmax(kept))
-    return out
-
-
-def _words(first: float, last: float) -> str:
-    parts = [f"from {first:.9g} s on"] if np.isfinite(first) else []
-    return " ".join([*parts, f"to {last:.9g} s"] if np.isfinite(last) else parts)
 
 
 def _sensor_file(spec: AlignmentSpec) -> tuple[InputFiles, ...]:

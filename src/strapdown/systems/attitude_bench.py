@@ -43,7 +43,7 @@ from strapdown.systems.attitude_shares import (
     find_shares,
     own_truth,
 )
-from strapdown.systems.attitude_source import Source, describe, read_source, window, with_truth
+from strapdown.systems.attitude_source import Source, describe, read_source, with_truth
 from strapdown.systems.attitude_start import find_gyro_bias, initial_attitude, without_bias
 from strapdown.systems.attitude_sweep import (
     Grounds,
@@ -53,6 +53,7 @@ from strapdown.systems.attitude_sweep import (
     sweep_rates,
 )
 from strapdown.systems.attitude_trials import gather, trial_names, worst_sweep
+from strapdown.systems.part_of_log import check_part, part_of_log
 from strapdown.systems.progress import Progress, silent
 from strapdown.tables import GYRO
 
@@ -85,6 +86,7 @@ def bench_attitude(
     repair: bool = False,
     from_s: float | None = None,
     to_s: float | None = None,
+    duration_s: float | None = None,
     peers: Sequence[str] = (),
     progress: Progress = silent,
 ) -> AttitudeBench:
@@ -130,8 +132,8 @@ def bench_attitude(
         Of a scenario: a sensor of the catalogue, or a file like its entries.
     columns, gyro_unit, accel_unit, time_unit, axes, repair
         How to read a log, as in `formats.recording.ReadOptions`.
-    from_s, to_s : float, optional, s
-        Use a part of the log.
+    from_s, to_s, duration_s : float, optional, s
+        Use a part of the log: to an instant, or so much of it.
     peers : sequence of str
         Filters of other libraries to lay beside (`peers.PEERS`), or ``all``.
     progress : callable, optional
@@ -158,6 +160,7 @@ def bench_attitude(
         raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
     for one in rates:
         refuse_no_rate(float(one))
+    check_part(from_s, to_s, duration_s)
     reading = {
         "columns": columns or None,
         "gyro_unit": gyro_unit,
@@ -191,6 +194,7 @@ def bench_attitude(
         reference_log_path=None if reference_log is None else str(reference_log),
         from_s=from_s,
         to_s=to_s,
+        duration_s=duration_s,
     )
     return run_bench(spec, progress)
 
@@ -317,7 +321,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
     progress("reading", 0.0)
     source = read_source(spec)
     whole = source.imu
-    source = replace(source, imu=window(whole, spec.from_s, spec.to_s, source.name))
+    part = part_of_log(whole, spec.from_s, spec.to_s, spec.duration_s, source.name)
+    source = replace(source, imu=part)
     source, second = read_second(spec, with_truth(source, spec))
     rests = find_rests(source.imu)
     bias, bias_input = find_gyro_bias(spec, source, rests)

@@ -69,7 +69,8 @@ def gather_references(
         and there are none with acceleration.
     """
     words = list(spec.references)
-    if isinstance(spec.source, ScenarioSpec) and not words and spec.from_s is spec.to_s is None:
+    whole = spec.from_s is spec.to_s is spec.duration_s is None
+    if isinstance(spec.source, ScenarioSpec) and not words and whole:
         words = list(find_scenario(spec.source.name).references)
     asked = [w for w in words if w.strip().lower() == RESTS]
     words = [w for w in words if w.strip().lower() != RESTS]

@@ -13,7 +13,7 @@ from strapdown.attitude import Quaternion, run_attitude
 from strapdown.bundle.seal import sha256
 from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
 from strapdown.evaluation.differences import error_angles
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.exceptions import DataError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
@@ -226,25 +226,3 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
         clean=None,
         inputs=(*source.inputs, input_files("truth", spec.truth_path, (path,))),
     )
-
-
-def window(imu: pd.DataFrame, from_s: float | None, to_s: float | None, name: str) -> pd.DataFrame:
-    """The part of an Imu table between two instants, both included.
-
-    Raises
-    ------
-    ConfigError
-        Fewer than two samples lie between them.
-    """
-    start = imu.index[0] if from_s is None else from_s
-    end = imu.index[-1] if to_s is None else to_s
-    part = imu[(imu.index >= start) & (imu.index <= end)]
-    if len(part) < 2:
-        raise ConfigError(
-            f"{len(part)} samples lie between {start:.9g} and {end:.9g} s; the log runs from "
-            f"{imu.index[0]:.9g} to {imu.index[-1]:.9g} s",
-            file=name,
-            quantity="--from, --to",
-            remedy="choose a window within the log",
-        )
-    return part

@@ -15,7 +15,7 @@ from strapdown.crash.path import CrashPath
 from strapdown.exceptions import Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_files import files_of_fixes, read_gnss
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.crash_unit import CrashUnit
@@ -195,7 +195,7 @@ def _inputs(
         found += sensor_file(sensor)
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
-    found += [input_files(role, path, (Path(path),)) for role, path in dict.fromkeys(others)]
+    found += [input_files(role, path, files_of_fixes(path)) for role, path in dict.fromkeys(others)]
     return tuple(found)
 
 

@@ -23,6 +23,7 @@ SENSOR = load_sensor("fog-1000")
 SENSORS = ImuUncertainty.of_sensor(SENSOR)
 FLAGS = (
     *("lat", "lon", "alt", "sensor", "method", "coarse_only", "gnss", "prefilter", "from_s"),
+    "to_s",
     *("duration", "rate", "sampling", "columns", "gyro_unit", "accel_unit", "time_unit", "axes"),
     "repair",
 )

@@ -350,6 +350,8 @@ def test_the_crash_test_of_nhtsa(recordings, tmp_path):
     draft, table = drafted(tmp_path, recordings("crash_nhtsa_10146"))
     assert table["vehicle"]["mass_kg"] == 1719.0
     assert table["entry"]["speed_km_per_h"] == pytest.approx(57.09)
+    # Of the first touch, which is zero of the record; it begins 50 ms before.
+    assert table["entry"]["time_s"] == 0.0
     left, right = table["units"]
     assert left["name"] == "LEFT REAR SEAT CROSSMEMBER"
     assert [u["accelerometers"][0]["channels"] for u in (left, right)] == [

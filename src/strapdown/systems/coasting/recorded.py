@@ -24,6 +24,7 @@ from strapdown.systems.coasting.forecast import (
     forecast,
     variances,
 )
+from strapdown.systems.part_of_log import check_part
 from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.chain import Chain, ChainState
@@ -184,7 +185,7 @@ def _spans(
 ) -> tuple[Span, ...]:
     """The outages, on the clock of the samples."""
     first = begun + SETTLED
-    room = end - first
+    check_part(spec.from_s, spec.to_s, spec.duration_s)
     if spec.at_s is not None:
         if not first - SETTLED <= spec.at_s <= end - spec.outage_s:
             raise ConfigError(
@@ -197,6 +198,20 @@ def _spans(
                 else "give a shorter --outage",
             )
         return (Span("outage", spec.at_s, spec.at_s + spec.outage_s),)
+    log = float(index_of(source.imu)[0]) if spec.from_s is None else spec.from_s
+    to = spec.to_s if spec.duration_s is None else log + spec.duration_s
+    within = (max(first, log), end if to is None else min(end, to))
+    if within != (first, end) and within[1] - within[0] < spec.outage_s <= end - first:
+        raise ConfigError(
+            f"an outage of {spec.outage_s:g} s is longer than the "
+            f"{max(within[1] - within[0], 0.0):.4g} s between {within[0]:.9g} and "
+            f"{within[1]:.9g} s",
+            file=source.name,
+            quantity="--from, --to, --duration",
+            remedy=f"give a longer part of what the run has, settled from {first:.9g} s on, to "
+            f"{end:.9g} s; or a shorter --outage",
+        )
+    room = end - first
     if room < spec.outage_s:
         raise ConfigError(
             f"an outage of {spec.outage_s:g} s is longer than the {max(room, 0.0):.4g} s of the "
@@ -208,7 +223,7 @@ def _spans(
             else "use a longer record: a filter needs half a minute to settle",
         )
     places = spec.places if receivers else 1
-    return spans_to_withhold(first, end, spec.outage_s, places)
+    return spans_to_withhold(*within, spec.outage_s, places)
 
 
 def _drift(

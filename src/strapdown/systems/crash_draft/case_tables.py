@@ -101,6 +101,15 @@ def entry_table(page: Page, facts: Mapping[str, str], units: Sequence[Unit]) -> 
             "found: from the trigger, s: the first sample of the record is there; the speed then",
         )
     speed = _fact(facts, "speed_m_per_s")
+    if not (timed and late > 0.0):
+        page.key(
+            "time_s",
+            "0.0",
+            "found: from the trigger, s: a test states the speed at its time zero, the first touch"
+            if speed is not None
+            else "assumed: from the trigger, s: the speed as the blow begins; of another instant, "
+            "write it, e.g. -1.0 where the car's own data end",
+        )
     if speed is None:
         page.key(
             "speed_km_per_h",

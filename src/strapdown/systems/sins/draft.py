@@ -17,7 +17,7 @@ from strapdown.estimation.stated_states import STATED_STATES
 from strapdown.exceptions import Finding
 from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.systems.alignment_draft import listed_kinds, toml_value
+from strapdown.systems.alignment_draft import listed_kinds, log_table_keys, toml_value
 from strapdown.systems.sins.foot import HERE, STILL, on_foot
 from strapdown.systems.sins.proposal import Proposal, propose
 from strapdown.tables.checks import index_of
@@ -92,7 +92,7 @@ def draft_navigation(
         "Each table is a place in the chain, and kind says what stands there; keys that begin "
         "with # show the defaults. Then: strapdown navigate on this file.",
     )
-    found = [*_log(page, made, folder), *_where(page, made, foot)]
+    found = [*_log(page, log, made, folder), *_where(page, made, foot)]
     _axes(page, axes)
     found += _sensors(page, made)
     _stage(page, "prefilter", {})
@@ -109,17 +109,14 @@ def draft_navigation(
     )
 
 
-def _log(page: Page, made: Proposal, folder: Path) -> list[str]:
+def _log(page: Page, log: LogTable, made: Proposal, folder: Path) -> list[str]:
     time = index_of(made.imu)
     rate = (len(time) - 1) / float(time[-1] - time[0])
     span = f"{len(time)} samples, {time[0]:.9g} to {time[-1]:.9g} s, {rate:.4g} Hz"
     page.table("[log]", f"Found: {span}, {made.imu.attrs['sampling']} values.")
-    for key, value in made.table["log"].items():
-        if key == "path":
-            page.path("path", Path(value), folder)
-        elif value not in (False, {}):
-            page.key(key, _inline(value))
-    page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
+    log_table_keys(page, log, folder)
+    if log.from_s is log.to_s is log.duration_s is None:
+        page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone")
     return [f"{made.recording.name}: {span}"]
 
 

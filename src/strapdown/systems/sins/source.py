@@ -15,6 +15,7 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.control_points import read_control_points
+from strapdown.formats.gnss_files import files_of_fixes
 from strapdown.formats.recording import StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.results.inputs import InputFiles, Reading
@@ -94,7 +95,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         if aid.path is not None:
             tables[name] = read_aid(aid)
             findings += tables[name].attrs.get("findings", ())
-            inputs.append(input_files(f"aid-{name}", aid.path, (Path(aid.path),)))
+            inputs.append(input_files(f"aid-{name}", aid.path, files_of_fixes(aid.path)))
     truth = None
     if spec.truth is not None:
         truth = read_trajectory(spec.truth.path)

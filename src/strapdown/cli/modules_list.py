@@ -1,0 +1,234 @@
+"""What can stand in each slot, as plain data: for a terminal and for a script."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
+from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
+from strapdown.attitude import ALGORITHMS
+from strapdown.config.motions import KINDS
+from strapdown.config.slots import SLOTS, Slot, options_of
+from strapdown.ellipsoids import ELLIPSOIDS
+from strapdown.formats import READERS
+from strapdown.formats.crash_records import CRASH_READERS
+from strapdown.formats.gnss_files import GNSS_READERS
+from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.simulation import SCENARIOS
+from strapdown.simulation.crash_cases import CASES
+from strapdown.simulation.crash_scenarios import CRASHES
+
+__all__ = ["HEADINGS", "Listed", "cell_text", "listed_modules"]
+
+#: What stands in a slot that a file leaves out, where that is none of the modules.
+_UNSAID = {"update_rule": "; where none is named, every observation counts in full"}
+
+
+#: Headings of columns on a terminal, where they are not their names for a script.
+HEADINGS = {
+    "summary": "what it is",
+    "duration_s": "s",
+    "semi_major_axis_m": "a, m",
+    "inverse_flattening": "1/f",
+}
+
+
+@dataclass(frozen=True)
+class Listed:
+    """One list.
+
+    Attributes
+    ----------
+    key : str
+        Its name for a script.
+    title : str
+    rows : tuple of mapping
+        By column; a text, a number, a list of texts, or None where there is nothing.
+    numbers : tuple of str
+        Columns of numbers.
+    """
+
+    key: str
+    title: str
+    rows: tuple[Mapping[str, Any], ...]
+    numbers: tuple[str, ...] = ()
+
+
+def cell_text(value: Any) -> str:
+    """A cell of a list as it is printed."""
+    if isinstance(value, float):
+        return f"{value:.12g}"
+    if isinstance(value, list):
+        value = ", ".join(value)
+    return value or "–"
+
+
+def listed_modules() -> tuple[Listed, ...]:
+    """Return every list, in the order in which they are printed."""
+    slots = {name: slot for name, slot in SLOTS.items() if name != "mechanization"}
+    return (
+        _algorithms(),
+        _mechanizations(),
+        *(_slot(name, slot) for name, slot in slots.items()),
+        Listed(
+            "standstill_detectors",
+            "Detectors of a standstill (detector = … of an aid that watches)",
+            _summaries(STANDSTILL_DETECTORS),
+        ),
+        Listed(
+            "standstill_thresholds",
+            "What becomes of its threshold (threshold_rule = …)",
+            _summaries(STANDSTILL_THRESHOLDS),
+        ),
+        Listed(
+            "ellipsoids",
+            "Ellipsoids",
+            tuple(
+                {
+                    "name": name,
+                    "semi_major_axis_m": float(e.semi_major_axis),
+                    "inverse_flattening": float(f"{e.inverse_flattening:.12g}"),
+                    "source": e.source,
+                }
+                for name, e in ELLIPSOIDS.items()
+            ),
+            ("semi_major_axis_m", "inverse_flattening"),
+        ),
+        Listed(
+            "motions", "Motions of a trajectory's file", tuple({"name": kind} for kind in KINDS)
+        ),
+        *_scenarios(),
+        Listed(
+            "sensors",
+            "Sensors that can be simulated",
+            tuple(
+                {"name": s.name, "class": s.grade, "summary": f"{s.title}: {s.summary}"}
+                for s in map(load_sensor, SENSORS)
+            ),
+        ),
+        Listed("log_formats", "Formats of logs that are read", _titles(READERS)),
+        Listed("fix_formats", "Formats of fixes that are read", _titles(GNSS_READERS)),
+        Listed("crash_formats", "Formats of crash records that are read", _titles(CRASH_READERS)),
+        Listed(
+            "log_writers",
+            "Formats that logs are written in",
+            tuple({"name": name} for name in LOG_WRITERS),
+        ),
+        Listed(
+            "trajectory_writers",
+            "Formats that trajectories are written in",
+            tuple({"name": name} for name in TRAJECTORY_WRITERS),
+        ),
+    )
+
+
+def _algorithms() -> Listed:
+    return Listed(
+        "attitude_algorithms",
+        "Attitude algorithms",
+        tuple(
+            {
+                "name": name,
+                "source": f"{cls.source} {cls.equations}".strip(),
+                "options": [f"{f.name}={f.default}".lower() for f in fields(cls)],
+                "summary": cls.summary,
+            }
+            for name, cls in ALGORITHMS.items()
+        ),
+    )
+
+
+def _mechanizations() -> Listed:
+    shared = len(fields(Mechanization))
+    return Listed(
+        "mechanization",
+        "Mechanizations",
+        tuple(
+            {
+                "name": name,
+                "source": cls.source,
+                "options": [f.name for f in fields(cls)[shared:]],
+                "summary": cls.summary,
+            }
+            for name, cls in MECHANIZATIONS.items()
+        ),
+    )
+
+
+def _slot(name: str, slot: Slot) -> Listed:
+    return Listed(
+        name,
+        f"{slot.title} ([{name}] of a chain{_UNSAID.get(name, '')})",
+        tuple(
+            {
+                "name": kind,
+                "source": getattr(entry, "source", "") or None,
+                "options": [o.key for o in options_of(entry)],
+                "summary": getattr(entry, "summary", "")
+                or (entry.__doc__ or "").partition("\n")[0],
+            }
+            for kind, entry in slot.entries.items()
+        ),
+    )
+
+
+def _scenarios() -> tuple[Listed, ...]:
+    return (
+        Listed(
+            "scenarios",
+            "Scenarios with exact attitude",
+            tuple(
+                {
+                    "name": name,
+                    "duration_s": float(f"{s.motion.duration:g}"),
+                    "summary": f"{s.title} ({s.origin})",
+                }
+                for name, s in SCENARIOS.items()
+            ),
+            ("duration_s",),
+        ),
+        Listed(
+            "crashes",
+            "Crashes with exact truth, and what is none",
+            tuple(
+                {
+                    "name": name,
+                    "duration_s": float(f"{c.motion.duration:.3g}"),
+                    "kind": c.kind,
+                    "summary": f"{c.summary} ({c.source})",
+                }
+                for name, c in CRASHES.items()
+            ),
+            ("duration_s",),
+        ),
+        Listed(
+            "crash_cases",
+            "The same crashes with recorders of their own",
+            tuple(
+                {
+                    "name": name,
+                    "crash": c.crash.name,
+                    "recorders": list(c.usual),
+                    "summary": c.summary,
+                }
+                for name, c in CASES.items()
+                if name not in CRASHES
+            ),
+        ),
+    )
+
+
+def _summaries(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
+    return tuple(
+        {"name": name, "source": one.source, "summary": one.summary}
+        for name, one in entries.items()
+    )
+
+
+def _titles(readers: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
+    return tuple({"name": name, "summary": one.title} for name, one in readers.items())

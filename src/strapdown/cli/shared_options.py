@@ -1,0 +1,250 @@
+"""Options that commands share: the same words, in the same order, in the same group everywhere.
+
+A command takes a set of them as one parameter (`LogFlags`, `OutFlags`), which `spread` lays out
+as the flags of the set.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, fields, is_dataclass
+from functools import wraps
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+__all__ = [
+    "LOG_PANEL",
+    "OUT_PANEL",
+    "RUN_PANEL",
+    "WITH_PANEL",
+    "Json",
+    "LogFlags",
+    "OutFlags",
+    "Quiet",
+    "WriteFlags",
+    "folder_to_make",
+    "log_keys",
+    "spread",
+]
+
+LOG_PANEL = "How to read the log"
+RUN_PANEL = "What to run"
+WITH_PANEL = "Where, and with what"
+OUT_PANEL = "What to write"
+
+
+@dataclass(frozen=True)
+class LogFlags:
+    """Which part of a log is used, and how it is read."""
+
+    from_s: Annotated[
+        float | None,
+        typer.Option(
+            "--from",
+            metavar="S",
+            help="Begin at this stamp; the first, if not given.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    to_s: Annotated[
+        float | None,
+        typer.Option(
+            "--to",
+            metavar="S",
+            help="End at this stamp; the last, if not given.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    duration: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=LOG_PANEL
+        ),
+    ] = None
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            metavar="HZ",
+            help="Samples a second of a log without a time column.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    sampling: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND",
+            help="instantaneous (the rate at the stamp) or mean (over the interval that ends "
+            "there).",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="Q=NAME",
+            help="time=t,gyro_x=wx,… ; a number counts columns from 1; gyro=NAME for an array of "
+            "three.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    gyro_unit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.", rich_help_panel=LOG_PANEL
+        ),
+    ] = None
+    accel_unit: Annotated[
+        str | None,
+        typer.Option(
+            metavar="UNIT",
+            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS); m/s: increments.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    time_unit: Annotated[
+        str | None, typer.Option(metavar="UNIT", help="s, ms, us, ns.", rich_help_panel=LOG_PANEL)
+    ] = None
+    axes: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Sensor axes that point forward, right, down: 'x,-y,-z'; or where x, y, z point: "
+            "forward-left-up.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = None
+    repair: Annotated[
+        bool,
+        typer.Option(
+            "--repair",
+            help="Leave out rows that cannot be used, undo a wrapped clock, and say so.",
+            rich_help_panel=LOG_PANEL,
+        ),
+    ] = False
+
+    def given(self) -> dict[str, Any]:
+        """By name of the flag, None where it is not given."""
+        return {**asdict(self), "repair": self.repair or None}
+
+
+def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a configuration's ``[log]`` that flags make.
+
+    Parameters
+    ----------
+    given : mapping
+        As `LogFlags.given`; what else is in it is not looked at.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ConfigError
+        A column is not named as it can be, or the part of the log is none.
+    """
+    from strapdown.formats.columns import parse_column_option
+    from strapdown.systems.part_of_log import check_part
+
+    check_part(given["from_s"], given["to_s"], given["duration"])
+    return {
+        "columns": parse_column_option(given["columns"] or []),
+        "gyro_unit": given["gyro_unit"],
+        "accel_unit": given["accel_unit"],
+        "time_unit": given["time_unit"],
+        "sampling": given["sampling"],
+        "rate_hz": given["rate"],
+        "repair": bool(given["repair"]),
+        "from_s": given["from_s"],
+        "to_s": given["to_s"],
+        "duration_s": given["duration"],
+    }
+
+
+def folder_to_make(name: str) -> Any:
+    """The option ``--out`` of a command that makes a folder, with the name that it has else."""
+    return typer.Option(
+        metavar="DIR",
+        help=f"Folder to make ({name}).",
+        rich_help_panel=OUT_PANEL,
+        show_default=False,
+    )
+
+
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUT_PANEL),
+]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=OUT_PANEL),
+]
+
+
+Json = Annotated[
+    bool,
+    typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=OUT_PANEL),
+]
+
+
+@dataclass(frozen=True)
+class WriteFlags:
+    """What becomes of a result that is there, and whether anything is printed."""
+
+    force: Force = False
+    quiet: Quiet = False
+
+
+@dataclass(frozen=True)
+class OutFlags:
+    """`WriteFlags`, of a command that can print its result as JSON."""
+
+    force: Force = False
+    json: Json = False
+    quiet: Quiet = False
+
+
+def spread(command: Callable[..., None]) -> Callable[..., None]:
+    """Lay the sets of options that a command takes out as the flags of the sets.
+
+    Parameters
+    ----------
+    command : callable
+        Some of its parameters are of a dataclass whose fields are options.
+
+    Returns
+    -------
+    callable
+        The same command with a parameter for each option, where the set stood.
+    """
+    hints = get_type_hints(command, include_extras=True)
+    hints.pop("return", None)
+    sets: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    laid_out: list[inspect.Parameter] = []
+    for name, parameter in inspect.signature(command).parameters.items():
+        if name not in sets:
+            laid_out.append(parameter.replace(annotation=hints[name]))
+            continue
+        options = get_type_hints(sets[name], include_extras=True)
+        laid_out += [
+            parameter.replace(name=f.name, annotation=options[f.name], default=f.default)
+            for f in fields(sets[name])
+        ]
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        made = {
+            name: kind(**{f.name: given.pop(f.name) for f in fields(kind)})
+            for name, kind in sets.items()
+        }
+        command(**given, **made)
+
+    # What typer reads; the command itself would tell it of the sets.
+    told: Any = run
+    del told.__wrapped__
+    told.__signature__ = inspect.Signature(laid_out)
+    told.__annotations__ = {p.name: p.annotation for p in laid_out}
+    return run

@@ -1,0 +1,109 @@
+"""The part of a log that is used: from one instant to another, or for so long."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from strapdown.exceptions import ConfigError
+
+__all__ = ["check_part", "part_of_log"]
+
+
+def check_part(from_s: float | None, to_s: float | None, duration_s: float | None) -> None:
+    """Refuse a part that cannot be meant.
+
+    Parameters
+    ----------
+    from_s, to_s, duration_s : float or None, s
+
+    Raises
+    ------
+    ConfigError
+        Both say where it ends, it ends before it begins, or one is no number.
+    """
+    for flag, value in (("--from", from_s), ("--to", to_s), ("--duration", duration_s)):
+        if value is not None and not np.isfinite(value):
+            raise ConfigError(
+                f"{value} is no number", quantity=flag, remedy="give a finite number of seconds"
+            )
+    if to_s is not None and duration_s is not None:
+        raise ConfigError(
+            f"it ends at {to_s:.9g} s, or after {duration_s:.9g} s: both are said",
+            quantity="--to, --duration",
+            remedy="keep one of the two",
+        )
+    if duration_s is not None and not duration_s > 0.0:
+        raise ConfigError(
+            f"{duration_s:g} s is no duration", quantity="--duration", remedy="give seconds above 0"
+        )
+    if from_s is not None and to_s is not None and not from_s < to_s:
+        raise ConfigError(
+            f"{to_s:.9g} s is not after --from {from_s:.9g} s",
+            quantity="--to",
+            remedy="give a later stamp of the log",
+        )
+
+
+def part_of_log(
+    imu: pd.DataFrame,
+    from_s: float | None,
+    to_s: float | None,
+    duration_s: float | None,
+    name: str,
+) -> pd.DataFrame:
+    """Return the samples between two instants, both included.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table.
+    from_s, to_s : float or None, s
+        On the log's own clock; its first and its last stamp, where they are not given.
+    duration_s : float or None, s
+        In place of `to_s`: so long from `from_s`, or from the first stamp.
+    name : str
+        Of the log, for messages.
+
+    Returns
+    -------
+    DataFrame
+        The same table where all of it is used.
+
+    Raises
+    ------
+    ConfigError
+        Fewer than two samples lie between them, or as `check_part`.
+    """
+    check_part(from_s, to_s, duration_s)
+    time = imu.index.to_numpy(dtype=np.float64)
+    first = float(time[0]) if from_s is None else from_s
+    last = float(time[-1]) if to_s is None else to_s
+    if duration_s is not None:
+        last = first + duration_s
+    # A stamp that is a sum of steps may miss the instant by its rounding.
+    slack = 1e-6 * float(np.median(np.diff(time)))
+    kept = (time >= first - slack) & (time <= last + slack)
+    if kept.sum() < 2:
+        ends = to_s is not None or duration_s is not None
+        raise ConfigError(
+            f"{int(kept.sum())} samples lie {_words(from_s, last if ends else None)}; the log "
+            f"runs from {time[0]:.9g} to {time[-1]:.9g} s",
+            file=name,
+            quantity="time",
+            remedy="give another part, in the log's own stamps: --from and --to or --duration; in "
+            "a file from_s and to_s or duration_s under [log]",
+        )
+    if kept.all():
+        return imu
+    out = imu[kept]
+    out.attrs = dict(imu.attrs)
+    if out.attrs.get("first_row") is not None:
+        out.attrs["first_row"] += int(np.argmax(kept))
+    return out
+
+
+def _words(from_s: float | None, last: float | None) -> str:
+    if from_s is None:
+        return f"up to {last:.9g} s"
+    return f"from {from_s:.9g} s on" if last is None else f"between {from_s:.9g} and {last:.9g} s"
