@@ -35,9 +35,12 @@ from strapdown.systems.tadic import (
     displacement,
     earth_terms,
     equations,
+    error_budget,
+    ground_truth,
     mounting,
     ranking,
     raw_data,
+    ringing,
     sampling_rate,
     sensors,
 )
@@ -281,7 +284,7 @@ def test_errors_alone_are_their_closed_forms():
 
 
 def test_the_abstract_turns():
-    ring, quiet = displacement.Rung("", 1.0), displacement.Rung("", 0.01)
+    ring, quiet = ringing.Rung("", 1.0), ringing.Rung("", 0.01)
     judge = displacement.decimetre_from
     assert judge({"LAB1": 0.2}, 0.05, 0.01, ring).verdict == HOLDS_WHEN
     assert judge({"LAB1": 0.2}, 0.05, 0.01, quiet).verdict == HOLDS
@@ -301,7 +304,7 @@ def test_all_four_turn():
 
 def test_error_causes_turn(made):
     own = {"levelling": 0.0, "axes": 50.0, "biases": 20.0, "scale factors": 20.0}
-    judge = displacement.causes_from
+    judge = error_budget.causes_from
     assert judge(own, own).verdict == HOLDS_WHEN
     assert judge(own | {"levelling": 10.0, "axes": 40.0}, own).verdict == HOLDS
     assert judge(own | {"scale factors": 1.0}, own).verdict == DOES_NOT_HOLD
@@ -312,20 +315,20 @@ def test_error_causes_turn(made):
 
 
 def test_small_statements_of_the_displacement_turn():
-    extra = displacement.extra_from
+    extra = error_budget.extra_from
     assert extra({"a": 0.003}, 0.2).verdict == HOLDS_WHEN
     assert extra({"a": 0.1}, 0.2).verdict == HOLDS
     assert extra({"a": 0.0}, 0.2).verdict == DOES_NOT_HOLD
-    rings = (displacement.Rung("", 0.5),)
-    assert displacement.vibrations(rings, 0.001).verdict == HOLDS
-    assert displacement.vibrations(rings, 0.2).verdict == DOES_NOT_HOLD
-    truth = displacement.ground_truth_from
+    rings = (ringing.Rung("", 0.5),)
+    assert ringing.vibrations(rings, 0.001).verdict == HOLDS
+    assert ringing.vibrations(rings, 0.2).verdict == DOES_NOT_HOLD
+    truth = ground_truth.ground_truth_from
     assert [truth(r, r, 0.1).verdict for r in (0.01, 0.05, 0.2)] == [
         HOLDS,
         HOLDS_WHEN,
         DOES_NOT_HOLD,
     ]
-    entry = displacement.same_entry_from
+    entry = ground_truth.same_entry_from
     assert [entry({"IMU": x}, 0.03).verdict for x in (0.001, 0.01, 0.1)] == [
         HOLDS,
         HOLDS_WHEN,
