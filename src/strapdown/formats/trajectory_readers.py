@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import csv, parquet, pyins, trajectory_nav
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
+from strapdown.formats.file_rows import told_by_file_rows
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog
@@ -91,7 +92,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
     values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
-    try:
+    with told_by_file_rows(raw.name, raw.row):
         table = trajectory_table(
             values["time"],
             np.column_stack([values[q] for q in ("lat", "lon", "alt")]),
@@ -99,16 +100,6 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
             np.column_stack([values[q] for q in ("roll", "pitch", "heading")]),
             source=raw.name,
         )
-    except DataError as error:
-        # The row of the table is not that of the file.
-        said = error.finding
-        raise DataError(
-            said.what,
-            file=raw.name,
-            row=None if said.row is None else raw.row(said.row - 1),
-            quantity=said.quantity,
-            remedy=said.remedy,
-        ) from None
     judged = judge_trajectory(
         table,
         angles_stated=found["lat"].stated and found["lon"].stated,
