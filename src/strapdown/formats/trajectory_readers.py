@@ -17,12 +17,9 @@ from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.file_rows import told_by_file_rows
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.quantity_columns import Found
 from strapdown.formats.recording import RawLog
-from strapdown.formats.trajectory_columns import (
-    QUANTITIES,
-    TrajectoryColumn,
-    find_trajectory_columns,
-)
+from strapdown.formats.trajectory_columns import QUANTITIES, find_trajectory_columns
 from strapdown.formats.trajectory_plausibility import judge_trajectory
 from strapdown.tables import trajectory_table
 
@@ -63,7 +60,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         `TRAJECTORY_READERS`.
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat``, ``lon``, ``alt``, ``VN``, ``VE``, ``VD``, ``roll``, ``pitch``,
-        ``heading``) to the name of its column, where the names do not say it.
+        ``heading``) to the name of its column, or its number from 1, where the names do not say it.
 
     Returns
     -------
@@ -131,7 +128,7 @@ def _there(path: str | Path) -> Path:
     return path
 
 
-def _values(raw: RawLog, quantity: str, column: TrajectoryColumn) -> Array:
+def _values(raw: RawLog, quantity: str, column: Found) -> Array:
     of = Column(column.source, None, "")
     if quantity == "time":
         ticks, dated = ticks_of(raw, of)
