@@ -8,22 +8,26 @@ from typing import Annotated, Any
 import typer
 
 from strapdown.cli.log_options import (
+    RUN_PANEL,
     AccelUnit,
     Axes,
     Columns,
+    Duration,
+    From,
     GyroUnit,
     Rate,
     Repair,
     Sampling,
     TimeUnit,
 )
+from strapdown.cli.result_options import RESULT_PANEL, Force, Json, Quiet
 
 EPILOG = (
     "Example: strapdown align log.csv --lat 55.75 --lon 37.62 --alt 150 --sensor fog-1000\n\n"
     "Example: strapdown align align.toml (strapdown init align LOG writes one)"
 )
 MOST = 6  # findings on the terminal
-_WHERE, _RUN, _OUT = "Where it stands, and with what", "What to run", "What to write"
+_WHERE = "Where it stands, and with what"
 
 
 def align(
@@ -62,19 +66,21 @@ def align(
             metavar="NAME",
             help="Coarse alignment, with options after a colon: inertial_frame (the body may "
             "rock), two_vector, levelling, known_heading:heading_deg=90,sd_deg=1, gnss_course.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "inertial_frame",
     coarse_only: Annotated[
         bool,
-        typer.Option("--coarse-only", help="No fine alignment after it.", rich_help_panel=_RUN),
+        typer.Option(
+            "--coarse-only", help="No fine alignment after it.", rich_help_panel=RUN_PANEL
+        ),
     ] = False,
     gnss: Annotated[
         Path | None,
         typer.Option(
             metavar="FIXES",
             help="Fixes of a satellite receiver, for --method gnss_course.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     prefilter: Annotated[
@@ -83,19 +89,11 @@ def align(
             metavar="NAME",
             help="What the samples pass first, with options after a colon, as "
             "robust_fir:rate_hz=100.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "none",
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
-    ] = None,
+    from_s: From = None,
+    duration: Duration = None,
     rate: Rate = None,
     sampling: Sampling = None,
     columns: Columns = None,
@@ -106,18 +104,13 @@ def align(
     repair: Repair = False,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (LOG-align).", rich_help_panel=_OUT),
+        typer.Option(
+            metavar="DIR", help="Folder to make (LOG-align).", rich_help_panel=RESULT_PANEL
+        ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Find roll, pitch and heading of a body that stands, from its gyros and accelerometers.
 

@@ -8,12 +8,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from strapdown.cli.log_flags import LOG_FLAGS, log_keys
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.alignment_checks import NOT_BEFORE_FINE
 from strapdown.config.alignment_file import alignment_spec
 from strapdown.exceptions import ConfigError, StrapdownError
 from strapdown.formats import read_raw
-from strapdown.formats.columns import parse_column_option
 
 __all__ = ["as_flag", "flag_words", "module_of_flag", "refused_flag", "spec_of_flags"]
 
@@ -23,14 +23,8 @@ FLAGS = {
     "site, lon_deg": "--lon",
     "site, alt_m": "--alt",
     "sensors, sensor": "--sensor",
-    "axes, axes": "--axes",
     "gnss, path": "--gnss",
-    "log, sampling": "--sampling",
-    "log, rate_hz": "--rate",
-    "log, duration_s": "--duration",
-    "log, gyro_unit": "--gyro-unit",
-    "log, accel_unit": "--accel-unit",
-    "log, time_unit": "--time-unit",
+    **LOG_FLAGS,
 }
 _STAGES = {"coarse": "--method", "prefilter": "--prefilter"}
 
@@ -100,7 +94,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     DataError
         The log cannot be read.
     """
-    first, duration = given["from_s"], given["duration"]
+    duration = given["duration"]
     if duration is not None and not duration > 0.0:
         raise ConfigError(
             f"{duration:g} s is no duration", quantity="--duration", remedy="give seconds above 0"
@@ -113,23 +107,11 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             remedy="name one of the catalogue (strapdown modules) or a .toml file of your own; or "
             "state bias and noise in the file of an alignment (strapdown init align)",
         )
-    options = {
-        "path": str(log),
-        "columns": parse_column_option(given["columns"] or []),
-        "gyro_unit": given["gyro_unit"],
-        "accel_unit": given["accel_unit"],
-        "time_unit": given["time_unit"],
-        "sampling": given["sampling"],
-        "rate_hz": given["rate"],
-        "repair": bool(given["repair"]),
-        "from_s": first,
-        "duration_s": duration,
-    }
     coarse = module_of_flag(given["method"] or "inertial_frame")
     alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
     table = {
         "name": log.resolve().stem,
-        "log": options,
+        "log": log_keys(log, given),
         "axes": {"axes": given["axes"]},
         "site": _site(log, given),
         "sensors": {"sensor": given["sensor"]},

@@ -10,6 +10,7 @@ import typer
 
 from strapdown.cli.log_options import (
     LOG_PANEL,
+    RUN_PANEL,
     AccelUnit,
     Axes,
     Columns,
@@ -18,12 +19,12 @@ from strapdown.cli.log_options import (
     Sampling,
     TimeUnit,
 )
+from strapdown.cli.result_options import RESULT_PANEL, Force, Json, Quiet
 
 EPILOG = (
     "Example: strapdown attitude alexiev-fig4 --rate 100\n\n"
     "Example: strapdown attitude log.csv --gyro-unit deg/s --reference 'end same as start'"
 )
-_RUN, _OUT = "What to run", "What to write"
 
 
 def attitude(
@@ -41,7 +42,7 @@ def attitude(
             metavar="NAMES",
             help="Names joined by blanks or commas, with options after a colon: 'naive "
             "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "naive euler dcm quaternion rk4 rotvec",
     rates: Annotated[
@@ -49,13 +50,15 @@ def attitude(
         typer.Option(
             metavar="HZ,HZ,…",
             help="Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     tolerance_deg: Annotated[
         float,
         typer.Option(
-            metavar="DEG", help="What is accurate enough: the largest error.", rich_help_panel=_RUN
+            metavar="DEG",
+            help="What is accurate enough: the largest error.",
+            rich_help_panel=RUN_PANEL,
         ),
     ] = 1.0,
     interpolation: Annotated[
@@ -63,12 +66,12 @@ def attitude(
         typer.Option(
             metavar="KIND",
             help="How rates run between their stamps: linear (the trapezoid), or cubic.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "linear",
     trials: Annotated[
         int,
-        typer.Option(metavar="N", help="Of a scenario: so many seeds.", rich_help_panel=_RUN),
+        typer.Option(metavar="N", help="Of a scenario: so many seeds.", rich_help_panel=RUN_PANEL),
     ] = 1,
     reference: Annotated[
         list[str] | None,
@@ -77,7 +80,7 @@ def attitude(
             help="What is known, as often as you like: 'end same as start', 'end 2 turns about z "
             "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
             "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     reference_log: Annotated[
@@ -85,7 +88,7 @@ def attitude(
         typer.Option(
             metavar="LOG",
             help="Log of a second, better sensor on the same body, to be taken for the truth.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     initial: Annotated[
@@ -93,7 +96,7 @@ def attitude(
         typer.Option(
             metavar="ATTITUDE",
             help="auto, truth, level, zero, or roll,pitch,heading in deg.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "auto",
     gyro_bias: Annotated[
@@ -102,7 +105,7 @@ def attitude(
             metavar="BIAS",
             help="none; rest (mean of the first stationary stretch); rests (course through all of "
             "them); 'x,y,z deg/s' about forward, right, down; or a log of the sensor lying still.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = "none",
     peers: Annotated[
@@ -110,14 +113,15 @@ def attitude(
         typer.Option(
             metavar="NAMES",
             help="Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     from_s: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=_RUN)
+        float | None,
+        typer.Option("--from", metavar="S", help="Begin here.", rich_help_panel=RUN_PANEL),
     ] = None,
     to_s: Annotated[
-        float | None, typer.Option("--to", metavar="S", help="End here.", rich_help_panel=_RUN)
+        float | None, typer.Option("--to", metavar="S", help="End here.", rich_help_panel=RUN_PANEL)
     ] = None,
     rate: Annotated[
         float | None,
@@ -136,14 +140,14 @@ def attitude(
     repair: Repair = False,
     seed: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Of a scenario's noise (0).", rich_help_panel=_RUN),
+        typer.Option(metavar="N", help="Of a scenario's noise (0).", rich_help_panel=RUN_PANEL),
     ] = None,
     sensor: Annotated[
         str | None,
         typer.Option(
             metavar="NAME|FILE",
             help="Of a scenario: a sensor of the catalogue, with its errors.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     export_c: Annotated[
@@ -152,7 +156,7 @@ def attitude(
             metavar="FILE.c",
             help="Write the algorithm that the answer chose (or the only one named) as C99, with "
             "a test vector of this log.",
-            rich_help_panel=_OUT,
+            rich_help_panel=RESULT_PANEL,
         ),
     ] = None,
     out: Annotated[
@@ -160,30 +164,24 @@ def attitude(
         typer.Option(
             metavar="DIR",
             help="Folder to make (LOG-attitude).",
-            rich_help_panel=_OUT,
+            rich_help_panel=RESULT_PANEL,
         ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
+    force: Force = False,
     speed: Annotated[
         bool,
         typer.Option(
             "--speed",
             help="Print how long a sample takes on this machine (it is in timing.json, too).",
-            rich_help_panel=_OUT,
+            rich_help_panel=RESULT_PANEL,
         ),
     ] = False,
     png: Annotated[
-        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
         bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
+        typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=RESULT_PANEL),
     ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Name the simplest attitude algorithm, and the lowest rate, that are accurate enough.
 

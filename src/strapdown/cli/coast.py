@@ -7,15 +7,16 @@ from typing import Annotated
 
 import typer
 
+from strapdown.cli.result_options import RESULT_PANEL, Force, Json, Quiet
+
 EPILOG = (
     "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
     "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
 )
-_WHAT, _START, _RUN, _OUT = (
+_WHAT, _START, _RUN = (
     "How it moves, of a sensor",
     "What is known at the start, of a sensor",
     "Where, of a run of navigation",
-    "What to write",
 )
 
 
@@ -123,18 +124,13 @@ def coast(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (SOURCE-coast).", rich_help_panel=_OUT),
+        typer.Option(
+            metavar="DIR", help="Folder to make (SOURCE-coast).", rich_help_panel=RESULT_PANEL
+        ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Foretell how far it drifts when its aids are away, and what makes the drift.
 

@@ -1,4 +1,4 @@
-"""Options that say how a log is read: the same in every command that reads one."""
+"""Options that say what of a log is read, and how: the same in every command that reads one."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ import typer
 
 __all__ = [
     "LOG_PANEL",
+    "RUN_PANEL",
     "AccelUnit",
     "Axes",
     "Columns",
+    "Duration",
+    "From",
     "GyroUnit",
     "Rate",
     "Repair",
@@ -19,7 +22,18 @@ __all__ = [
 ]
 
 LOG_PANEL = "How to read the log"
+RUN_PANEL = "What to run"
 
+From = Annotated[
+    float | None,
+    typer.Option(
+        "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=RUN_PANEL
+    ),
+]
+Duration = Annotated[
+    float | None,
+    typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=RUN_PANEL),
+]
 Rate = Annotated[
     float | None,
     typer.Option(metavar="HZ", help="Of a log without a time column.", rich_help_panel=LOG_PANEL),

@@ -8,22 +8,26 @@ from typing import Annotated, Any
 import typer
 
 from strapdown.cli.log_options import (
+    RUN_PANEL,
     AccelUnit,
     Axes,
     Columns,
+    Duration,
+    From,
     GyroUnit,
     Rate,
     Repair,
     Sampling,
     TimeUnit,
 )
+from strapdown.cli.result_options import RESULT_PANEL, Force, Json, Quiet
 
 EPILOG = (
     "Example: strapdown navigate log.csv --gnss fixes.csv --sensor adis16470\n\n"
     "Example: strapdown navigate navigate.toml (strapdown init navigate LOG writes one)"
 )
 MOST = 6  # findings on the terminal
-_WITH, _RUN, _OUT = "With what", "What to run", "What to write"
+_WITH = "With what"
 
 
 def navigate(
@@ -95,26 +99,18 @@ def navigate(
         typer.Option(
             "--smooth",
             help="When it has ended, tell every state by all observations, later ones too.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = False,
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from", metavar="S", help="Begin at this stamp of the log.", rich_help_panel=_RUN
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(metavar="S", help="Use so much of it.", rich_help_panel=_RUN),
-    ] = None,
+    from_s: From = None,
+    duration: Duration = None,
     pace: Annotated[
         str | None,
         typer.Option(
             metavar="N|max",
             help="Play the record sample by sample, N times as fast as it was taken, and tell how "
             "long each sample takes.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     live: Annotated[
@@ -123,18 +119,20 @@ def navigate(
             metavar="-|udp://HOST:PORT",
             help="Take samples as they come, as lines of standard input or of datagrams, by the "
             "file of a run.",
-            rich_help_panel=_RUN,
+            rich_help_panel=RUN_PANEL,
         ),
     ] = None,
     every: Annotated[
         float,
         typer.Option(
-            metavar="S", help="With --live: a line of the state so often.", rich_help_panel=_RUN
+            metavar="S",
+            help="With --live: a line of the state so often.",
+            rich_help_panel=RUN_PANEL,
         ),
     ] = 1.0,
     lines: Annotated[
         str,
-        typer.Option(metavar="json|csv", help="With --live: as what.", rich_help_panel=_RUN),
+        typer.Option(metavar="json|csv", help="With --live: as what.", rich_help_panel=RUN_PANEL),
     ] = "json",
     rate: Rate = None,
     sampling: Sampling = None,
@@ -146,18 +144,13 @@ def navigate(
     repair: Repair = False,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Folder to make (LOG-navigate).", rich_help_panel=_OUT),
+        typer.Option(
+            metavar="DIR", help="Folder to make (LOG-navigate).", rich_help_panel=RESULT_PANEL
+        ),
     ] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a result that is there.", rich_help_panel=_OUT)
-    ] = False,
-    json: Annotated[
-        bool,
-        typer.Option("--json", help="Print the result as JSON alone.", rich_help_panel=_OUT),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=_OUT)
-    ] = False,
+    force: Force = False,
+    json: Json = False,
+    quiet: Quiet = False,
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
     from strapdown.bundle import check_destination, write_latency, write_timing

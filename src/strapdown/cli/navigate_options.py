@@ -9,11 +9,11 @@ from typing import Any
 from pydantic import ValidationError
 
 from strapdown.cli.align_options import as_flag, refused_flag
+from strapdown.cli.log_flags import LOG_FLAGS, log_keys
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec
 from strapdown.exceptions import ConfigError
-from strapdown.formats.columns import parse_column_option
 from strapdown.systems.sins.proposal import propose
 
 __all__ = ["FLAGS", "navigation_of_flags"]
@@ -24,20 +24,13 @@ FLAGS = {
     "site, lon_deg": "--lon",
     "site, alt_m": "--alt",
     "sensors, sensor": "--sensor",
-    "axes, axes": "--axes",
     "coarse, heading_deg": "--heading",
     "aiding, gnss, path": "--gnss",
     "aiding, gnss, lever_arm_m": "--lever-arm",
     "truth, path": "--truth",
     "control_points, path": "--points",
     "smoother, kind": "--smooth",
-    "log, from_s": "--from",
-    "log, duration_s": "--duration",
-    "log, sampling": "--sampling",
-    "log, rate_hz": "--rate",
-    "log, gyro_unit": "--gyro-unit",
-    "log, accel_unit": "--accel-unit",
-    "log, time_unit": "--time-unit",
+    **LOG_FLAGS,
 }
 
 
@@ -62,18 +55,7 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
         A file cannot be read.
     """
     try:
-        table = LogTable(
-            path=str(log),
-            columns=parse_column_option(given["columns"] or []),
-            gyro_unit=given["gyro_unit"],
-            accel_unit=given["accel_unit"],
-            time_unit=given["time_unit"],
-            sampling=given["sampling"],
-            rate_hz=given["rate"],
-            repair=bool(given["repair"]),
-            from_s=given["from_s"],
-            duration_s=given["duration"],
-        )
+        table = LogTable(**log_keys(log, given))
     except ValidationError as error:
         first = error.errors()[0]
         raise refused_flag({**first, "loc": ("log", *first["loc"])}, _flag) from None
