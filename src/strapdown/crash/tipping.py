@@ -93,11 +93,6 @@ class TippingBody:
                     remedy="give a positive number, or leave it out for a passenger car",
                 )
 
-    @property
-    def tip_deg(self) -> float:
-        """Roll at which the centre of mass is above the wheels, deg."""
-        return math.degrees(math.atan(self.stability_factor))
-
     def energy_share(self, roll: ArrayLike, rate: ArrayLike) -> Array:
         """Energy of a roll over that which tips the body over.
 
