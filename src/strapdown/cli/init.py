@@ -68,16 +68,16 @@ def crash(
     strapdown crash case.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.systems.crash_draft import draft_case, read_records
-    from strapdown.systems.crash_draft.file import check_free, write_file
 
-    check_free(out, force)
+    check_free(out, "case.toml", force=force)
     with progress(quiet) as report:
         report("reading", 0.1)
         there = read_records(records)
         report("looking through", 0.5)
         draft = draft_case(there, folder=out.absolute().parent)
-        write_file(out, draft.text, force=force)
+        write_file(out, draft.text, "case.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -120,12 +120,12 @@ def align(
 
     Then: strapdown align align.toml
     """
+    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.formats import ReadOptions
     from strapdown.formats.columns import parse_column_option
     from strapdown.systems.alignment_draft import draft_alignment
-    from strapdown.systems.crash_draft.file import check_free, write_file
 
-    check_free(out, force)
+    check_free(out, "align.toml", force=force)
     options = ReadOptions(
         columns=parse_column_option(columns or []),
         gyro_unit=gyro_unit,
@@ -137,7 +137,7 @@ def align(
         repair=repair,
     )
     draft = draft_alignment(log, folder=out.absolute().parent, options=options)
-    write_file(out, draft.text, force=force)
+    write_file(out, draft.text, "align.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -185,13 +185,13 @@ def navigate(
     Then: strapdown navigate navigate.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
     from strapdown.formats.columns import parse_column_option
-    from strapdown.systems.crash_draft.file import check_free, write_file
     from strapdown.systems.sins.draft import draft_navigation
 
-    check_free(out, force)
+    check_free(out, "navigate.toml", force=force)
     table = specify(
         LogTable,
         path=str(log),
@@ -213,7 +213,7 @@ def navigate(
             sensor=sensor,
             foot=foot,
         )
-        write_file(out, draft.text, force=force)
+        write_file(out, draft.text, "navigate.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)

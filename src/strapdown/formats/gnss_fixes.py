@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
-from strapdown.formats.file_rows import told_by_file_rows
+from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.tables import gnss_table
 from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 

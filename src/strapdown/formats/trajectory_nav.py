@@ -16,9 +16,9 @@ from strapdown.exceptions import DataError
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
 from strapdown.formats.decimal_rows import write_decimals
-from strapdown.formats.file_rows import told_by_file_rows
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers
+from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.tables import TRAJECTORY, check_trajectory, trajectory_table
 from strapdown.tables.checks import index_of, values_of

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import csv, parquet, pyins, trajectory_nav
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
-from strapdown.formats.file_rows import told_by_file_rows
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.quantity_columns import Found
 from strapdown.formats.recording import RawLog
+from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.formats.trajectory_columns import QUANTITIES, find_trajectory_columns
 from strapdown.formats.trajectory_plausibility import judge_trajectory
 from strapdown.tables import trajectory_table

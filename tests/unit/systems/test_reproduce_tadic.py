@@ -16,7 +16,6 @@ from strapdown.report.reproduction import (
     curves_json,
     reproduction_json,
     reproduction_page,
-    statements_markdown,
 )
 from strapdown.report.reproduction_charts import chart
 from strapdown.report.svg_chart import draw
@@ -47,10 +46,9 @@ from strapdown.systems.tadic import (
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from same_picture import PINNED, same_picture
+from statements_of_a_paper import check_manual, check_statements
 
 PAGE = Path(__file__).parents[3] / "docs" / "tadic.md"
-BEGIN = "<!-- statements: begin; written by `make statements` -->\n"
-END = "<!-- statements: end -->"
 # Equations and a row of a table, as the paper's text has them.
 AS_WRITTEN = {
     "eq8": (r"\frac{V_E \tan \varphi}{R_p + h}",),
@@ -90,15 +88,8 @@ def test_every_statement_is_there_once_in_the_order_of_the_paper(made):
 
 
 def test_each_has_a_quote_of_one_sentence_numbers_and_a_figure_that_exists(made):
-    slugs = {f.slug for f in made.figures}
-    for s in made.statements:
-        assert 0 < len(s.quote) < 300, s.key
-        assert not re.search(r"[a-z]\. [A-Z]", s.quote), s.key
-        assert s.evidence, s.key
-        assert s.figure in {"", *slugs}, s.key
-        assert all(np.isfinite(e.value) for e in s.evidence), s.key
-    assert len(slugs) == len(made.figures)
-    assert {"fig6", "fig7", "fig8", "fig9"} <= slugs
+    check_statements(made)
+    assert {"fig6", "fig7", "fig8", "fig9"} <= {f.slug for f in made.figures}
     assert {"table1", "table2"} <= {t.slug for t in made.tables}
 
 
@@ -161,14 +152,7 @@ def test_every_curve_that_is_no_reference_is_told_apart_without_its_colour(made)
 
 
 def test_the_manual_has_the_statements_of_this_code(made):
-    table = statements_markdown(made)
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    written, _, after = rest.partition(END)
-    if os.environ.get("STRAPDOWN_WRITE_STATEMENTS"):
-        written = f"\n{table}\n"
-        PAGE.write_text(before + BEGIN + written + END + after, encoding="utf-8")
-    assert written.strip() == table.strip(), "run `make statements` and read the difference"
+    check_manual(made, PAGE)
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
