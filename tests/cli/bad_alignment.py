@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bad_command import said_by
 
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
@@ -272,13 +272,4 @@ def alignment_section(mktemp, run_cli) -> str:
 def alignment_said(case: AlignmentCase, folder: Path, run_cli) -> tuple[str, int]:
     """Run a case; whether anything is left behind is looked at here."""
     case.make(folder)
-    before = sorted(p.name for p in folder.rglob("*"))
-    done = run_cli("align", folder / case.source, "--out", folder / "out", *case.options)
-    assert "Traceback" not in done.err, done.err
-    assert done.code == case.code, (case.title, done.code, done.err)
-    if case.code:
-        assert sorted(p.name for p in folder.rglob("*")) == before, "something was left behind"
-        assert done.out == ""
-    else:
-        assert (folder / "out" / "manifest.json").is_file()
-    return done.err.replace(str(folder) + os.sep, ""), done.code
+    return said_by("align", case, folder, case.options, run_cli)

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from bad_command import said_by
 
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, car, simulate_imu
@@ -367,14 +368,5 @@ def navigate_section(mktemp, run_cli) -> str:
 def navigate_said(case: NavigateCase, folder: Path, run_cli) -> tuple[str, int]:
     """Run a case; whether anything is left behind is looked at here."""
     case.make(folder)
-    before = sorted(p.name for p in folder.rglob("*"))
     options = [o.replace("FOLDER", str(folder)) for o in case.options]
-    done = run_cli("navigate", folder / case.source, "--out", folder / "out", *options)
-    assert "Traceback" not in done.err, done.err
-    assert done.code == case.code, (case.title, done.code, done.err)
-    if case.code:
-        assert sorted(p.name for p in folder.rglob("*")) == before, "something was left behind"
-        assert done.out == ""
-    else:
-        assert (folder / "out" / "manifest.json").is_file()
-    return done.err.replace(str(folder) + os.sep, ""), done.code
+    return said_by("navigate", case, folder, options, run_cli)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import re
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,14 +13,14 @@ from strapdown.report.reproduction import (
     REPRODUCTIONS,
     make_reproduction,
     reproduction_specification,
-    statements_markdown,
 )
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from statements_of_a_paper import check_manual
 
 pytestmark = pytest.mark.usefixtures("sketched_module")
 
 PAGE = Path(__file__).parents[2] / "docs" / "alexiev.md"
-BEGIN = "<!-- statements: begin; written by `make statements` -->\n"
-END = "<!-- statements: end -->"
 
 
 @pytest.fixture(scope="module")
@@ -93,14 +93,7 @@ def test_every_reproduction_can_be_made_by_its_name(paper, run_cli):
 
 
 def test_the_manual_has_the_statements_of_this_code():
-    table = statements_markdown(make_reproduction(reproduction_specification("alexiev")))
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    written, _, after = rest.partition(END)
-    if os.environ.get("STRAPDOWN_WRITE_STATEMENTS"):
-        written = f"\n{table}\n"
-        PAGE.write_text(before + BEGIN + written + END + after, encoding="utf-8")
-    assert written.strip() == table.strip(), "run `make statements` and read the difference"
+    check_manual(make_reproduction(reproduction_specification("alexiev")), PAGE)
 
 
 @pytest.mark.slow

@@ -86,22 +86,6 @@ def places_from_ecef(positions, ellipsoid, out):
 
 
 @njit(cache=True)
-def ecef_from_places(places, ellipsoid, out):
-    """Columns x, y, z of rows latitude, longitude, height."""
-    for i in range(places.shape[0]):
-        lat, lon = places[i, 0], places[i, 1]
-        out[i, 0], out[i, 1], out[i, 2] = ecef_from_geodetic(
-            math.sin(lat),
-            math.cos(lat),
-            math.sin(lon),
-            math.cos(lon),
-            places[i, 2],
-            ellipsoid[A],
-            ellipsoid[E2],
-        )
-
-
-@njit(cache=True)
 def quats_ned_from_ecef(lats, lons, out):
     """Rows ``q_ne`` of latitudes and longitudes."""
     for i in range(lats.size):

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
@@ -298,10 +299,8 @@ def _best(
 
 def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]:
     """Integrals of three channels, (m, 3), at stamps that are no closer than the search needs."""
-    steps = np.diff(stamps)
-    mean = values[1:] if means else 0.5 * (values[1:] + values[:-1])
-    sums = np.vstack([np.zeros(3), np.cumsum(steps[:, None] * mean, axis=0)])
-    each = max(1, int(NODES / float(np.median(steps))))
+    sums = running_integral(stamps, values, means=means)
+    each = max(1, int(NODES / float(np.median(np.diff(stamps)))))
     last = len(stamps) - 1
     kept = np.append(np.arange(0, last, each), last)
     return stamps[kept], sums[kept]

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.chi_square import chi_square_exceeded
+from strapdown.dsp.running_integral import running_integral
 from strapdown.sensors.imu_uncertainty import BiasDrift
 from strapdown.sensors.triad_errors import Triad
 from strapdown.tables import ACCEL, GYRO
@@ -149,9 +150,7 @@ def excursion(imu: pd.DataFrame, density: Triad) -> Array:
     """
     time = imu.index.to_numpy(dtype=np.float64)
     gyro = imu[GYRO].to_numpy(dtype=np.float64)
-    steps = np.diff(time)[:, None]
-    middle = gyro[1:] if imu.attrs["sampling"] == "mean" else 0.5 * (gyro[1:] + gyro[:-1])
-    angle = np.vstack([np.zeros((1, 3)), np.cumsum(middle * steps, axis=0)])
+    angle = running_integral(time, gyro, means=imu.attrs["sampling"] == "mean")
     line = np.column_stack([np.ones_like(time), (time - time.mean()) / (time[-1] - time[0])])
     angle -= line @ np.linalg.lstsq(line, angle, rcond=None)[0]
     swing = angle.T @ angle / len(angle)

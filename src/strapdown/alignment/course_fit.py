@@ -34,6 +34,7 @@ from strapdown.alignment.course_unknowns import (
 from strapdown.alignment.drive_sums import DriveSums, drive_sums
 from strapdown.alignment.site import Site
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
+from strapdown.dsp.running_integral import running_integral
 from strapdown.earth import transport_rate
 from strapdown.estimation.influence import Influence
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -246,11 +247,11 @@ class CourseFit:
         T, g = sums.until_end[:, None], self.site.gravity
         gained = sums.gained @ found.C.T
         v = found.velocity - gained - g * T + np.cross(rate, g) * 0.5 * T * T
-        order = np.argsort(-sums.until_end, kind="stable")
-        ahead = np.vstack([v[order], found.velocity])
-        steps = -np.diff(np.append(sums.until_end[order], 0.0))[:, None]
+        from_end = np.argsort(-sums.until_end, kind="stable")[::-1]
         way = np.empty_like(v)
-        way[order] = np.cumsum((0.5 * (ahead[1:] + ahead[:-1]) * steps)[::-1], axis=0)[::-1]
+        way[from_end] = running_integral(
+            np.append(0.0, sums.until_end[from_end]), np.vstack([found.velocity, v[from_end]])
+        )[1:]
         v = v + np.cross(self.site.earth_rate, way)
         by = np.zeros((len(v), 3, COUNT))
         by[:, :, VELOCITY] = np.eye(3)

@@ -79,11 +79,11 @@ def crash(
     strapdown crash case.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
     from strapdown.systems.crash_draft import draft_case, read_records
-    from strapdown.systems.crash_draft.file import check_free, write_file
 
-    check_free(out, force)
+    check_free(out, "case.toml", force=force)
     for record in records:
         refuse_result(record, "record")
     with progress(quiet) as report:
@@ -91,7 +91,7 @@ def crash(
         there = read_records(records)
         report("looking through", 0.5)
         draft = draft_case(there, folder=out.absolute().parent)
-        write_file(out, draft.text, force=force)
+        write_file(out, draft.text, "case.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -128,19 +128,19 @@ def align(
     Then: strapdown align align.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
     from strapdown.systems.alignment_draft import draft_alignment
-    from strapdown.systems.crash_draft.file import check_free, write_file
 
-    check_free(out, force)
+    check_free(out, "align.toml", force=force)
     refuse_result(log, "log")
     with progress(quiet) as report:
         report("reading", 0.3)
         table = specify(LogTable, path=str(log), **log_keys(flags.given()))
         draft = draft_alignment(table, folder=out.absolute().parent, axes=flags.axes)
-        write_file(out, draft.text, force=force)
+        write_file(out, draft.text, "align.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)
@@ -192,13 +192,13 @@ def navigate(
     Then: strapdown navigate navigate.toml
     """
     from strapdown.cli.console import progress
+    from strapdown.cli.draft_file import check_free, write_file
     from strapdown.cli.result_folder import refuse_result
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
-    from strapdown.systems.crash_draft.file import check_free, write_file
     from strapdown.systems.sins.draft import draft_navigation
 
-    check_free(out, force)
+    check_free(out, "navigate.toml", force=force)
     refuse_result(log, "log")
     table = specify(LogTable, path=str(log), **log_keys(flags.given()))
     with progress(quiet) as report:
@@ -211,7 +211,7 @@ def navigate(
             sensor=sensor,
             foot=foot,
         )
-        write_file(out, draft.text, force=force)
+        write_file(out, draft.text, "navigate.toml", force=force)
     if quiet:
         return
     page = _say_found(draft.findings, draft.found)

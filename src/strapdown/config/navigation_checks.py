@@ -20,7 +20,7 @@ from strapdown.config.navigation_modules import (
     make_aid,
     make_aids,
     make_filter,
-    uncertainty_of,
+    sensors_of,
 )
 from strapdown.config.slots import SLOTS
 from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
@@ -315,7 +315,7 @@ class _Checks(SourceChecks):
     def chain(self, spec: NavigationSpec) -> None:
         """Begin the filter, which refuses parts that do not go together."""
         try:
-            made = make_filter(spec, uncertainty_of(spec))
+            made = make_filter(spec, sensors_of(spec))
             aids = make_aids(spec)
         except ConfigError as error:
             # Options of modules are told by themselves, and with their own keys.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from strapdown.aiding.aid import Aid
+from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec, aids_of
 from strapdown.config.slots import SLOTS
@@ -16,7 +17,7 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.stated_imu import stated_imu
 
-__all__ = ["given_of", "make_aid", "make_aids", "make_filter", "uncertainty_of"]
+__all__ = ["given_of", "make_aid", "make_aids", "make_filter", "sensors_of"]
 
 
 def given_of(spec: NavigationSpec) -> dict[str, Any]:
@@ -24,7 +25,7 @@ def given_of(spec: NavigationSpec) -> dict[str, Any]:
     return {"ellipsoid": spec.ellipsoid}
 
 
-def uncertainty_of(spec: NavigationSpec) -> ImuUncertainty:
+def sensors_of(spec: AlignmentSpec | NavigationSpec) -> ImuUncertainty:
     """What is not known of the sensors of a specification.
 
     Raises

@@ -12,7 +12,7 @@ from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.combined_effects import SampleWeights, combine_effects
-from strapdown.crash.mean_weights import CRASH_WINDOW, by_none, force_weights
+from strapdown.crash.mean_weights import by_none, crash_steps, force_weights
 from strapdown.crash.sample_effects import SampleEffects, level_turned_by
 from strapdown.crash.unit_differences import TINY
 from strapdown.exceptions import ConfigError, DataError
@@ -237,10 +237,7 @@ def _median_weights(force: Array) -> Array:
 
 def _rate_weights(units: Sequence[AtPoint], counted: NDArray[np.bool_]) -> Array:
     """One number a unit; a gyro that several have counts once."""
-    time = units[0].time
-    steps = np.gradient(time)
-    within = (time >= CRASH_WINDOW[0]) & (time <= CRASH_WINDOW[1])
-    steps = np.where(within, steps, 0.0) if within.any() else steps
+    steps = crash_steps(units[0].time)
     known, weights = set(), []
     for u, counts in zip(units, counted, strict=True):
         turned = np.tensordot(steps, u.effects.rate, axes=(0, 1))

@@ -83,12 +83,6 @@ class DeltaV:
         sds = np.broadcast_to(np.asarray(noise, dtype=np.float64), (len(self.weights), 3))
         return np.diag(self.weights**2 @ sds**2)
 
-    def timing_covariance(self, start_sd: float = 0.0, end_sd: float = 0.0) -> Array:
-        """Covariance from independent errors of the two ends, (3, 3), m²/s², to first order."""
-        return np.outer(self.start_rate, self.start_rate) * start_sd**2 + (
-            np.outer(self.end_rate, self.end_rate) * end_sd**2
-        )
-
 
 @dataclass(frozen=True, eq=False)
 class TrailingDeltaV:

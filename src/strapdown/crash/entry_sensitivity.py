@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.running_integral import running_integral
 from strapdown.rotation import cross_matrix
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
@@ -171,9 +172,7 @@ def noise_between_fixes(
 
 def back_integral(time: Array, values: Array) -> Array:
     """Minus the integral from each stamp to the last, by trapezoids."""
-    dt = np.diff(time).reshape((-1,) + (1,) * (values.ndim - 1))
-    out = np.zeros_like(values)
-    np.cumsum(0.5 * dt * (values[1:] + values[:-1]), axis=0, out=out[1:])
+    out = running_integral(time, values)
     out -= out[-1].copy()
     return out
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -75,12 +74,6 @@ class CrashEvents:
             There is none.
         """
         return max(self.events, key=lambda e: e.peak) if self.events else self.first
-
-    @property
-    def times_between(self) -> tuple[float, ...]:
-        """From time zero of each event to that of the next, s (49 CFR 563.5(b))."""
-        zeros = [e.time_zero for e in self.events]
-        return tuple(b - a for a, b in itertools.pairwise(zeros))
 
     @property
     def crashes(self) -> tuple[tuple[CrashEvent, ...], ...]:

@@ -13,7 +13,7 @@ from strapdown.crash.unit_differences import floored
 
 Array = NDArray[np.float64]
 
-__all__ = ["CRASH_WINDOW", "by_none", "force_weights"]
+__all__ = ["by_none", "crash_steps", "force_weights"]
 
 # What is weighed: the change of velocity from shortly before the impact to the end of the path.
 CRASH_WINDOW = (-0.1, 0.75)  # s
@@ -69,6 +69,23 @@ def force_weights(units: Sequence[AtPoint]) -> Array:
     return weights
 
 
+def crash_steps(time: Array) -> Array:
+    """Steps of the crash window, zero outside of it; all, where no stamp lies in it.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+        From the trigger.
+
+    Returns
+    -------
+    ndarray, (n,), s
+    """
+    steps = np.gradient(time)
+    within = (time >= CRASH_WINDOW[0]) & (time <= CRASH_WINDOW[1])
+    return np.where(within, steps, 0.0) if within.any() else steps
+
+
 def velocity_covariance(units: Sequence[AtPoint]) -> Array:
     """Joint covariance of the changes of velocity of units over the crash, axis by axis.
 
@@ -83,10 +100,7 @@ def velocity_covariance(units: Sequence[AtPoint]) -> Array:
         Of the integral of the specific force along each vehicle axis. Unknowns of one name are one
         unknown; noise is that of independent samples.
     """
-    time = units[0].time
-    steps = np.gradient(time)
-    within = (time >= CRASH_WINDOW[0]) & (time <= CRASH_WINDOW[1])
-    steps = np.where(within, steps, 0.0) if within.any() else steps
+    steps = crash_steps(units[0].time)
     columns: dict[str, int] = {}
     for u in units:
         for name in u.effects.names:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
 
@@ -92,11 +93,6 @@ class TippingBody:
                     remedy="give a positive number, or leave it out for a passenger car",
                 )
 
-    @property
-    def tip_deg(self) -> float:
-        """Roll at which the centre of mass is above the wheels, deg."""
-        return math.degrees(math.atan(self.stability_factor))
-
     def energy_share(self, roll: ArrayLike, rate: ArrayLike) -> Array:
         """Energy of a roll over that which tips the body over.
 
@@ -165,8 +161,7 @@ class TippingBody:
                 quantity="roll_rate",
                 remedy="give the rates of the event, on the clock of its time zero",
             )
-        steps = 0.5 * (rate[1:] + rate[:-1]) * np.diff(stamps)
-        roll = math.radians(start_roll_deg) + np.concatenate([[0.0], np.cumsum(steps)])
+        roll = math.radians(start_roll_deg) + running_integral(stamps, rate)
         share = self.energy_share(roll, rate)[counted]
         best = int(np.argmax(share))
         bounds = [float(share[best])]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.crash.acceleration import Acceleration
+from strapdown.dsp.running_integral import running_integral
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,7 @@ class VelocityCourse:
         mean = acceleration.sampling == "mean"
         self._first = values[1:] if mean else values[:-1]
         self._slope = (values[1:] - self._first) / steps
-        rise = 0.5 * (self._first + values[1:]) * steps
-        self._velocity = np.vstack([np.zeros(3), np.cumsum(rise, axis=0)])
+        self._velocity = running_integral(self._time, values, means=mean)
 
     def _place(self, instants: Array) -> tuple[NDArray[np.int64], Array]:
         time = self._time

@@ -15,11 +15,11 @@ from strapdown.formats import csv, parquet
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
 from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.find_columns import Column
+from strapdown.formats.geodetic_quantities import GEODETIC_QUANTITIES
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.quantity_columns import (
-    ANGLES,
     LENGTHS,
     SPEEDS,
     Found,
@@ -33,7 +33,6 @@ __all__ = ["QUANTITIES", "detect", "read"]
 
 Array = NDArray[np.float64]
 _SD_HEADS = ("sd", "std", "stddev", "stdev", "sigma", "s")
-_HEADS = ("v", "vel", "velocity", "speed")
 
 
 def _sds(*words: str) -> tuple[str, ...]:
@@ -43,10 +42,6 @@ def _sds(*words: str) -> tuple[str, ...]:
     )
 
 
-def _velocities(letter: str, word: str) -> tuple[str, ...]:
-    return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
-
-
 #: What a table of fixes may hold, as it may be called.
 QUANTITIES: dict[str, Quantity] = {
     "time": Quantity(
@@ -54,24 +49,7 @@ QUANTITIES: dict[str, Quantity] = {
         TIME_UNITS,
     ),
     "week": Quantity(("week", "gpsweek", "weeknumber", "wn"), {}),
-    "lat": Quantity(("lat", "latitude"), ANGLES),
-    "lon": Quantity(("lon", "lng", "long", "longitude"), ANGLES),
-    "alt": Quantity(
-        (
-            "alt",
-            "altitude",
-            "h",
-            "hgt",
-            "height",
-            "hell",
-            "altell",
-            "heightell",
-            "ellipsoidalheight",
-            "heightellipsoid",
-            "altitudeellipsoid",
-        ),
-        LENGTHS,
-    ),
+    **GEODETIC_QUANTITIES,
     "alt_msl": Quantity(
         (
             "hmsl",
@@ -88,9 +66,6 @@ QUANTITIES: dict[str, Quantity] = {
         ("geoid", "undulation", "geoidsep", "geoidseparation", "geoidheight", "geoidundulation"),
         LENGTHS,
     ),
-    "VN": Quantity(_velocities("n", "north"), SPEEDS),
-    "VE": Quantity(_velocities("e", "east"), SPEEDS),
-    "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
     "north_sd": Quantity(_sds("n", "north", "lat", "latitude"), LENGTHS),
     "east_sd": Quantity(_sds("e", "east", "lon", "longitude"), LENGTHS),
     "down_sd": Quantity(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
+from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.tables import gnss_table
 from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -135,7 +136,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
             remedy="look at the file: every row is without a place or a later stamp",
         )
     at = np.flatnonzero(keep)
-    try:
+    with told_by_file_rows(fixes.name, lambda row: int(fixes.rows[at[row]])):
         table = gnss_table(
             time[at],
             fixes.place[at],
@@ -145,16 +146,6 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
             quality[at],
             source=fixes.name,
         )
-    except DataError as error:
-        # The row of the table is not that of the file.
-        said = error.finding
-        raise DataError(
-            said.what,
-            file=fixes.name,
-            row=None if said.row is None else int(fixes.rows[at[said.row - 1]]),
-            quantity=said.quantity,
-            remedy=said.remedy,
-        ) from None
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
     if taken is not None:

@@ -94,6 +94,7 @@ def find_quantities(
     asked: Mapping[str, str],
     file: str,
     units: Mapping[str, str] | None = None,
+    of: str = "this table",
 ) -> dict[str, Found]:
     """Find the column of each quantity.
 
@@ -109,6 +110,8 @@ def find_quantities(
         For messages.
     units : dict of str to str, optional
         Column to unit, where the file states it apart from the name.
+    of : str
+        What the quantities are of, for messages.
 
     Returns
     -------
@@ -127,7 +130,7 @@ def find_quantities(
     for quantity, name in asked.items():
         if quantity not in known:
             raise ConfigError(
-                f"'{quantity}' is no quantity of this table",
+                f"'{quantity}' is no quantity of {of}",
                 quantity="columns",
                 remedy=nearest(quantity, known),
             )

@@ -18,6 +18,7 @@ from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_
 from strapdown.formats.decimal_rows import write_decimals
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers
+from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.tables import TRAJECTORY, check_trajectory, trajectory_table
 from strapdown.tables.checks import index_of, values_of
@@ -88,7 +89,7 @@ def read(path: Path) -> pd.DataFrame:
     time = values["time"] + WEEK * (week - week[0])
     if np.isfinite(time).all():
         time, _ = unrolled(time)
-    try:
+    with told_by_file_rows(raw.name, raw.row):
         table = trajectory_table(
             time,
             np.column_stack([values[n] for n in TRAJECTORY[:3]]),
@@ -96,16 +97,6 @@ def read(path: Path) -> pd.DataFrame:
             np.column_stack([values[n] for n in TRAJECTORY[6:]]),
             source=raw.name,
         )
-    except DataError as error:
-        # The row of the table is not that of the file.
-        said = error.finding
-        raise DataError(
-            said.what,
-            file=raw.name,
-            row=None if said.row is None else raw.row(said.row - 1),
-            quantity=said.quantity,
-            remedy=said.remedy,
-        ) from None
     known = np.isfinite(week[0]) and week[0] > 0
     with_clock(table, Clock(GPS, 0.0, int(week[0]) if known else None))
     table.attrs["findings"] = tuple(raw.findings)

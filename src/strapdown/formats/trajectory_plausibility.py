@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import DataError, Finding
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY
@@ -57,8 +58,7 @@ def judge_trajectory(
     velocity = table[VELOCITY[:2]].to_numpy(dtype=np.float64)
     if not euler_stated:
         _refuse_radians_of_attitude(table[EULER].to_numpy(dtype=np.float64), velocity, file)
-    steps = np.diff(time)[:, None]
-    moved = np.vstack([np.zeros(2), np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * steps, 0)])
+    moved = running_integral(time, velocity)
     moved -= moved.mean(axis=0)
     size = float(np.sqrt(np.square(moved).sum(axis=1).mean()))
     if not size > LEAST_MOTION:

@@ -16,12 +16,10 @@ from strapdown.formats import csv, parquet, pyins, trajectory_nav
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
+from strapdown.formats.quantity_columns import Found
 from strapdown.formats.recording import RawLog
-from strapdown.formats.trajectory_columns import (
-    QUANTITIES,
-    TrajectoryColumn,
-    find_trajectory_columns,
-)
+from strapdown.formats.table_rows import told_by_file_rows
+from strapdown.formats.trajectory_columns import QUANTITIES, find_trajectory_columns
 from strapdown.formats.trajectory_plausibility import judge_trajectory
 from strapdown.tables import trajectory_table
 
@@ -62,7 +60,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         `TRAJECTORY_READERS`.
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat``, ``lon``, ``alt``, ``VN``, ``VE``, ``VD``, ``roll``, ``pitch``,
-        ``heading``) to the name of its column, where the names do not say it.
+        ``heading``) to the name of its column, or its number from 1, where the names do not say it.
 
     Returns
     -------
@@ -91,7 +89,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
     values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
-    try:
+    with told_by_file_rows(raw.name, raw.row):
         table = trajectory_table(
             values["time"],
             np.column_stack([values[q] for q in ("lat", "lon", "alt")]),
@@ -99,16 +97,6 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
             np.column_stack([values[q] for q in ("roll", "pitch", "heading")]),
             source=raw.name,
         )
-    except DataError as error:
-        # The row of the table is not that of the file.
-        said = error.finding
-        raise DataError(
-            said.what,
-            file=raw.name,
-            row=None if said.row is None else raw.row(said.row - 1),
-            quantity=said.quantity,
-            remedy=said.remedy,
-        ) from None
     judged = judge_trajectory(
         table,
         angles_stated=found["lat"].stated and found["lon"].stated,
@@ -140,7 +128,7 @@ def _there(path: str | Path) -> Path:
     return path
 
 
-def _values(raw: RawLog, quantity: str, column: TrajectoryColumn) -> Array:
+def _values(raw: RawLog, quantity: str, column: Found) -> Array:
     of = Column(column.source, None, "")
     if quantity == "time":
         ticks, dated = ticks_of(raw, of)

@@ -14,7 +14,7 @@ import pandas as pd
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import given_of, uncertainty_of
+from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.slots import SLOTS
 from strapdown.exceptions import DataError, StrapdownError
 from strapdown.live.clock import Clock
@@ -108,7 +108,7 @@ def receive(
         The chain cannot be made.
     """
     with closing(source):
-        chain = make_chain(spec, uncertainty_of(spec))
+        chain = make_chain(spec, sensors_of(spec))
         recorder: Recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
         reader = _Reader(write)
         lines = StateLines(chain.navigator, reader.write, form, every)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from strapdown.mechanization.mechanization import HEIGHTS, Mechanization
+from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
+from strapdown.mechanization.reference_heights import HEIGHTS
 from strapdown.mechanization.run import NavigationRun, navigate_segments, run_mechanization
 from strapdown.mechanization.tadic import Tadic
 from strapdown.mechanization.tracker import NavTracker

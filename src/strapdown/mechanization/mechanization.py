@@ -16,11 +16,8 @@ from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import LEVEL
 from strapdown._kernels.ned import (
     ALT,
-    LARGEST_TURN,
     LAT,
-    LEAP,
     LON,
-    POLE,
     ROW,
     Q,
     V,
@@ -29,15 +26,14 @@ from strapdown._kernels.ned import (
 from strapdown._kernels.ned_level import ned_correct, ned_correct_rows, ned_levels
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, DataError, DivergenceError, Finding, nearest
+from strapdown.exceptions import ConfigError, Finding, nearest
+from strapdown.mechanization.reference_heights import HEIGHTS, reference_heights
+from strapdown.mechanization.refusal import refuse_start, refuse_step
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
 from strapdown.tables.checks import is_number, values_of
 
 Array = NDArray[np.float64]
-
-#: What may become of the height: it follows from the sensors; it is kept; a reference damps it.
-HEIGHTS = ("free", "held", "damped")
 
 
 @dataclass(frozen=True)
@@ -294,7 +290,7 @@ class Mechanization(ABC):
         backward: bool,
     ) -> None:
         """As `advance`, in place; `rows` are those of `increments`."""
-        reference = self._heights(heights, len(rows))
+        reference = reference_heights(self.height, heights, len(rows))
         velocity = slice(self.v_at, self.v_at + 3)
         earth = find_ellipsoid(self.ellipsoid).parameters()
         if backward:
@@ -309,8 +305,15 @@ class Mechanization(ABC):
         if why:
             at = len(rows) - 1 - made if backward else made
             if not made:
-                self._refuse_start(state, increments)
-            self._refuse(why, at, increments, history[made - 1] if made else None)
+                refuse_start(
+                    float(state[self.alt_at]),
+                    self._speed(state),
+                    self.height_limits,
+                    self.largest_speed,
+                    increments.attrs.get("source"),
+                )
+            before = self._words(history[made - 1]) if made else ""
+            refuse_step(why, at, increments, before, self.latitude_limit_deg)
         if backward:
             state[velocity] *= -1.0
             history[:] = history[::-1].copy()
@@ -353,97 +356,11 @@ class Mechanization(ABC):
         """Return what a person should know of the states of a run."""
         return ()
 
-    def _heights(self, heights: ArrayLike | None, steps: int) -> Array:
-        if self.height != "damped":
-            if heights is None:
-                return np.empty(0)
-            raise DataError(
-                f"there are heights to damp by, and the height is '{self.height}'",
-                quantity="heights",
-                remedy="use height='damped', or leave them out",
-            )
-        if heights is None:
-            raise DataError(
-                "the height is to be damped, and there is no reference for it",
-                quantity="heights",
-                remedy="give a height for every step, or use height='held' or 'free'",
-            )
-        try:
-            reference = np.ascontiguousarray(heights, dtype=np.float64)
-        except (TypeError, ValueError):
-            raise DataError(
-                "these are no numbers",
-                quantity="heights",
-                remedy="give one height in m for every step, NaN where there is none",
-            ) from None
-        if reference.shape != (steps,):
-            raise DataError(
-                f"its shape is {reference.shape}, and there are {steps} steps",
-                quantity="heights",
-                remedy="give one height in m for every step, NaN where there is none",
-            )
-        if np.isinf(reference).any():
-            raise DataError(
-                "it is infinite",
-                row=int(np.argmax(np.isinf(reference))) + 1,
-                quantity="heights",
-                remedy="give heights in m, NaN where there is none",
-            )
-        return reference
-
-    def _refuse_start(self, state: Array, increments: pd.DataFrame) -> None:
-        """Refuse a state that was outside of the limits before any step."""
-        speed, alt = self._speed(state), float(state[self.alt_at])
-        lowest, highest = self.height_limits
-        if speed > self.largest_speed or not lowest <= alt <= highest:
-            raise DivergenceError(
-                f"the state to begin with, {alt:.6g} m high and at {speed:.6g} m/s, is "
-                f"outside of {lowest:g} to {highest:g} m, or above {self.largest_speed:g} m/s",
-                file=increments.attrs.get("source"),
-                quantity="state",
-                remedy="give the height over the ellipsoid in m and the velocity in m/s, or other "
-                "height_limits or largest_speed",
-            )
-
     def _speed(self, row: Array) -> float:
         return float(np.linalg.norm(row[self.v_at : self.v_at + 3]))
 
-    def _refuse(self, why: int, step: int, increments: pd.DataFrame, last: Array | None) -> None:
-        time = float(increments.index[step])
-        row = increments.iloc[step]
-        before = ""
-        if last is not None:
-            before = (
-                f"; before it {np.degrees(self.latitude(last)):.6f} deg of latitude, "
-                f"{last[self.alt_at]:.6g} m of height, {self._speed(last):.6g} m/s"
-            )
-        source = increments.attrs.get("source")
-        if why == POLE:
-            raise DivergenceError(
-                f"the sample at {time:.9g} s (step {step + 1}) comes nearer to a pole than "
-                f"{self.latitude_limit_deg:g} deg of latitude{before}: north, and every angle from "
-                "it, changes too fast there",
-                file=source,
-                quantity="lat",
-                remedy="end the run before it, or navigate with WanderAzimuth, which knows no "
-                "pole; north-east-down has no meaning there",
-            )
-        if why == LEAP:
-            raise DivergenceError(
-                f"with the sample at {time:.9g} s (step {step + 1}, of {row['dt']:.4g} s) the "
-                f"place moves by more than {LARGEST_TURN:g} rad around the Earth{before}",
-                file=source,
-                quantity="state",
-                remedy="a step so long has no course between its ends: cut the log there",
-            )
-        given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
-        raise DivergenceError(
-            f"the state has diverged with the sample at {time:.9g} s (step {step + 1}: {given})"
-            f"{before}",
-            file=source,
-            quantity="state",
-            remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-            "gravity (-9.8 on z at level rest), a burst; at the start: an attitude in rad; or a "
-            "sensor too poor for so long a run, whose bias is best taken off at a rest, or a free "
-            "height over an hour",
+    def _words(self, row: Array) -> str:
+        return (
+            f"; before it {np.degrees(self.latitude(row)):.6f} deg of latitude, "
+            f"{row[self.alt_at]:.6g} m of height, {self._speed(row):.6g} m/s"
         )

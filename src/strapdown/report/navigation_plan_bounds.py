@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.running_integral import running_integral
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLUE, VERMILLION, Line
@@ -61,7 +62,7 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
     table = record.trajectory
     speed = np.hypot(table["VN"].to_numpy(), table["VE"].to_numpy())
     at = table.index.to_numpy(dtype=np.float64)
-    way = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(at))])
+    way = running_integral(at, speed)
     gone = np.interp(time[rows], at, way)
     picked = np.searchsorted(gone, np.linspace(0.0, gone[-1], _ALONG + 1)[1:])
     picked = np.clip(picked, 0, rows.size - 1)

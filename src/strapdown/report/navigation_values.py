@@ -155,7 +155,7 @@ def distance_over_ground(trajectory: pd.DataFrame) -> float:
     """Way over the ground, m: the horizontal speed summed over time by the trapezoid rule."""
     time = trajectory.index.to_numpy(dtype=np.float64)
     speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
-    return float(np.sum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time)))
+    return float(np.trapezoid(speed, time))
 
 
 def length_words(metres: float) -> str:

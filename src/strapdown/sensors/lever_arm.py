@@ -50,11 +50,6 @@ class MovedImu:
     bandwidth: float
     slope: LocalSlope
 
-    @property
-    def added_sd(self) -> Array:
-        """Standard deviation that is added to each sample, (n, 3), m/s²."""
-        return np.asarray(np.sqrt(np.diagonal(self.added, axis1=1, axis2=2)), dtype=np.float64)
-
     @cached_property
     def turning(self) -> Array:
         """Rates where the angular acceleration is taken, (n, 3), rad/s."""

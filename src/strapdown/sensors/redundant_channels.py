@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.sensors.low_pass import low_pass
 
@@ -142,8 +143,7 @@ def compare_redundant(
     found_correlation = float(np.corrcoef(x, y)[0, 1])
     gain = float(x @ y) / power
     difference = y - x
-    step = np.diff(t)[:, None]
-    total = np.vstack([np.zeros((1, 2)), np.cumsum(0.5 * step * (both[1:] + both[:-1]), axis=0)])
+    total = running_integral(t, both)
     apart = np.abs(total[:, 1] - total[:, 0])
     largest = float(np.abs(total[:, 0]).max())
     share = float(apart.max()) / largest if largest else float("inf")

@@ -17,14 +17,13 @@ from strapdown.alignment.observability import Manoeuvre, manoeuvres_after
 from strapdown.alignment.site import Site
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.choice import make_choice
+from strapdown.config.navigation_modules import sensors_of
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.results.inputs import InputFiles
-from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
-from strapdown.sensors.stated_imu import stated_imu
 from strapdown.systems.alignment_health import channel_findings
 from strapdown.systems.alignment_outliers import saying_outliers
 from strapdown.systems.alignment_readiness import AlignmentReadiness, alignment_readiness
@@ -195,13 +194,6 @@ def run_alignment(
         unread=unread,
         findings=tuple(dict.fromkeys(findings)),
     )
-
-
-def sensors_of(spec: AlignmentSpec) -> ImuUncertainty:
-    """What is not known of the sensors of a specification."""
-    stated = spec.sensors
-    sensor = None if stated.sensor is None else load_sensor(stated.sensor)
-    return stated_imu(sensor, stated.gyro, stated.accel)
 
 
 def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:

@@ -10,20 +10,19 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude import AttitudeAlgorithm, RotationVector, make_algorithm, run_attitude
+from strapdown.attitude import AttitudeAlgorithm, make_algorithm, run_attitude
 from strapdown.attitude.cost import count_cost
 from strapdown.config import AttitudeSpec, specify
 from strapdown.evaluation.differences import largest_differences
-from strapdown.evaluation.known import Known, known_at
+from strapdown.evaluation.known import known_at
 from strapdown.evaluation.place_scores import score_places
 from strapdown.evaluation.reference_points import score_references
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import increments_from_imu
 from strapdown.results.attitude_bench import AttitudeBench
-from strapdown.results.rests import RestStretch
-from strapdown.rotation.angles import unit_rotation_angle
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.attitude_answer import Evidence, find_answer
+from strapdown.systems.attitude_evidence import find_evidence, worst_evidence
 from strapdown.systems.attitude_judgement import judge_runs, judge_truth, judge_turns, truth_score
 from strapdown.systems.attitude_known import gather_references, read_second, truth_of_second
 from strapdown.systems.attitude_peers import run_beside
@@ -37,8 +36,6 @@ from strapdown.systems.attitude_request import (
     source_spec,
 )
 from strapdown.systems.attitude_shares import (
-    MOST_ACCURATE,
-    best_error,
     between_samples,
     find_shares,
     own_truth,
@@ -48,14 +45,12 @@ from strapdown.systems.attitude_start import find_gyro_bias, initial_attitude, w
 from strapdown.systems.attitude_sweep import (
     Grounds,
     choose_factors,
-    error_at_full_rate,
     refuse_no_rate,
     sweep_rates,
 )
-from strapdown.systems.attitude_trials import gather, trial_names, worst_sweep
+from strapdown.systems.attitude_trials import gather, not_judged, trial_names, worst_sweep
 from strapdown.systems.part_of_log import check_part, part_of_log
 from strapdown.systems.progress import Progress, silent
-from strapdown.tables import GYRO
 
 Array = NDArray[np.float64]
 
@@ -229,7 +224,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeBench:
     benches = [b for b, _ in judged]
     names = trial_names([s.source for s in specs])
     sweep = worst_sweep([b.sweep for b in benches])
-    together = _together([e for _, e in judged], sweep)
+    together = worst_evidence([e for _, e in judged], sweep)
     return replace(
         bench,
         specification=spec.model_dump(mode="json"),
@@ -241,55 +236,8 @@ def run_bench(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeBench:
             for b, name in zip(benches, names, strict=True)
             for f in b.findings
         )
-        + _not_judged(judged, names),
+        + not_judged([e.known for _, e in judged], names),
         inputs=tuple(item for b in benches for item in b.inputs),
-    )
-
-
-def _together(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidence:
-    """What an answer for several trials rests on: the worst of them."""
-    sensors = [e.sensor for e in evidence if e.sensor is not None]
-    return replace(
-        evidence[0],
-        sweep=sweep,
-        sensor=max(sensors, key=lambda e: e[2]) if sensors else None,
-        known=any(e.known for e in evidence),
-        exact=all(e.exact for e in evidence),
-        without_bias=_worst([e.without_bias for e in evidence]),
-        with_cubic=_worst([e.with_cubic for e in evidence]),
-        start=max(e.start for e in evidence),
-        sampling=max(e.sampling for e in evidence),
-        reference_sd=max(e.reference_sd for e in evidence),
-    )
-
-
-def _reference_sd(known: Known | None, references: pd.DataFrame) -> float:
-    """What the best reference point is known to, where there is no truth."""
-    if known is not None or references.empty:
-        return 0.0
-    return float(np.nan_to_num(references["sd"].to_numpy(dtype=np.float64)).min())
-
-
-def _worst(errors: Sequence[float | None]) -> float | None:
-    """The largest, where all of them are known."""
-    known = [e for e in errors if e is not None]
-    return max(known) if len(known) == len(errors) else None
-
-
-def _not_judged(
-    judged: Sequence[tuple[AttitudeBench, Evidence]], names: Sequence[str]
-) -> tuple[Finding, ...]:
-    """Say which trials have nothing known, where others have."""
-    if not any(e.known for _, e in judged):
-        return ()
-    return tuple(
-        Finding(
-            "nothing is known of its attitude: there the algorithms' own errors are judged",
-            file=name,
-            quantity="reference",
-        )
-        for (_, e), name in zip(judged, names, strict=True)
-        if not e.known
     )
 
 
@@ -353,27 +301,19 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
     findings += judge_runs(runs, increments)
     findings += judge_turns(scores)
     findings += judge_truth(source, span)
-    grounds, known = _grounds(spec, source, imu, q_nb, references)
+    grounds = _grounds(spec, source, imu, q_nb, references)
     progress("sharing out the error", 0.2)
-    shares = find_shares(algorithms, runs, imu, grounds.own, known, q_nb, spec.interpolation)
+    shares = find_shares(
+        algorithms, runs, imu, grounds.own, grounds.truth, q_nb, spec.interpolation
+    )
     factors = choose_factors(imu, spec.rates_hz, findings)
     sweep = sweep_rates(
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
     costs = tuple(count_cost(algorithm, increments["dt"]) for algorithm in algorithms)
     between = source.sampling_error_deg or between_samples(imu, q_nb)
-    evidence = Evidence(
-        algorithms=algorithms,
-        costs=costs,
-        sweep=sweep,
-        sensor=best_error(grounds.own, known, imu, q_nb, spec.interpolation),
-        known=known is not None or bool(len(references)),
-        exact=grounds.own.exact,
-        without_bias=_without_bias(grounds, bias, rests),
-        with_cubic=_with_cubic(grounds),
-        start=_start_error(known, q_nb),
-        sampling=0.0 if grounds.own.exact or between is None else between[1],
-        reference_sd=_reference_sd(known, references),
+    evidence = find_evidence(
+        grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     truth, scored = source.truth, source.scored
@@ -414,7 +354,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
 
 def _grounds(
     spec: AttitudeSpec, source: Source, imu: pd.DataFrame, q_nb: Array, references: pd.DataFrame
-) -> tuple[Grounds, Known | None]:
+) -> Grounds:
     """What errors are measured against, and what is known of the attitude itself."""
     stamps = imu.index.to_numpy(dtype=np.float64)
     known = None
@@ -423,32 +363,4 @@ def _grounds(
         known = found if found.counts.any() else None
     clean = None if source.clean is None else source.clean.loc[imu.index]
     own = own_truth(imu, clean, known, q_nb, spec.interpolation)
-    return Grounds(imu, q_nb, own, known, references, spec.interpolation), known
-
-
-def _start_error(known: Known | None, q_nb: Array) -> float:
-    """What the run's first attitude is off by, in deg, where that is known."""
-    if known is None or not known.counts[0]:
-        return 0.0
-    return float(unit_rotation_angle(q_nb[None], known.q_nb[:1])[0])
-
-
-def _without_bias(
-    grounds: Grounds, bias: dict[str, object], rests: tuple[RestStretch, ...]
-) -> float | None:
-    """Error that the most accurate algorithm would leave with the bias of a rest removed."""
-    nothing_known = grounds.truth is None and grounds.references.empty
-    if bias["rad_per_s"] is not None or not rests or nothing_known:
-        return None
-    imu = grounds.imu.copy()
-    imu[GYRO] = imu[GYRO].to_numpy() - np.asarray(rests[0].gyro_mean)
-    return error_at_full_rate(MOST_ACCURATE, replace(grounds, imu=imu))
-
-
-def _with_cubic(grounds: Grounds) -> float | None:
-    """Error that would be left with rates as cubics, where they were taken as chords."""
-    if grounds.interpolation == "cubic" or grounds.imu.attrs["sampling"] == "mean":
-        return None
-    if grounds.truth is None and grounds.references.empty:
-        return None
-    return error_at_full_rate(RotationVector(samples=1), replace(grounds, interpolation="cubic"))
+    return Grounds(imu, q_nb, own, known, references, spec.interpolation)

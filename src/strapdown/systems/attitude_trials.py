@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config import LogSpec, ScenarioSpec
-from strapdown.exceptions import ConfigError
+from strapdown.exceptions import ConfigError, Finding
 from strapdown.results.answer import Trials
 from strapdown.results.attitude_bench import AttitudeBench
 
@@ -170,3 +170,29 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
             remedy="name rates that all of them can have",
         )
     return pd.DataFrame(rows)[list(first.columns)]
+
+
+def not_judged(known: Sequence[bool], names: Sequence[str]) -> tuple[Finding, ...]:
+    """Say which trials have nothing known, where others have.
+
+    Parameters
+    ----------
+    known : sequence of bool
+        Whether anything is known of the attitude, trial by trial.
+    names : sequence of str
+
+    Returns
+    -------
+    tuple of Finding
+    """
+    if not any(known):
+        return ()
+    return tuple(
+        Finding(
+            "nothing is known of its attitude: there the algorithms' own errors are judged",
+            file=name,
+            quantity="reference",
+        )
+        for there, name in zip(known, names, strict=True)
+        if not there
+    )

@@ -22,9 +22,12 @@ from strapdown.systems.tadic import (
     displacement,
     earth_terms,
     equations,
+    error_budget,
+    ground_truth,
     mounting,
     ranking,
     raw_data,
+    ringing,
     sampling_rate,
     sensors,
 )
@@ -165,14 +168,14 @@ def _longer(made: Experiments) -> Part:
 
 
 def _sampling() -> Part:
-    still, ringing = sampling_rate.rates()
+    still, ring = sampling_rate.rates()
     return (
         [
-            sampling_rate.above_100(still, ringing),
+            sampling_rate.above_100(still, ring),
             sampling_rate.pulses(),
             sampling_rate.receiver(),
         ],
-        [sampling_rate.table(still, ringing)],
+        [sampling_rate.table(still, ring)],
         [],
     )
 
@@ -234,17 +237,17 @@ def _mounting() -> Part:
 
 
 def _displacement(made: Experiments) -> Part:
-    rings = displacement.rung()
+    rings = ringing.rung()
     return (
         [
             displacement.decimetre(made, rings),
-            displacement.extra_sources(made),
-            displacement.vibrations(rings, displacement.silent()),
-            displacement.same_entry(made),
-            displacement.ground_truth(made),
+            error_budget.extra_sources(made),
+            ringing.vibrations(rings, ringing.silent()),
+            ground_truth.same_entry(made),
+            ground_truth.ground_truth(made),
             displacement.all_four(made),
-            displacement.error_causes(made),
+            error_budget.error_causes(made),
         ],
-        [displacement.errors_table(made), displacement.budget_table(made)],
+        [displacement.errors_table(made), error_budget.budget_table(made)],
         [displacement.figure(made.first)],
     )

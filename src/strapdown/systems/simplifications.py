@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import earth, rotation
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.running_integral import running_integral
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
 from strapdown.exceptions import DivergenceError
 from strapdown.increments import motion_increments
@@ -280,20 +281,14 @@ def predicted_errors(trip: Trip, simplification: str) -> pd.Series:
     force = rotation.rotate(trip.motion.attitude(time), trip.motion.specific_force(time))
     kept = left.coriolis * (2.0 * turning * left.earth_rate + transport * left.transport_rate)
     missing = turning * (not left.earth_rate) + transport * (not left.transport_rate)
-    turned = _integral(missing, time)
+    turned = running_integral(time, missing)
     error = np.cross(2.0 * turning + transport - kept, v) + np.cross(turned, force)
     if left.gravity is not None:
         error[:, 2] += left.gravity - earth.gravity(lat, alt)[:, 2]
     if trip.height == "held":
         error[:, 2] = 0.0
-    speed = _integral(error, time)
-    parts = (_integral(speed, time), speed, np.degrees(turned))
+    speed = running_integral(time, error)
+    parts = (running_integral(time, speed), speed, np.degrees(turned))
     return pd.Series(
         {n: np.linalg.norm(x, axis=1).max() for n, x in zip(ERRORS, parts, strict=True)}
     )
-
-
-def _integral(values: Array, time: Array) -> Array:
-    """From the first instant to each, by the trapezoid."""
-    steps = 0.5 * np.diff(time)[:, None] * (values[1:] + values[:-1])
-    return np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import DataError
 from strapdown.frames import place_difference
 from strapdown.tables.checks import (
@@ -196,6 +197,5 @@ def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
 
 def _mean_between(velocity: Array, time: Array, apart: int) -> Array:
     """Mean velocity between rows so far apart."""
-    steps = np.diff(time)[:, None]
-    way = np.vstack([np.zeros((1, 2)), np.cumsum(0.5 * steps * (velocity[1:] + velocity[:-1]), 0)])
+    way = running_integral(time, velocity)
     return np.asarray((way[apart:] - way[:-apart]) / (time[apart:] - time[:-apart])[:, None])

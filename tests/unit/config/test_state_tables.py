@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
-from strapdown.config.navigation_modules import make_filter, uncertainty_of
+from strapdown.config.navigation_modules import make_filter, sensors_of
 from strapdown.exceptions import ConfigError
 
 FILE = """[log]
@@ -34,7 +34,7 @@ def states_of(folder, text):
     path = folder / "run.toml"
     path.write_text(FILE + text)
     spec = read_navigation_spec(path, files=False)
-    made = make_filter(spec, uncertainty_of(spec))
+    made = make_filter(spec, sensors_of(spec))
     return {one.block.name: one for one in made.model.sensors}
 
 

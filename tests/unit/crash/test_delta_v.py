@@ -106,11 +106,6 @@ def test_ends_move_the_change_by_their_rates():
     # The quadratic within a step: half its slope, 0.5 · 3.6e3 m/s³ · 1e-6 s.
     assert np.allclose((later.vector - change.vector) / d, change.end_rate, atol=2e-3)
     assert np.allclose((sooner.vector - change.vector) / d, -change.start_rate, atol=2e-3)
-    spread = change.timing_covariance(1e-3, 2e-3)
-    assert spread[0, 1] == pytest.approx(
-        1e-6 * change.start_rate[0] * change.start_rate[1]
-        + 4e-6 * change.end_rate[0] * change.end_rate[1]
-    )
 
 
 def test_noise_covariance_is_that_of_noisy_records():

@@ -12,7 +12,7 @@ from tests.contracts.test_chain_cuts import LENGTH, assert_same, drive
 from tests.town_drive import ARM, fixes, motion
 
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.config.navigation_modules import sensors_of
 from strapdown.exceptions import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.live.clock import MachineClock
@@ -81,7 +81,7 @@ def received(texts, spec=None, clock=None, **more):
 
 
 def at_once(spec):
-    chain = make_chain(spec, uncertainty_of(spec))
+    chain = make_chain(spec, sensors_of(spec))
     inside = fixes()[fixes().index <= LENGTH]
     inside.attrs = dict(fixes().attrs)
     return run_batch(chain, drive(), {"gnss": inside}, FullRecorder())
@@ -108,7 +108,7 @@ def test_what_was_received_is_read_to_the_same_numbers(tmp_path, sketched, origi
     assert result.record is live.run.record
     imu, fixed = result.source.imu, result.source.tables["gnss"]
     again = run_batch(
-        make_chain(result.spec, uncertainty_of(result.spec)), imu, {"gnss": fixed}, FullRecorder()
+        make_chain(result.spec, sensors_of(result.spec)), imu, {"gnss": fixed}, FullRecorder()
     )
     assert_same(live.run, again)
 
@@ -193,7 +193,7 @@ def test_a_commanded_mode_begins_where_it_did_when_it_runs_again(tmp_path, sketc
     assert [one.mode for one in live.got.commands] == ["navigation"]
     result = result_of(live, tmp_path)
     again = run_batch(
-        make_chain(result.spec, uncertainty_of(result.spec)),
+        make_chain(result.spec, sensors_of(result.spec)),
         result.source.imu,
         result.source.tables,
         FullRecorder(),

@@ -13,7 +13,7 @@ import pytest
 
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.paper_update import PaperUpdate
-from strapdown.report.reproduction import reproduction_page, statements_markdown
+from strapdown.report.reproduction import reproduction_page
 from strapdown.report.reproduction_charts import chart
 from strapdown.report.svg_chart import draw
 from strapdown.systems import reproduce_chernodarov as system
@@ -40,10 +40,9 @@ from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from same_picture import PINNED, same_picture
+from statements_of_a_paper import check_manual, check_statements
 
 PAGE = Path(__file__).parents[3] / "docs" / "chernodarov.md"
-BEGIN = "<!-- statements: begin; written by `make statements` -->\n"
-END = "<!-- statements: end -->"
 # Equations, as the paper's text has them.
 AS_WRITTEN = {
     "eq2": (r"Moreover, for the wander azimuth frame, $\omega_\zeta = 0$.",),
@@ -80,15 +79,8 @@ def test_every_statement_is_there_once_in_the_order_of_the_paper(made):
 
 @pytest.mark.slow
 def test_each_has_a_quote_of_one_sentence_numbers_and_a_figure_that_exists(made):
-    slugs = {f.slug for f in made.figures}
-    for s in made.statements:
-        assert 0 < len(s.quote) < 300, s.key
-        assert not re.search(r"[a-z]\. [A-Z]", s.quote), s.key
-        assert s.evidence, s.key
-        assert s.figure in {"", *slugs}, s.key
-        assert all(np.isfinite(e.value) for e in s.evidence), s.key
-    assert len(slugs) == len(made.figures)
-    assert {f"fig{k}" for k in range(4, 12)} <= slugs
+    check_statements(made)
+    assert {f"fig{k}" for k in range(4, 12)} <= {f.slug for f in made.figures}
 
 
 @pytest.mark.slow
@@ -142,14 +134,7 @@ def test_every_curve_that_is_no_reference_is_told_apart_without_its_colour(made)
 
 @pytest.mark.slow
 def test_the_manual_has_the_statements_of_this_code(made):
-    table = statements_markdown(made)
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    written, _, after = rest.partition(END)
-    if os.environ.get("STRAPDOWN_WRITE_STATEMENTS"):
-        written = f"\n{table}\n"
-        PAGE.write_text(before + BEGIN + written + END + after, encoding="utf-8")
-    assert written.strip() == table.strip(), "run `make statements` and read the difference"
+    check_manual(made, PAGE)
 
 
 @pytest.mark.slow

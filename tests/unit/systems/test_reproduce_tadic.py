@@ -16,7 +16,6 @@ from strapdown.report.reproduction import (
     curves_json,
     reproduction_json,
     reproduction_page,
-    statements_markdown,
 )
 from strapdown.report.reproduction_charts import chart
 from strapdown.report.svg_chart import draw
@@ -35,19 +34,21 @@ from strapdown.systems.tadic import (
     displacement,
     earth_terms,
     equations,
+    error_budget,
+    ground_truth,
     mounting,
     ranking,
     raw_data,
+    ringing,
     sampling_rate,
     sensors,
 )
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 from same_picture import PINNED, same_picture
+from statements_of_a_paper import check_manual, check_statements
 
 PAGE = Path(__file__).parents[3] / "docs" / "tadic.md"
-BEGIN = "<!-- statements: begin; written by `make statements` -->\n"
-END = "<!-- statements: end -->"
 # Equations and a row of a table, as the paper's text has them.
 AS_WRITTEN = {
     "eq8": (r"\frac{V_E \tan \varphi}{R_p + h}",),
@@ -87,15 +88,8 @@ def test_every_statement_is_there_once_in_the_order_of_the_paper(made):
 
 
 def test_each_has_a_quote_of_one_sentence_numbers_and_a_figure_that_exists(made):
-    slugs = {f.slug for f in made.figures}
-    for s in made.statements:
-        assert 0 < len(s.quote) < 300, s.key
-        assert not re.search(r"[a-z]\. [A-Z]", s.quote), s.key
-        assert s.evidence, s.key
-        assert s.figure in {"", *slugs}, s.key
-        assert all(np.isfinite(e.value) for e in s.evidence), s.key
-    assert len(slugs) == len(made.figures)
-    assert {"fig6", "fig7", "fig8", "fig9"} <= slugs
+    check_statements(made)
+    assert {"fig6", "fig7", "fig8", "fig9"} <= {f.slug for f in made.figures}
     assert {"table1", "table2"} <= {t.slug for t in made.tables}
 
 
@@ -158,14 +152,7 @@ def test_every_curve_that_is_no_reference_is_told_apart_without_its_colour(made)
 
 
 def test_the_manual_has_the_statements_of_this_code(made):
-    table = statements_markdown(made)
-    text = PAGE.read_text(encoding="utf-8")
-    before, _, rest = text.partition(BEGIN)
-    written, _, after = rest.partition(END)
-    if os.environ.get("STRAPDOWN_WRITE_STATEMENTS"):
-        written = f"\n{table}\n"
-        PAGE.write_text(before + BEGIN + written + END + after, encoding="utf-8")
-    assert written.strip() == table.strip(), "run `make statements` and read the difference"
+    check_manual(made, PAGE)
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
@@ -281,7 +268,7 @@ def test_errors_alone_are_their_closed_forms():
 
 
 def test_the_abstract_turns():
-    ring, quiet = displacement.Rung("", 1.0), displacement.Rung("", 0.01)
+    ring, quiet = ringing.Rung("", 1.0), ringing.Rung("", 0.01)
     judge = displacement.decimetre_from
     assert judge({"LAB1": 0.2}, 0.05, 0.01, ring).verdict == HOLDS_WHEN
     assert judge({"LAB1": 0.2}, 0.05, 0.01, quiet).verdict == HOLDS
@@ -301,7 +288,7 @@ def test_all_four_turn():
 
 def test_error_causes_turn(made):
     own = {"levelling": 0.0, "axes": 50.0, "biases": 20.0, "scale factors": 20.0}
-    judge = displacement.causes_from
+    judge = error_budget.causes_from
     assert judge(own, own).verdict == HOLDS_WHEN
     assert judge(own | {"levelling": 10.0, "axes": 40.0}, own).verdict == HOLDS
     assert judge(own | {"scale factors": 1.0}, own).verdict == DOES_NOT_HOLD
@@ -312,20 +299,20 @@ def test_error_causes_turn(made):
 
 
 def test_small_statements_of_the_displacement_turn():
-    extra = displacement.extra_from
+    extra = error_budget.extra_from
     assert extra({"a": 0.003}, 0.2).verdict == HOLDS_WHEN
     assert extra({"a": 0.1}, 0.2).verdict == HOLDS
     assert extra({"a": 0.0}, 0.2).verdict == DOES_NOT_HOLD
-    rings = (displacement.Rung("", 0.5),)
-    assert displacement.vibrations(rings, 0.001).verdict == HOLDS
-    assert displacement.vibrations(rings, 0.2).verdict == DOES_NOT_HOLD
-    truth = displacement.ground_truth_from
+    rings = (ringing.Rung("", 0.5),)
+    assert ringing.vibrations(rings, 0.001).verdict == HOLDS
+    assert ringing.vibrations(rings, 0.2).verdict == DOES_NOT_HOLD
+    truth = ground_truth.ground_truth_from
     assert [truth(r, r, 0.1).verdict for r in (0.01, 0.05, 0.2)] == [
         HOLDS,
         HOLDS_WHEN,
         DOES_NOT_HOLD,
     ]
-    entry = displacement.same_entry_from
+    entry = ground_truth.same_entry_from
     assert [entry({"IMU": x}, 0.03).verdict for x in (0.001, 0.01, 0.1)] == [
         HOLDS,
         HOLDS_WHEN,

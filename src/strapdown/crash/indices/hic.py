@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.indices.pulse import checked, integrals
+from strapdown.crash.indices.pulse import checked
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import ConfigError
 
 __all__ = ["Hic", "hic"]
@@ -69,7 +70,7 @@ def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
             remedy="give 0.015 for HIC15 or 0.036 for HIC36",
         )
     t, a = checked(time, accel, 3, "accel")
-    total, _ = integrals(t, np.sqrt((a * a).sum(axis=1)) / STANDARD_GRAVITY)
+    total = running_integral(t, np.sqrt((a * a).sum(axis=1)) / STANDARD_GRAVITY)
     best = (0.0, 0, 1)
     # By the number of samples between the ends, until no window is short enough.
     for apart in range(1, t.size):

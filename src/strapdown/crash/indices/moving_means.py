@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.indices.pulse import integrals
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import DataError
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array
     starts = np.concatenate([time[time <= last], time[time >= time[0] + width] - width, [last]])
     starts = np.unique(np.clip(starts, time[0], last))
     flat = values.reshape(values.shape[0], -1)
-    total, _ = integrals(time, flat)
+    total = running_integral(time, flat)
     ends = np.minimum(starts + width, time[-1])
     means = (
         _integral_at(time, flat, total, ends) - _integral_at(time, flat, total, starts)
@@ -73,7 +73,7 @@ def largest_mean(time: Array, values: Array, width: float) -> tuple[float, float
     at = starts[inner] + (starts[inner + 1] - starts[inner]) * slope[inner] / (
         slope[inner] - slope[inner + 1]
     )
-    total, _ = integrals(time, values[:, None])
+    total = running_integral(time, values[:, None])
     vertex = (
         _integral_at(time, values[:, None], total, at + width)
         - _integral_at(time, values[:, None], total, at)

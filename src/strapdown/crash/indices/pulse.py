@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import DataError
 
 Array = NDArray[np.float64]
@@ -125,7 +126,6 @@ def integrals(time: Array, values: Array) -> tuple[Array, Array]:
         first grows by ``h (a0 + a1)/2`` and the second by ``h v0 + h² (2 a0 + a1)/6``.
     """
     h = np.diff(time).reshape(-1, *([1] * (values.ndim - 1)))
-    zero = np.zeros_like(values[:1])
-    first = np.concatenate([zero, np.cumsum(0.5 * h * (values[1:] + values[:-1]), axis=0)])
+    first = running_integral(time, values)
     grown = h * first[:-1] + h * h * (2.0 * values[:-1] + values[1:]) / 6.0
-    return first, np.concatenate([zero, np.cumsum(grown, axis=0)])
+    return first, np.concatenate([first[:1], np.cumsum(grown, axis=0)])

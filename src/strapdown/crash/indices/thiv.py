@@ -13,6 +13,7 @@ from strapdown.crash.indices.crossings import cubic, first_reach
 from strapdown.crash.indices.moving_means import largest_mean
 from strapdown.crash.indices.phaseless import four_pole
 from strapdown.crash.indices.pulse import checked, from_start, integrals
+from strapdown.dsp.running_integral import running_integral
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 
 __all__ = ["PHD_AVERAGES", "Thiv", "thiv"]
@@ -167,7 +168,7 @@ def _inputs(
 
 def _head_in_vehicle(time: Array, accel: Array, rate: Array, head: Array) -> tuple[Array, Array]:
     """Place of the head in vehicle axes, and its velocity there."""
-    yaw, _ = integrals(time, rate)
+    yaw = running_integral(time, rate)
     c, s = np.cos(yaw), np.sin(yaw)
     level = np.column_stack([c * accel[:, 0] - s * accel[:, 1], s * accel[:, 0] + c * accel[:, 1]])
     moved, place = integrals(time, level)

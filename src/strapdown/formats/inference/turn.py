@@ -18,6 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.running_integral import running_integral
+
 Array = NDArray[np.float64]
 
 # Long enough for the accelerations of hands and legs to average out, and of different lengths,
@@ -139,10 +141,8 @@ def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
     # (w x f)_a = e_abc w_b f_c; products of the gyro's axis d and the force's axis c.
     products = (gyro[:, :, None] * force[:, None, :]).reshape(-1, 9)
     signals = np.hstack([force, products])
-    middle = 0.5 * (signals[1:] + signals[:-1]) * step[:, None]
-    once = np.vstack([np.zeros(12), np.cumsum(middle, axis=0)])
-    half = 0.5 * (once[1:] + once[:-1]) * step[:, None]
-    twice = np.vstack([np.zeros(12), np.cumsum(half, axis=0)])
+    once = running_integral(time, signals)
+    twice = running_integral(time, once)
     holes = step > max(0.1, 5.0 * float(np.quantile(step, 0.95)))
     found = []
     for width in HALF_WIDTHS:

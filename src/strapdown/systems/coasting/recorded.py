@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec, aids_of
-from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.config.navigation_modules import sensors_of
 from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.evaluation.withheld import WithheldScore, blinded, score_of, spans_to_withhold
 from strapdown.exceptions import ConfigError
@@ -131,7 +131,7 @@ def coast_of_run(
     DataError
         Navigation never begins.
     """
-    chain = make_chain(navigation, uncertainty_of(navigation))
+    chain = make_chain(navigation, sensors_of(navigation))
     # What comes after an outage tells nothing of it while it lasts.
     chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
     receivers = [name for name, aid in aids_of(navigation).items() if aid.kind == "gnss"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.config.navigation_modules import sensors_of
 from strapdown.exceptions import ConfigError, Finding
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
@@ -114,7 +114,7 @@ def run_coast(
         navigation,
         source.name,
         source.what,
-        uncertainty_of(navigation),
+        sensors_of(navigation),
         recorded.forecast,
         recorded,
         recorded.stays,

@@ -96,26 +96,26 @@ def _by_heading(part: Part) -> Part | None:
     return None
 
 
-def _by_gravity(part: Part, known: Sequence[Part]) -> Part | None:
+def _weighed(part: Part, known: Sequence[Part]) -> Answer | None:
     # A gyro may rest at what gravity is in some unit: beside an accelerometer it must agree.
     if not part.kind and any(q.path == part.path for q in known):
         return None
     if part.kind not in ("", "acceleration") or len(part.axes) < 3:
         return None
-    said = accel_unit(part.values, part.step, quiet_part(part.values))
-    if not said.settled:
+    return accel_unit(part.values, part.step, quiet_part(part.values))
+
+
+def _by_gravity(part: Part, known: Sequence[Part]) -> Part | None:
+    said = _weighed(part, known)
+    if said is None or not said.settled:
         return None
     return _scaled(part, "acceleration", said.unit, ACCEL_UNITS[said.unit], said.why)
 
 
 def _by_gravity_alone(part: Part, known: Sequence[Part]) -> Part | None:
     """An accelerometer, as it weighs something at rest, in a unit that is not settled."""
-    if not part.kind and any(q.path == part.path for q in known):
-        return None
-    if part.kind not in ("", "acceleration") or len(part.axes) < 3:
-        return None
-    said = accel_unit(part.values, part.step, quiet_part(part.values))
-    if said.gravity < THRESHOLD:
+    said = _weighed(part, known)
+    if said is None or said.gravity < THRESHOLD:
         return None
     return _asked(part, "acceleration", said.unit, ACCEL_UNITS, _accelerations)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.site import Site
 from strapdown.constants import MAD_TO_SD
+from strapdown.dsp.running_integral import running_integral
 from strapdown.ellipsoids import Ellipsoid
 from strapdown.exceptions import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
@@ -175,8 +176,7 @@ def _newest_that_agrees(
     near = np.clip(np.arange(len(v))[:, None] + np.arange(-1, 2), 0, len(v) - 1)
     v = np.median(v[near], axis=1)
     v = np.column_stack([np.interp(stamps[rows], v_time, one) for one in v.T])
-    steps = np.diff(stamps[rows])[:, None]
-    way = np.vstack([np.zeros((1, 3)), np.cumsum(0.5 * (v[1:] + v[:-1]) * steps, axis=0)])
+    way = running_integral(stamps[rows], v)
     at = np.array([ned_from_geodetic(one, place[-1], ellipsoid=ellipsoid) for one in place[rows]])
     off = at - way
     off -= np.median(off, axis=0)

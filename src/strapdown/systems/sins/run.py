@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import given_of, uncertainty_of
+from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.evaluation.control_points import score_control_points
@@ -85,7 +85,7 @@ def run_navigation(
     progress("reading", 0.02)
     source = read_navigation_source(spec)
     progress("looking through", 0.1)
-    sensors = uncertainty_of(spec)
+    sensors = sensors_of(spec)
     tables = (source.imu, *source.tables.values())
     with said_of_file(*tables):
         looked = look_through(spec, source.imu, source.tables)

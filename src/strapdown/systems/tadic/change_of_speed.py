@@ -17,13 +17,12 @@ from strapdown.systems.reproduction import (
     Trace,
     amount,
 )
-from strapdown.systems.tadic.experiment import CHOSEN, PLATFORMS, Experiment, Experiments
+from strapdown.systems.tadic.experiment import AXES, CHOSEN, PLATFORMS, Experiment, Experiments
 
 Array = NDArray[np.float64]
 
 WINDOW = 0.030  # s: "the short time-window (herein 30 ms)"
 SHOWN = (-0.02, 0.20)  # s
-AXES = ("longitudinal", "lateral", "vertical")
 
 
 def figure(made: Experiment) -> Figure:

@@ -1,17 +1,10 @@
-"""Fig. 9: errors of the place against the cameras over 750 ms, and what makes them."""
+"""Fig. 9: errors of the place against the cameras over 750 ms."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.simulation import Ringing, Setting
-from strapdown.simulation.front_impacts import pole_impact
-from strapdown.systems.crash_trials.paper_experiment import INTERVAL, RINGINGS
-from strapdown.systems.crash_trials.ringing_at_200_hz import perfect_sensors
 from strapdown.systems.reproduction import (
     DOES_NOT_HOLD,
     HOLDS,
@@ -24,18 +17,24 @@ from strapdown.systems.reproduction import (
     Trace,
     amount,
 )
-from strapdown.systems.tadic.experiment import CHOSEN, PLATFORMS, Experiment, Experiments
+from strapdown.systems.tadic.error_budget import budget
+from strapdown.systems.tadic.experiment import (
+    AXES,
+    CHOSEN,
+    IMUS,
+    PLATFORMS,
+    Experiment,
+    Experiments,
+)
+from strapdown.systems.tadic.ringing import Rung
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]
 
 #: An error is of decimetres as long as it is not half a metre.
 DECIMETRES = 0.5  # m
-AXES = ("longitudinal", "lateral", "vertical")
-LABS, IMUS = ("LAB1", "LAB2"), ("IMU1", "IMU2")
 SCALE_SD = 2.0  # %, of the MEMS triads of the experiment
 SHEET_SCALE = 10.0 / np.sqrt(3.0)  # %, a bound of ±10 %
-PHASES = 3
 FRAMES = 5  # of 1000 a second, from one point that is drawn to the next
 
 
@@ -105,58 +104,6 @@ def errors_table(made: Experiments) -> Table:
         ),
         tuple((name, tuple(float(v) for v in values if v is not None)) for name, values in rows),
     )
-
-
-def budget(made: Experiments, names: tuple[str, ...]) -> pd.DataFrame:
-    """Mean variance that each contributor adds to the place after 750 ms, m²."""
-    parts = [e.platform(n).path.variances()[NED] for e in made.all for n in names]
-    return pd.concat(parts).groupby(level=0, sort=False).sum() / len(parts)
-
-
-def budget_table(made: Experiments) -> Table:
-    """Standard deviations that each contributor adds, for both kinds of platforms."""
-    labs, imus = budget(made, LABS), budget(made, IMUS)
-    names = list(dict.fromkeys([*imus.index, *labs.index]))
-    rows: list[tuple[str, tuple[float | None, ...]]] = []
-    for name in names:
-        cells: list[float | None] = []
-        for part in (labs, imus):
-            have = name in part.index
-            own = part.loc[name].to_numpy(dtype=np.float64) if have else None
-            cells += [None] * 3 if own is None else (1e3 * np.sqrt(own)).tolist()
-        rows.append((str(name), tuple(cells)))
-    sums = [1e3 * float(np.sqrt(v)) for part in (labs, imus) for v in part.sum().tolist()]
-    rows.append(("all", tuple(sums)))
-    return Table(
-        "fig9-budget",
-        "Fig. 9: what makes the errors",
-        "Standard deviations in mm that each contributor adds to the place after 750 ms, as the "
-        "reconstruction tells them; quadratic mean over the experiments.",
-        ("contributor", *(f"{kind}, {a}" for kind in ("LAB", "IMU") for a in AXES)),
-        tuple(rows),
-    )
-
-
-# --- statements -------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Rung:
-    """Distance from the true place after 750 ms by perfect sensors at 200 Hz on what rings, m."""
-
-    name: str
-    away: float
-
-
-def rung() -> tuple[Rung, ...]:
-    """Quadratic mean over some instants between two samples at which the ringing begins."""
-    crash = pole_impact(setting=Setting(stand=2.6, towing=5.0, after=0.85))
-    found = []
-    for name, shape in RINGINGS.items():
-        starts = [crash.start + (k + 0.5) / PHASES * INTERVAL for k in range(PHASES)]
-        errors = [perfect_sensors(scenario=crash, ringing=Ringing(s, *shape)) for s in starts]
-        found.append(Rung(name, float(np.sqrt(np.mean([e @ e for e in errors])))))
-    return tuple(found)
 
 
 def decimetre(made: Experiments, rings: tuple[Rung, ...]) -> Statement:
@@ -257,208 +204,4 @@ def all_four_from(largest: Array, limit: float = DECIMETRES) -> Statement:
             Evidence("largest of all", float(largest.max()), "m"),
         ),
         "fig9",
-    )
-
-
-def error_causes(made: Experiments) -> Statement:
-    """Judge alignment, biases and scale factors as the causes."""
-    return causes_from(_shares(made, IMUS), _shares(made, LABS))
-
-
-def _shares(made: Experiments, names: tuple[str, ...]) -> dict[str, float]:
-    """Shares of the variance of the place, all axes together, %."""
-    total = budget(made, names).sum(axis=1)
-    groups = {
-        "levelling": ("levelling",),
-        "axes": ("misalignment", "gyro misalignment", "mounting"),
-        "biases": ("accelerometer bias", "gyro bias"),
-        "scale factors": ("scale factor", "gyro scale factor"),
-        "bends": ("nonlinearity", "gyro nonlinearity", "gyro g-sensitivity"),
-        "entry speed": ("entry speed",),
-    }
-    return {
-        group: 100.0 * float(total.reindex(lines).fillna(0.0).sum() / total.sum())
-        for group, lines in groups.items()
-    }
-
-
-def causes_from(imu: dict[str, float], lab: dict[str, float]) -> Statement:
-    """Judge from the shares of the variance, %."""
-    named = imu["levelling"] + imu["axes"] + imu["biases"] + imu["scale factors"]
-    if not (named > 50.0 and imu["biases"] > 5.0 and imu["scale factors"] > 5.0):
-        verdict, condition = DOES_NOT_HOLD, ""
-    elif imu["levelling"] > 5.0:
-        verdict, condition = HOLDS, ""
-    else:
-        verdict = HOLDS_WHEN
-        condition = (
-            "the alignment of the IMUs means how their axes lie in the car; the levelling, for "
-            "which time was short, counts for the laboratory's platforms alone, which began 100 ms "
-            "before the impact"
-        )
-    return Statement(
-        "error-causes",
-        "Section 4",
-        "As testing was limited to a very short time of the initial sensor platform alignment, "
-        "among causes of errors there are surely imperfect alignment and inaccurate removal of "
-        "sensor biases and the scale factors.",
-        verdict,
-        condition,
-        "Shares of the variance of the place after 750 ms, all axes together, as the "
-        "reconstruction tells them. The table has them by axis: scale factors lead along the "
-        "vehicle, axes and mounting across, the bias that no rest tells from gravity downward.",
-        tuple(
-            Evidence(f"{kind}: {name}", share, "%")
-            for kind, shares in (("IMU", imu), ("LAB", lab))
-            for name, share in shares.items()
-        ),
-        "fig9",
-    )
-
-
-def extra_sources(made: Experiments) -> Statement:
-    """Judge nonlinearity and sensitivity to g."""
-    imus = budget(made, IMUS).sum(axis=1)
-    parts = {
-        name: float(np.sqrt(imus[line])) if line in imus.index else 0.0
-        for name, line in (
-            ("nonlinearity of the accelerometers", "nonlinearity"),
-            ("nonlinearity of the gyros", "gyro nonlinearity"),
-            ("sensitivity of the gyros to g", "gyro g-sensitivity"),
-        )
-    }
-    return extra_from(parts, float(np.sqrt(imus.sum())))
-
-
-def extra_from(parts: dict[str, float], whole: float) -> Statement:
-    """Judge from what each adds to the place after 750 ms, m, and all errors together."""
-    added = float(np.sqrt(sum(p * p for p in parts.values())))
-    share = 100.0 * (added / whole) ** 2
-    if share > 10.0:
-        verdict, condition = HOLDS, ""
-    elif added > 0.0:
-        verdict = HOLDS_WHEN
-        condition = (
-            f"no more than their presence is meant: they are {amount(share, '%')} of the variance "
-            "after 750 ms"
-        )
-    else:
-        verdict, condition = DOES_NOT_HOLD, ""
-    return Statement(
-        "extra-sources",
-        "Section 2.2",
-        "At crash conditions, nonlinearity and “g-sensitivity” are extra error sources.",
-        verdict,
-        condition,
-        "Standard deviations that the budget of the IMUs has for them, with the data sheets' 0.5 % "
-        "and 1 % of full scale and 0.1°/s per g.",
-        (
-            *(Evidence(n, 1e3 * p, "mm") for n, p in parts.items()),
-            Evidence("all errors", 1e3 * whole, "mm"),
-            Evidence("share of the variance", share, "%"),
-        ),
-    )
-
-
-def vibrations(rings: tuple[Rung, ...], silent: float) -> Statement:
-    """Judge that vibration degrades the measurement."""
-    ring = max(rings, key=lambda r: r.away)
-    holds = ring.away > 10.0 * silent
-    return Statement(
-        "vibrations",
-        "Section 2.2",
-        "Measurement can be further degraded by vibrations if they are not compensated by rubber "
-        "dumpers.",
-        HOLDS if holds else DOES_NOT_HOLD,
-        "",
-        "Distance from the true place after 750 ms, perfect sensors at 200 Hz, RMS over "
-        f"{PHASES} instants at which the ringing begins; it decays in 30 ms. Means over the sample "
-        "or a rate of 1 kHz do what rubber does, without moving the sensor.",
-        (
-            Evidence("no ringing", 1e3 * silent, "mm"),
-            *(Evidence(r.name, 1e3 * r.away, "mm") for r in rings),
-        ),
-    )
-
-
-def silent() -> float:
-    """The same without ringing, m."""
-    crash = pole_impact(setting=Setting(stand=2.6, towing=5.0, after=0.85))
-    return float(np.linalg.norm(perfect_sensors(scenario=crash)))
-
-
-def ground_truth(made: Experiments) -> Statement:
-    """Judge the cameras as ground truth."""
-    cameras = np.concatenate([e.camera_errors for e in made.all])
-    inertial = np.array([made.rms(n) for n in PLATFORMS])
-    return ground_truth_from(
-        float(np.sqrt((cameras**2).mean(axis=0)).max()),
-        float(np.abs(cameras).max()),
-        float(inertial.min()),
-    )
-
-
-def ground_truth_from(rms: float, largest: float, inertial: float) -> Statement:
-    """Judge from errors of the cameras and the smallest RMS of a platform, m."""
-    if rms < inertial / 3.0:
-        verdict, condition = HOLDS, ""
-    elif rms < inertial:
-        verdict, condition = HOLDS_WHEN, "its own error is counted with that of the sensors"
-    else:
-        verdict, condition = DOES_NOT_HOLD, ""
-    return Statement(
-        "ground-truth",
-        "Section 3",
-        "top and side view camera readings were combined into a “ground-truth” reference 3D "
-        "trajectory (Fig. 5)",
-        verdict,
-        condition,
-        "Simulated cameras of 1000 frames/s and 1.3 megapixels, 8 m away, readings to half a "
-        "pixel, pose to 5 mm and 0.05°, against the exact path, from the impact on.",
-        (
-            Evidence("cameras, worst axis, RMS", 1e3 * rms, "mm"),
-            Evidence("cameras, largest", 1e3 * largest, "mm"),
-            Evidence("best axis of a platform, RMS", 1e3 * inertial, "mm"),
-        ),
-    )
-
-
-def same_entry(made: Experiments) -> Statement:
-    """Judge that one trigger gives all the same entry position."""
-    speed = float(made.first.exact.course([0.0])[1][0, 0])
-    late = {
-        kind: float(
-            np.sqrt(np.mean([e.truths[n].trigger_error ** 2 for e in made.all for n in names]))
-        )
-        for kind, names in (("LAB", LABS), ("IMU", IMUS))
-    }
-    return same_entry_from({k: v * speed for k, v in late.items()}, speed / 200.0)
-
-
-def same_entry_from(away: dict[str, float], step: float) -> Statement:
-    """Judge from the RMS of the place at the trigger by kind, and the way in a sample, m."""
-    worst = max(away.values())
-    if worst < 0.003:
-        verdict, condition = HOLDS, ""
-    elif worst < 0.03:
-        verdict = HOLDS_WHEN
-        condition = (
-            f"a centimetre does not matter: a trigger that is stamped with its sample at 200 Hz is "
-            f"off by up to {amount(1e3 * step, 'mm')}"
-        )
-    else:
-        verdict, condition = DOES_NOT_HOLD, ""
-    return Statement(
-        "same-entry",
-        "Section 3",
-        "Recording of reference sensors and cameras was triggered by the same pulse so entry "
-        "position may be considered as identical for all sensors.",
-        verdict,
-        condition,
-        "Errors of the trigger that were drawn, times the entry speed; chosen: a trigger is "
-        "stamped with the sample in which it falls.",
-        (
-            *(Evidence(f"{k}, RMS", 1e3 * v, "mm") for k, v in away.items()),
-            Evidence("way in one sample at 200 Hz", 1e3 * step, "mm"),
-        ),
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.dsp.running_integral import running_integral
 from strapdown.earth import radii_of_curvature
 from strapdown.simulation import CRASHES, CrashScenario
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
@@ -94,7 +95,7 @@ def matrix_as_printed(crash: CrashScenario | None = None) -> Statement:
     rolled = np.asarray(rotation.quaternion_from_euler([1.0, 0.0, 0.0]), dtype=np.float64)
     still = np.array([0.0, 0.0, -9.80665])
     aside = as_printed(rolled)[0] @ still - rotation.rotate(rolled, still)
-    moved = float(np.linalg.norm(_twice(wrong, END / FINE)))
+    moved = float(np.linalg.norm(_twice(wrong, time)))
     residual = as_printed(rolled)[0]
     return matrix_from(
         float(np.abs(residual @ residual.T - np.eye(3)).max()),
@@ -103,10 +104,9 @@ def matrix_as_printed(crash: CrashScenario | None = None) -> Statement:
     )
 
 
-def _twice(values: Array, dt: float) -> Array:
+def _twice(values: Array, time: Array) -> Array:
     """Integral of the integral at the end, by trapezoids."""
-    speed = np.vstack([np.zeros(3), np.cumsum(0.5 * dt * (values[1:] + values[:-1]), axis=0)])
-    return np.asarray(0.5 * dt * (speed[1:] + speed[:-1]).sum(axis=0))
+    return np.asarray(np.trapezoid(running_integral(time, values), time, axis=0))
 
 
 def matrix_from(residual: float, rolled: float, crash: float) -> Statement:
@@ -171,7 +171,7 @@ def place_error(kind: str, crash: CrashScenario | None = None) -> float:
     # (19) of a quaternion that is not of unit length is as much longer as its square.
     size = (q * q).sum(axis=1, keepdims=True)
     own = size * rotation.rotate(q / np.sqrt(size), force)
-    return float(np.linalg.norm(_twice(own - true, 1.0 / RATE)))
+    return float(np.linalg.norm(_twice(own - true, time)))
 
 
 def _product(a: Array, b: Array) -> Array:

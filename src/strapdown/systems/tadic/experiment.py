@@ -26,7 +26,10 @@ from strapdown.tables import NED
 
 Array = NDArray[np.float64]
 
-PLATFORMS = ("LAB1", "LAB2", "IMU1", "IMU2")
+LABS, IMUS = ("LAB1", "LAB2"), ("IMU1", "IMU2")
+PLATFORMS = LABS + IMUS
+#: North, east and down, of a vehicle that heads north at the impact.
+AXES = ("longitudinal", "lateral", "vertical")
 # Section 3: "Recording of lab sensors (LAB1/2) outputs started 100 ms before impact".
 LAB_LEAD = 0.1  # s
 END = 0.75  # s: "the harshest section of the collision of 750 ms"

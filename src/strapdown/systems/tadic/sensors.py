@@ -17,8 +17,9 @@ from strapdown.systems.reproduction import (
     Table,
     amount,
 )
-from strapdown.systems.tadic.displacement import DECIMETRES, IMUS, budget
-from strapdown.systems.tadic.experiment import END, Experiments
+from strapdown.systems.tadic.displacement import DECIMETRES
+from strapdown.systems.tadic.error_budget import budget
+from strapdown.systems.tadic.experiment import END, IMUS, Experiments
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""Write a file whole or not at all, and never over another unasked."""
+"""Write a drafted file whole or not at all, and never over another unasked."""
 
 from __future__ import annotations
 
@@ -12,8 +12,16 @@ from strapdown.exceptions import ConfigError
 __all__ = ["check_free", "write_file"]
 
 
-def check_free(path: Path, force: bool) -> None:
+def check_free(path: Path, usual: str, *, force: bool) -> None:
     """Refuse a place where something stands.
+
+    Parameters
+    ----------
+    path : Path
+    usual : str
+        What such a file is called.
+    force : bool
+        Whether a file may be replaced.
 
     Raises
     ------
@@ -25,7 +33,7 @@ def check_free(path: Path, force: bool) -> None:
             "it is a folder",
             file=str(path),
             quantity="--out",
-            remedy=f"name a file in it: --out {path / 'case.toml'}",
+            remedy=f"name a file in it: --out {path / usual}",
         )
     if path.exists() and not force:
         raise ConfigError(
@@ -36,13 +44,15 @@ def check_free(path: Path, force: bool) -> None:
         )
 
 
-def write_file(path: Path, text: str, *, force: bool) -> None:
+def write_file(path: Path, text: str, usual: str, *, force: bool) -> None:
     """Write a text file.
 
     Parameters
     ----------
     path : Path
     text : str
+    usual : str
+        What such a file is called.
     force : bool
         Replace a file that is there.
 
@@ -51,7 +61,7 @@ def write_file(path: Path, text: str, *, force: bool) -> None:
     ConfigError
         As `check_free`, also for a file that came in the meantime.
     """
-    check_free(path, force)
+    check_free(path, usual, force=force)
     path = path.absolute()
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".partial", dir=path.parent)
@@ -67,10 +77,10 @@ def write_file(path: Path, text: str, *, force: bool) -> None:
             # A link is refused where something stands, in one step with making it.
             path.hardlink_to(staged)
         except FileExistsError:
-            check_free(path, force)
+            check_free(path, usual, force=force)
         except OSError:
             # A file system without links.
-            check_free(path, force)
+            check_free(path, usual, force=force)
             staged.replace(path)
     finally:
         with suppress(FileNotFoundError):

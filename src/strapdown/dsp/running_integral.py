@@ -1,0 +1,39 @@
+"""Integral of a sampled signal from its first stamp to each."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+__all__ = ["running_integral"]
+
+
+def running_integral(time: Array, values: Array, *, means: bool = False) -> Array:
+    """Integrate samples from the first stamp to each.
+
+    Parameters
+    ----------
+    time : ndarray, (n,), s
+        At least one stamp, even or not.
+    values : ndarray, (n, ...)
+        In any unit.
+    means : bool
+        A sample is the mean over the interval that ends at its stamp, the first one unused;
+        otherwise it is the value at its stamp, straight in between (trapezoids; error of the
+        second order in the step).
+
+    Returns
+    -------
+    ndarray, (n, ...), unit of the values times s
+        Zero at the first stamp.
+
+    Notes
+    -----
+    The trapezoids are those of `scipy.integrate.cumulative_trapezoid`, to the last bit; loading
+    that takes a fifth of a second, which every log with velocities would wait for.
+    """
+    steps = np.diff(time).reshape(-1, *[1] * (values.ndim - 1))
+    middle = values[1:] if means else 0.5 * (values[1:] + values[:-1])
+    return np.concatenate([np.zeros_like(values[:1]), np.cumsum(middle * steps, axis=0)])
