@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.estimation.covariance import Innovations
-from strapdown.navigation.node import Node
 
 __all__ = ["Mark", "NavigationPiece", "Seen"]
 
@@ -76,8 +75,8 @@ class NavigationPiece:
         ends, before it, too. The newest sample has one by `Navigator.finish`.
     late : tuple of (str, float)
         Epochs of aids that came when the navigator was beyond their time, and were not used.
-    nodes : tuple of Node
-        For a smoother, where the navigator is to be smoothed.
+    nodes : tuple of ndarray, (k, width)
+        For a smoother, where the navigator is to be smoothed: rows of `NodeRows`.
     """
 
     time: Array
@@ -85,4 +84,4 @@ class NavigationPiece:
     seen: tuple[Seen, ...]
     marks: tuple[Mark, ...]
     late: tuple[tuple[str, float], ...] = ()
-    nodes: tuple[Node, ...] = ()
+    nodes: tuple[Array, ...] = ()

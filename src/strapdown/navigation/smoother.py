@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.smoothing import smooth_back
+from strapdown._kernels.smoothing import padded, smooth_back
+from strapdown._kernels.smoothing_rows import COVARIANCE, TURN
 from strapdown.exceptions import ConfigError
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import NavigationPiece
@@ -101,8 +102,8 @@ class Smoothing:
 
     def take(self, piece: NavigationPiece) -> None:
         """Take what came of a further piece."""
-        for node in piece.nodes:
-            self._tape.take(node)
+        for rows in piece.nodes:
+            self._tape.take(rows)
 
     def smoothed(self, marks: Array) -> Smoothed:
         """Go back over everything that was taken.
@@ -126,30 +127,21 @@ class Smoothing:
             of_mark,
         )
         nodes, place = np.unique(of_mark, return_inverse=True)
-        told, less = np.zeros(n), np.zeros((n, n))
+        told, less = np.zeros(padded(n)), np.zeros((n, padded(n)))
         errors = np.empty((len(time), n))
         mark_errors = np.empty((len(nodes), 9))
         covariance = np.empty((len(nodes), 9, 9))
         sensors_sd = np.empty((len(nodes), n - 9))
         end = len(time)
-        for chunk in tape.backward():
-            begin = end - len(chunk.time)
+        for rows in tape.backward():
+            begin = end - len(rows)
             first, last = np.searchsorted(nodes, [begin, end])
-            wanted = np.full(end - begin, -1)
-            wanted[nodes[first:last] - begin] = np.arange(last - first)
+            there = nodes[first:last] - begin
+            wanted = np.full(len(rows), -1)
+            wanted[there] = np.arange(last - first)
             P = np.empty((last - first, n, n))
-            smooth_back(
-                chunk.kind,
-                chunk.covariance,
-                chunk.move,
-                chunk.taken,
-                told,
-                less,
-                wanted,
-                errors[begin:end],
-                P,
-            )
-            turn = chunk.turn[nodes[first:last] - begin]
+            smooth_back(rows, n, told, less, wanted, errors[begin:end], P)
+            turn = rows[there, TURN:COVARIANCE].reshape(-1, 3, 3)
             level = errors[nodes[first:last], :9].reshape(-1, 3, 3)
             mark_errors[first:last] = (level @ turn).reshape(-1, 9)
             for a in (0, 3, 6):
