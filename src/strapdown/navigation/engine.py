@@ -87,6 +87,7 @@ class Engine(ABC):
         Takes every growth of the covariance, and every update, where a smoother wants them.
     """
 
+    navigation: ErrorFilter
     nodes: NodeRows
     filter: FilterState
     errors: Array
@@ -124,6 +125,14 @@ class Engine(ABC):
         self, observations: Sequence[Observation], rules: Sequence[Rules]
     ) -> list[Innovations]:
         """Take what is observed now, after `close`; return what each told."""
+
+    def known(self, observation: Observation) -> Observation:
+        """Return an observation of the state as it is estimated, what is kept beside taken off."""
+        if not self.errors.any():
+            return observation
+        used = self.navigation
+        T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
+        return replace(observation, z=observation.z - observation.H @ (T @ self.errors))
 
     @abstractmethod
     def shown(self) -> Array:

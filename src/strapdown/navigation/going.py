@@ -260,10 +260,11 @@ class Going:
                 self._mark(JUST_BEFORE)
             self.observed = at
             observations = [one for _, one in told]
+            known = [self.engine.known(one) for one in observations]
             innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
             self.seen += [
-                Seen(at, one.name, one.labels, nu)
-                for one, nu in zip(observations, innovations, strict=True)
+                Seen(at, one.name, one.labels, nu, one)
+                for one, nu in zip(known, innovations, strict=True)
             ]
         self._mark()
 

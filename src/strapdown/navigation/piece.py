@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.estimation.covariance import Innovations
+from strapdown.estimation.observation import Observation
 
 __all__ = ["Mark", "NavigationPiece", "Seen"]
 
@@ -27,12 +28,16 @@ class Seen(NamedTuple):
         Of its components, with units.
     innovations : Innovations
         Computed less observed less what was expected of it; variance that was expected; weight.
+    observation : Observation, optional
+        Of the state before anything of this epoch was taken, estimates that are kept beside taken
+        off; none of a lone receiver in a compiled loop.
     """
 
     time: float
     name: str
     labels: tuple[str, ...]
     innovations: Innovations
+    observation: Observation | None = None
 
 
 class Mark(NamedTuple):
