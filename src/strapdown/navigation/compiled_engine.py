@@ -17,10 +17,11 @@ from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.covariance_input import bad_observation
-from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
+from strapdown.estimation.error_filter import ErrorFilter, diverged
 from strapdown.estimation.error_model import PHYSICAL, refuse_damped_height
 from strapdown.estimation.joseph import Joseph, Plain
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.observed_together import Rules
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.ud import BiermanThornton
 from strapdown.estimation.wd import Chernodarov

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.error_loop import BEYOND
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import PHYSICAL
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.observed_together import Rules
 from strapdown.navigation.node_rows import NodeRows
 
 __all__ = ["LARGEST_GROUP", "Engine", "EngineState", "GeneralEngine"]

@@ -15,8 +15,8 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.adaptive_rule import AdaptiveRule
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import Rules
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.observed_together import Rules
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.navigation.compiled_engine import CompiledEngine, Fixed
 from strapdown.navigation.engine import SAME_INSTANT

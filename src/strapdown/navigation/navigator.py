@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.gnss import Gnss
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.filter_state import FilterState
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled

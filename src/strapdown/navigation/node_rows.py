@@ -19,7 +19,8 @@ from strapdown._kernels.smoothing_rows import (
     pack,
     row_width,
 )
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.filter_state import FilterState
 
 __all__ = ["NodeRows"]
 
