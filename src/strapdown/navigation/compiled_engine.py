@@ -199,40 +199,43 @@ class CompiledEngine(Engine):
         made : int
         fixed : Fixed
         noted : bool
-            Whether it stopped for a covariance to be noted. It stops for more room, too.
+            Whether it stopped for a covariance to be noted.
         """
-        # A growth and an update each.
-        self.nodes.make_room(2)
         size, k = len(fixes.time), self._n - 9
         told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
-        why, made, self._count, done, self.nodes.used = fix_kernel.over_fixes(
-            self._kinds,
-            self._model,
-            self._states,
-            self._group,
-            self._count,
-            self._room,
-            self.navigation.step,
-            note_at,
-            interval,
-            time,
-            rows,
-            history,
-            made,
-            self.nodes.room,
-            self.nodes.used,
-            SAME_INSTANT,
-            arm,
-            POSITION_CODE,
-            fixes.time,
-            fixes.values,
-            told,
-            at,
-            noted,
-            sensors,
-            sd,
-        )
+        why, done = kernel.FULL, 0
+        while why == kernel.FULL:
+            # Of a fix a growth and an update.
+            self.nodes.make_room(2)
+            why, made, self._count, more, self.nodes.used = fix_kernel.over_fixes(
+                self._kinds,
+                self._model,
+                self._states,
+                self._group,
+                self._count,
+                self._room,
+                self.navigation.step,
+                note_at if not done else at[done - 1] + interval,
+                interval,
+                time,
+                rows,
+                history,
+                made,
+                self.nodes.room,
+                self.nodes.used,
+                SAME_INSTANT,
+                arm,
+                POSITION_CODE,
+                fixes.time[done:],
+                fixes.values[done:],
+                told[done:],
+                at[done:],
+                noted[done:],
+                sensors[done:],
+                sd[done:],
+            )
+            done += more
         if why == fix_kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
