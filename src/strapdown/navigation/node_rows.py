@@ -28,6 +28,8 @@ Array = NDArray[np.float64]
 
 #: Nodes that are noted before a compiled loop asks for more room: half a megabyte.
 BLOCK = 256
+#: Where nothing is noted a sample alone must not pay for it.
+NOTHING: Array = np.empty((0, 0))
 
 
 class NodeRows:
@@ -52,10 +54,11 @@ class NodeRows:
 
     def __init__(self, filter_: ErrorFilter, wanted: bool) -> None:
         self._filter = filter_
-        self._size = filter_.model.physical_size
         self._full: list[Array] = []
-        self.room = np.empty((BLOCK if wanted else 0, row_width(self._size)))
-        self.used = 0
+        self._size, self.room, self.used = 0, NOTHING, 0
+        if wanted:
+            self._size = filter_.model.physical_size
+            self.room = np.empty((BLOCK, row_width(self._size)))
 
     @property
     def wanted(self) -> bool:
