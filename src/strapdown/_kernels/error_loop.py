@@ -15,20 +15,20 @@ from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.factors import udu_predict
 from strapdown._kernels.given_arrays import GIVEN
 from strapdown._kernels.growth import grown_covariance, growth_of_step, unfold_growth
+from strapdown._kernels.level_place import WANDER
 from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.ned import ned_advance
 from strapdown._kernels.ned_level import ned_levels
 from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
+from strapdown._kernels.smoothing_rows import GROWTH, head_row, move_by_growth
 from strapdown._kernels.wander import Q_WB, wander_advance
 from strapdown._kernels.wander_level import wander_levels
 
-# Mechanizations.
-NED, WANDER = 0, 1
 # Forms of a covariance: the matrix, by two updates; its factors, by two.
 JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
 # What became of a call: all is done; a covariance is to be noted; the mechanization diverged; the
-# covariance is none.
-ALL, NOTE, DIVERGED, BAD = 0, 1, 2, 3
+# covariance is none; the rows for a smoother are full.
+ALL, NOTE, DIVERGED, BAD, FULL = 0, 1, 2, 3, 4
 # Places in the times of a loop: of the covariance, of the newest step.
 AT_COVARIANCE, AT_STEP = 0, 1
 # A group ends before it is longer than this many steps of its time.
@@ -43,6 +43,8 @@ BEYOND = 1.000001
 #   without errors), which go on in place;
 # - group: (rows of the history, the first at its start; increments), of what is not closed yet;
 # - room: arrays to work in.
+# Where a run is to be smoothed, every growth is put to rows of `notes` (`smoothing_rows`), of which
+# `noted` are filled; where it is not, `notes` has none.
 
 
 @njit(**GIVEN)
@@ -110,22 +112,43 @@ def begin_group(states, group, count, room):
 
 
 @njit(cache=True, error_model="numpy")
-def close_group(kinds, model, states, group, count, room):
-    """Take the covariance over the steps of a group; return -1, or the first state gone bad.
+def close_group(kinds, model, states, group, count, room, notes, noted):
+    """Take the covariance over the steps of a group.
 
-    The covariance is (n, n), as its form has it: the matrix, or its factors.
+    The covariance is (n, n), as its form has it: the matrix, or its factors. Return -1, or the
+    first state gone bad, and how many rows are filled now.
     """
     if count == 0:
-        return -1
+        return -1, noted
     growth_of_group(kinds, model, states, group, count, room)
-    bad = matrix_over_group(states, room) if kinds[1] < UD else factors_over_group(states, room)
+    factored = kinds[1] >= UD
+    bad = factors_over_group(states, room) if factored else matrix_over_group(states, room)
     begin_group(states, group, count, room)
-    return bad
+    if bad < 0 and notes.shape[0] > 0:
+        row, time = notes[noted], states[4][AT_COVARIANCE]
+        head_row(kinds[0], factored, states, time, GROWTH, room[5], row)
+        move_by_growth(room[1], row, states[2].shape[0])
+        noted += 1
+    return bad, noted
 
 
 @njit(cache=True, error_model="numpy")
-def over_steps(kinds, model, states, group, count, room, step, note_at, time, rows, history):
-    """Go over steps; return what became of it, the steps made, and those of the open group.
+def over_steps(
+    kinds,
+    model,
+    states,
+    group,
+    count,
+    room,
+    step,
+    note_at,
+    time,
+    rows,
+    history,
+    notes,
+    noted,
+):
+    """Go over steps; return what became of it, steps made, those of the open group, rows filled.
 
     `time` are the ends of the steps, `rows` their increments; `history` takes a row after each.
     A call ends before its steps where a group was closed at `note_at` or later. After the room of
@@ -147,12 +170,14 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
         ):
             end += 1
         if end == made:
-            bad = close_group(kinds, model, states, group, count, closing)
+            if 0 < notes.shape[0] <= noted:
+                return FULL, made, count, noted
+            bad, noted = close_group(kinds, model, states, group, count, closing, notes, noted)
             count = 0
             if bad >= 0:
-                return BAD, made, bad
+                return BAD, made, bad, noted
             if times[AT_COVARIANCE] >= note_at:
-                return NOTE, made, count
+                return NOTE, made, count, noted
             continue
         errors_of_states(gyro_terms, sensors, of_gyros)
         errors_of_states(accel_terms, sensors, of_accels)
@@ -164,7 +189,7 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
         else:
             went, why = ned_advance(state, new, heights, earth, options, into)
         if why != 0:
-            return DIVERGED, made + went, count
+            return DIVERGED, made + went, count, noted
         for i in range(made, end):
             for j in range(history.shape[1]):
                 history[i, j] = open_history[count + 1 + i - made, j]
@@ -173,4 +198,4 @@ def over_steps(kinds, model, states, group, count, room, step, note_at, time, ro
         times[AT_STEP] = time[end - 1]
         for j in range(newest.shape[0]):
             newest[j] = open_rows[last - 1, j]
-    return ALL, made, count
+    return ALL, made, count, noted

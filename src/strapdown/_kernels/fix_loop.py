@@ -14,9 +14,9 @@ from strapdown._kernels.error_loop import (
     AT_COVARIANCE,
     AT_STEP,
     BAD,
+    FULL,
     PLAIN,
     UD,
-    WANDER,
     WD,
     close_group,
     over_steps,
@@ -24,41 +24,32 @@ from strapdown._kernels.error_loop import (
 from strapdown._kernels.factored_update import ud_update, wd_epoch
 from strapdown._kernels.factors import udu_matrix
 from strapdown._kernels.geodetic import displacement
-from strapdown._kernels.ned import ALT as NED_ALT
-from strapdown._kernels.ned import COSINE, LAT, LON, PRIME, SINE
+from strapdown._kernels.level_place import WANDER, level_place
+from strapdown._kernels.ned import COSINE, LAT, PRIME, SINE
 from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.ned import V as V_N
 from strapdown._kernels.ned_level import ned_correct
 from strapdown._kernels.rotation import dcm_from_quat
 from strapdown._kernels.rotation_vector import cross
+from strapdown._kernels.smoothing_rows import (
+    UPDATE,
+    begin_of_move,
+    begin_of_taken,
+    head_row,
+    pack_covariance,
+)
 from strapdown._kernels.split_increment import split_increment
-from strapdown._kernels.wander import ALT as WANDER_ALT
 from strapdown._kernels.wander import Q_WB
 from strapdown._kernels.wander import V as V_W
 from strapdown._kernels.wander_geometry import earth_axis
-from strapdown._kernels.wander_level import geodetic_from_wander, wander_correct
+from strapdown._kernels.wander_level import wander_correct
 
 # Of a fix: what it is of, three numbers, three variances.
 CODE, VALUE, VARIANCE = 0, 1, 4
 # What an observation tells: innovation, its expected variance, weight.
 TOLD = 3
 # An observation that is none; beside what became of a call in `error_loop`.
-BAD_FIX = 4
-
-
-@njit(cache=True, error_model="numpy")
-def level_place(which, state, turn):
-    """Latitude, longitude and height; fills C_nl, level to north-east-down, (3, 3)."""
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = 0.0
-    if which == WANDER:
-        lat, lon, angle = geodetic_from_wander(state[0], state[1], state[2], state[3])
-        s, c = math.sin(angle), math.cos(angle)
-        turn[0, 0], turn[0, 1], turn[1, 0], turn[1, 1], turn[2, 2] = s, c, c, -s, -1.0
-        return lat, lon, state[WANDER_ALT]
-    turn[0, 0] = turn[1, 1] = turn[2, 2] = 1.0
-    return state[LAT], state[LON], state[NED_ALT]
+BAD_FIX = 5
 
 
 @njit(cache=True, error_model="numpy")
@@ -156,7 +147,7 @@ def take_off(which, state, sensors, earth, x):
 
 
 @njit(cache=True, error_model="numpy")
-def note(form, same_axes, covariance, sensors, turn, P, noted, noted_sensors, noted_sd):
+def mark(form, same_axes, covariance, sensors, turn, P, marked, marked_sensors, marked_sd):
     """Fill a mark: covariance of nine in north-east-down, estimates, and their deviations."""
     if form >= UD:
         udu_matrix(covariance, P)
@@ -169,7 +160,7 @@ def note(form, same_axes, covariance, sensors, turn, P, noted, noted_sensors, no
             if same_axes:
                 for i in range(3):
                     for j in range(3):
-                        noted[a + i, b + j] = P[a + i, b + j]
+                        marked[a + i, b + j] = P[a + i, b + j]
                 continue
             for i in range(3):
                 for j in range(3):
@@ -177,10 +168,10 @@ def note(form, same_axes, covariance, sensors, turn, P, noted, noted_sensors, no
                     for m in range(3):
                         for k in range(3):
                             total += turn[i, m] * P[a + m, b + k] * turn[j, k]
-                    noted[a + i, b + j] = total
+                    marked[a + i, b + j] = total
     for j in range(sensors.shape[0]):
-        noted_sensors[j] = sensors[j]
-        noted_sd[j] = math.sqrt(P[9 + j, 9 + j])
+        marked_sensors[j] = sensors[j]
+        marked_sd[j] = math.sqrt(P[9 + j, 9 + j])
 
 
 @njit(cache=True, error_model="numpy")
@@ -197,21 +188,25 @@ def over_fixes(
     time,
     rows,
     history,
+    made,
+    notes,
+    noted,
     same,
     arm,
     place_code,
     fix_time,
     fixes,
     told,
-    noted_at,
-    noted,
-    noted_sensors,
-    noted_sd,
+    marked_at,
+    marked,
+    marked_sensors,
+    marked_sd,
 ):
-    """Go over steps and fixes, to the end of either.
+    """Go over steps and fixes, to the end of either, where so many steps are made already.
 
     `rows` are changed where a fix cuts a step. Return what became of it, the steps made, those of
-    the open group, and the fixes taken; where a covariance is to be noted it ends as `over_steps`.
+    the open group, the fixes taken, and the rows filled for a smoother; where a covariance is to be
+    noted, or these rows are full, it ends as `over_steps`.
     An instant within `same` seconds of another is the same.
     """
     which, form, _ = kinds
@@ -224,7 +219,7 @@ def over_fixes(
     turn, P, after = np.empty((3, 3)), np.empty((n, n)), np.empty((size, size))
     cut = np.empty((2, rows.shape[1]))
     between = np.empty((1, history.shape[1]))
-    made, done, total = 0, 0, time.shape[0]
+    done, total = 0, time.shape[0]
     while done < fix_time.shape[0]:
         epoch = fix_time[done]
         if epoch > times[AT_STEP] + same:
@@ -236,7 +231,7 @@ def over_fixes(
             inside = end < total and time[end] > epoch + same
             if not inside:
                 end = min(end + 1, total)
-            why, went, count = over_steps(
+            why, went, count, noted = over_steps(
                 kinds,
                 model,
                 states,
@@ -248,13 +243,15 @@ def over_fixes(
                 time[made:end],
                 rows[made:end],
                 history[made:end],
+                notes,
+                noted,
             )
             made += went
             if why != ALL:
-                return why, made, count, done
+                return why, made, count, done, noted
             if inside:
                 split_increment(rows[end], epoch - times[AT_STEP], cut[0], cut[1])
-                why, went, count = over_steps(
+                why, went, count, noted = over_steps(
                     kinds,
                     model,
                     states,
@@ -266,23 +263,29 @@ def over_fixes(
                     fix_time[done : done + 1],
                     cut[:1],
                     between,
+                    notes,
+                    noted,
                 )
                 if went == 1:
                     for j in range(rows.shape[1]):
                         rows[end, j] = cut[1, j]
                 if why != ALL:
-                    return why, made, count, done
+                    return why, made, count, done, noted
             continue
-        bad = close_group(kinds, model, states, group, count, room[0])
+        if notes.shape[0] > 0 and noted + 2 > notes.shape[0]:
+            return FULL, made, count, done, noted
+        bad, noted = close_group(kinds, model, states, group, count, room[0], notes, noted)
         count = 0
         if bad >= 0:
-            return BAD, made, count, done
+            return BAD, made, count, done, noted
         of_place = fixes[done, CODE] == place_code
         meet_fix(which, state, earth, model[0], last, arm, of_place, fixes[done], turn, z, h, H, R)
         for j in range(size):
             x[j] = 0.0
         for j in range(3):
             told[done, 2, j] = 1.0
+        if notes.shape[0] > 0:
+            pack_covariance(form >= UD, covariance, P, notes[noted], begin_of_move(n))
         if form == UD:
             wrong = ud_update(covariance, x, z, H, R, told[done])
         elif form == WD:
@@ -295,20 +298,25 @@ def over_fixes(
         else:
             wrong = dense_update(covariance, x, z, H, R, form != PLAIN, told[done])
         if wrong != -1:
-            return BAD_FIX, made, count, done
+            return BAD_FIX, made, count, done, noted
         take_off(which, state, sensors, earth, x)
         level_place(which, state, turn)
-        noted_at[done] = times[AT_STEP]
-        note(
+        if notes.shape[0] > 0:
+            head_row(which, form >= UD, states, times[AT_STEP], UPDATE, P, notes[noted])
+            for j in range(n):
+                notes[noted, begin_of_taken(n) + j] = x[j]
+            noted += 1
+        marked_at[done] = times[AT_STEP]
+        mark(
             form,
             which != WANDER,
             covariance,
             sensors,
             turn,
             P,
-            noted[done],
-            noted_sensors[done],
-            noted_sd[done],
+            marked[done],
+            marked_sensors[done],
+            marked_sd[done],
         )
         for j in range(open_history.shape[1]):
             open_history[0, j] = state[j]
@@ -319,4 +327,4 @@ def over_fixes(
                 history[made - 1, j] = state[j]
         note_at = times[AT_COVARIANCE] + interval
         done += 1
-    return ALL, made, count, done
+    return ALL, made, count, done, noted

@@ -13,34 +13,29 @@ import math
 import numpy as np
 from numba import njit
 
-# Of an entry: how the errors grew to it; what was observed at it; or that a filter begins with it,
-# of which nothing before it is told.
-GROWTH, UPDATE, BEGIN = 0, 1, 2
-# Rows of a transition that are more than a decay.
-CORE = 9
+from strapdown._kernels.given_arrays import GIVEN
+from strapdown._kernels.smoothing_rows import (
+    CORE,
+    COVARIANCE,
+    GROWTH,
+    KIND,
+    UPDATE,
+    begin_of_move,
+    begin_of_taken,
+    unpack,
+)
+
+# Numbers that are reckoned together: rows of matrices are padded to a multiple of it, with zeros.
+LANES = 8
 # A pivot, of 1, below which a direction is taken to be known exactly: rounding of a covariance that
 # was made by thousands of operations is some 1e-14 of it.
 EXACT = 1e-12
 
 
-@njit(cache=True, error_model="numpy")
-def unpack(packed, out):
-    """Fill a symmetric matrix from its upper half, row by row."""
-    n, at = out.shape[0], 0
-    for i in range(n):
-        for j in range(i, n):
-            out[i, j] = out[j, i] = packed[at]
-            at += 1
-
-
-@njit(cache=True, error_model="numpy")
-def pack(matrix, packed):
-    """Fill the upper half of a symmetric matrix, row by row."""
-    n, at = matrix.shape[0], 0
-    for i in range(n):
-        for j in range(i, n):
-            packed[at] = 0.5 * (matrix[i, j] + matrix[j, i])
-            at += 1
+@njit(cache=True)
+def padded(n):
+    """Columns of a matrix to work in, of n errors."""
+    return (n + LANES - 1) // LANES * LANES
 
 
 @njit(cache=True, error_model="numpy")
@@ -91,105 +86,171 @@ def inverse(P, out):
             out[i, j] = out[j, i] = total
 
 
-@njit(cache=True, error_model="numpy")
-def sandwich(A, S, B, out):
-    """Fill ``A S A' + B``, symmetric S and B."""
-    n = S.shape[0]
-    half = np.empty((n, n))
+@njit(**GIVEN, fastmath={"contract"})
+def product(A, B, n, out):
+    """Fill ``A B``, (n, n) within padded matrices."""
     for i in range(n):
-        for j in range(n):
-            half[i, j] = 0.0
+        for p in range(0, out.shape[1], LANES):
+            for j in range(LANES):
+                out[i, p + j] = 0.0
         for m in range(n):
             a = A[i, m]
-            if a != 0.0:
-                for j in range(n):
-                    half[i, j] += a * S[m, j]
+            for p in range(0, out.shape[1], LANES):
+                for j in range(LANES):
+                    out[i, p + j] += a * B[m, p + j]
+
+
+@njit(**GIVEN, fastmath={"reassoc", "contract"})
+def sandwich(A, S, n, half, out):
+    """Fill ``A S A'``, symmetric S, (n, n) within padded matrices; `half` is room to work in."""
+    product(A, S, n, half)
     for i in range(n):
         for j in range(i, n):
-            total = B[i, j]
-            for m in range(n):
+            total = 0.0
+            for m in range(half.shape[1]):
                 total += half[i, m] * A[j, m]
             out[i, j] = out[j, i] = total
 
 
-@njit(cache=True, error_model="numpy")
-def transposed_growth(move, out):
-    """Fill the transpose of a transition from its first rows and the decay of the others."""
-    n = out.shape[0]
+@njit(**GIVEN, fastmath={"contract"})
+def unpack_growth(row, n, core, decay):
+    """Fill the first rows of a transition, and the decay of the others, padded, from a row."""
+    at = begin_of_move(n)
+    for i in range(CORE):
+        for j in range(n):
+            core[i, j] = row[at]
+            at += 1
+    for i in range(CORE, n):
+        decay[i] = row[at]
+        at += 1
+
+
+@njit(**GIVEN, fastmath={"contract"})
+def estimate_of(row, told, n, out):
+    """Fill ``P l`` with the covariance P of a row."""
+    at = COVARIANCE
+    for i in range(n):
+        out[i] = 0.0
+    for i in range(n):
+        own = told[i]
+        total = row[at] * own
+        for j in range(1, n - i):
+            out[i + j] += row[at + j] * own
+            total += row[at + j] * told[i + j]
+        out[i] += total
+        at += n - i
+
+
+@njit(**GIVEN, fastmath={"contract"})
+def told_before_growth(core, decay, told, new):
+    """Change l to ``Phi' l``; vectors are padded."""
+    for p in range(0, told.shape[0], LANES):
+        for j in range(LANES):
+            new[p + j] = decay[p + j] * told[p + j]
+        for m in range(CORE):
+            own = told[m]
+            for j in range(LANES):
+                new[p + j] += core[m, p + j] * own
+    for j in range(told.shape[0]):
+        told[j] = new[j]
+
+
+@njit(**GIVEN, fastmath={"contract"})
+def less_before_growth(core, decay, less, n, half):
+    """Change L to ``Phi' L Phi``, exactly symmetric; matrices are padded, `half` is room."""
+    for i in range(n):
+        a0, a1, a2 = less[i, 0], less[i, 1], less[i, 2]
+        a3, a4, a5 = less[i, 3], less[i, 4], less[i, 5]
+        a6, a7, a8 = less[i, 6], less[i, 7], less[i, 8]
+        for p in range(0, less.shape[1], LANES):
+            for j in range(p, p + LANES):
+                half[i, j] = (
+                    (decay[j] * less[i, j] + a0 * core[0, j] + a1 * core[1, j])
+                    + (a2 * core[2, j] + a3 * core[3, j] + a4 * core[4, j])
+                    + (a5 * core[5, j] + a6 * core[6, j])
+                    + (a7 * core[7, j] + a8 * core[8, j])
+                )
+    for i in range(n):
+        own = decay[i]
+        a0, a1, a2 = core[0, i], core[1, i], core[2, i]
+        a3, a4, a5 = core[3, i], core[4, i], core[5, i]
+        a6, a7, a8 = core[6, i], core[7, i], core[8, i]
+        for p in range(i // LANES * LANES, less.shape[1], LANES):
+            for j in range(p, p + LANES):
+                less[i, j] = (
+                    (own * half[i, j] + a0 * half[0, j] + a1 * half[1, j])
+                    + (a2 * half[2, j] + a3 * half[3, j] + a4 * half[4, j])
+                    + (a5 * half[5, j] + a6 * half[6, j])
+                    + (a7 * half[7, j] + a8 * half[8, j])
+                )
+    for i in range(n):
+        for j in range(i):
+            less[i, j] = less[j, i]
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def before_update(row, P, told, less, room):
+    """Take the adjoint pair over an update with the covariance P after it."""
+    n = P.shape[0]
+    before, weight, A, half, added, new = room
+    unpack(row, begin_of_move(n), before)
+    inverse(before, weight)
+    at = begin_of_taken(n)
     for i in range(n):
         for j in range(n):
-            out[j, i] = move[i * n + j] if i < CORE else 0.0
-        if i >= CORE:
-            out[i, i] = move[CORE * n + i - CORE]
+            before[i, j] -= P[i, j]
+    product(weight, P, n, A)
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += weight[i, j] * row[at + j] + A[i, j] * told[j]
+        new[i] = total
+    sandwich(weight, before, n, half, added)
+    sandwich(A, less, n, half, less)
+    for i in range(n):
+        told[i] = new[i]
+        for j in range(n):
+            less[i, j] += added[i, j]
 
 
 @njit(cache=True, error_model="numpy")
-def smooth_back(kind, packed, move, x, told, less, wanted, estimates, covariances):
-    """Go back over entries, from the last to the first.
+def smooth_back(rows, n, told, less, wanted, estimates, covariances):
+    """Go back over rows, from the last to the first.
 
     Parameters
     ----------
-    kind : ndarray, (k,)
-    packed : ndarray, (k, n (n + 1)/2)
-        Covariance after each.
-    move : ndarray, (k, room)
-        Of a growth its first rows and the decay of the others; of an update the covariance before.
-    x : ndarray, (k, n)
-        Of an update, the estimate that it took off.
-    told, less : ndarray, (n,) and (n, n)
-        The adjoint pair after the last entry; before the first one, when it is done.
+    rows : ndarray, (k, `smoothing_rows.row_width`)
+    n : int
+        Number of errors.
+    told, less : ndarray, (`padded`,) and (n, `padded`)
+        The adjoint pair after the last row; before the first one, when it is done.
     wanted : ndarray, (k,)
         Where the covariance goes in `covariances`, -1 where it is not wanted.
     estimates : ndarray, (k, n)
         Filled with the error that the filter's state after each has, by all data.
     covariances : ndarray, (m, n, n)
     """
-    n = told.shape[0]
-    P, A, B = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
-    before, weight, zero = np.empty((n, n)), np.empty((n, n)), np.zeros((n, n))
-    new = np.empty(n)
-    for k in range(kind.shape[0] - 1, -1, -1):
-        unpack(packed[k], P)
-        for i in range(n):
-            total = 0.0
-            for j in range(n):
-                total += P[i, j] * told[j]
-            estimates[k, i] = total
+    width = less.shape[1]
+    P, before, weight = np.zeros((n, width)), np.zeros((n, width)), np.zeros((n, width))
+    A, half, added = np.zeros((n, width)), np.zeros((n, width)), np.zeros((n, width))
+    core, decay, new = np.zeros((CORE, width)), np.zeros(width), np.zeros(width)
+    for k in range(rows.shape[0] - 1, -1, -1):
+        row, kind = rows[k], rows[k, KIND]
+        estimate_of(row, told, n, estimates[k])
+        if wanted[k] >= 0 or kind == UPDATE:
+            unpack(row, COVARIANCE, P)
         if wanted[k] >= 0:
             out = covariances[wanted[k]]
-            sandwich(P, less, zero, out)
+            sandwich(P, less, n, half, A)
             for i in range(n):
                 for j in range(n):
-                    out[i, j] = P[i, j] - out[i, j]
-        if kind[k] == GROWTH:
-            transposed_growth(move[k], A)
-            for i in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += A[i, j] * told[j]
-                new[i] = total
-            sandwich(A, less, zero, B)
-        elif kind[k] == BEGIN:
-            new[:] = 0.0
-            B[:, :] = 0.0
+                    out[i, j] = P[i, j] - A[i, j]
+        if kind == GROWTH:
+            unpack_growth(row, n, core, decay)
+            told_before_growth(core, decay, told, new)
+            less_before_growth(core, decay, less, n, half)
+        elif kind == UPDATE:
+            before_update(row, P, told, less, (before, weight, A, half, added, new))
         else:
-            unpack(move[k], before)
-            inverse(before, weight)
-            for i in range(n):
-                for j in range(n):
-                    total = 0.0
-                    for m in range(n):
-                        total += weight[i, m] * P[m, j]
-                    A[i, j] = total
-                    before[i, j] -= P[i, j]
-            for i in range(n):
-                total = 0.0
-                for j in range(n):
-                    total += weight[i, j] * x[k, j] + A[i, j] * told[j]
-                new[i] = total
-            sandwich(weight, before, zero, B)
-            sandwich(A, less, B, B)
-        for i in range(n):
-            told[i] = new[i]
-            for j in range(n):
-                less[i, j] = B[i, j]
+            told[:] = 0.0
+            less[:, :] = 0.0

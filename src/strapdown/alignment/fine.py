@@ -36,8 +36,9 @@ from strapdown.alignment.stationary import (
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import ErrorModel, Segment
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.resting_sensors import resting_states
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.stationary import Standing, rate_observation, still_observations
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import PHYSICAL, Segment
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.observation import Observation
 from strapdown.nav_state import NavState
 

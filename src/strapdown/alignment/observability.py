@@ -13,7 +13,7 @@ from strapdown.alignment.fine_epochs import settled_epoch
 from strapdown.alignment.fine_result import FineResult, alignment_of
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import home_of
-from strapdown.estimation.error_filter import FilterState
+from strapdown.estimation.filter_state import FilterState
 
 __all__ = ["Manoeuvre", "manoeuvres_after", "null_space"]
 

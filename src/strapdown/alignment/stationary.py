@@ -18,8 +18,9 @@ from strapdown._kernels.level import AXIS, OMEGA_EL, Q_LB, V_L
 from strapdown.alignment.site import Site
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import PHYSICAL, Segment
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.observation import Observation
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.state_error import displacement_between

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,22 +9,20 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown import rotation
 from strapdown._kernels.compensation import compensate, errors_of_states
-from strapdown._kernels.level import ALT, AXIS, Q_LB
-from strapdown.earth import gravity
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.observation import Observation
-from strapdown.estimation.update_rule import FullUpdate, UpdateRule
+from strapdown.estimation.observed_together import Rules, rules_of_components, split_innovations
+from strapdown.estimation.resting_body import biases_in_level, resting
+from strapdown.estimation.update_rule import UpdateRule
 from strapdown.exceptions import DivergenceError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]
-#: What an observation is believed by: one rule, one for each of its components, or none.
-Rules = UpdateRule | Sequence[UpdateRule] | None
 
 # Part by which noise is larger than what is known of it, so that what is left is no less than zero:
 # of a noise of less than full rank, as that of a quaternion's four numbers, the rounding of the
@@ -33,34 +30,6 @@ Rules = UpdateRule | Sequence[UpdateRule] | None
 ROUNDING = 1e-5
 # Place of the rotation among the physical errors.
 ROTATION = slice(6, 9)
-# Place of the attitude in a level row.
-ATTITUDE = slice(Q_LB, Q_LB + 4)
-# Blocks of states that are vectors of the body.
-BIASES = ("gyro_bias", "accel_bias")
-
-
-@dataclass(frozen=True, eq=False)
-class FilterState:
-    """Everything that a filter remembers: from here it goes on.
-
-    Attributes
-    ----------
-    time : float, s
-    mechanization : ndarray
-        State of the mechanization, errors taken off.
-    row : ndarray
-        Its row of a history.
-    sensors : ndarray, (k,)
-        Estimates of the sensors' errors, in the order of the model's `sensors`.
-    covariance : ndarray, (n, n)
-        State of the covariance form.
-    """
-
-    time: float
-    mechanization: Array
-    row: Array
-    sensors: Array
-    covariance: Array
 
 
 @dataclass(frozen=True)
@@ -347,10 +316,9 @@ class ErrorFilter:
             np.concatenate([one.z for one in observations]),
             np.concatenate([one.H for one in observations]) @ to_physical,
             np.concatenate([one.R for one in observations]),
-            self.rule if rules is None else _each(rules, observations),
+            self.rule if rules is None else rules_of_components(rules, observations),
         )
-        sizes = [one.z.size for one in observations]
-        return replace(state, covariance=covariance), x, _split(seen, sizes)
+        return replace(state, covariance=covariance), x, split_innovations(seen, observations)
 
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
@@ -362,24 +330,7 @@ class ErrorFilter:
 
     def _transition(self, segment: Segment) -> tuple[Array, Array]:
         """How errors go over a segment."""
-        if self.rests:
-            levels = self.mechanization.levels(segment.history[:-1])
-            rows = segment.increments.copy()
-            up = np.zeros((len(rows), 3))
-            up[:, 2] = self.mechanization.level_up * self._gravity(levels[0])
-            up = rotation.rotate(rotation.conjugate(levels[:, ATTITUDE]), up)
-            rows[:, 4:7] = up * rows[:, :1]
-            segment = replace(segment, increments=rows)
-        return self.model.transition(segment, self.step)
-
-    def _gravity(self, level: Array) -> float:
-        """Gravity at a level row, m/s²."""
-        sine = float(level[AXIS + 2]) * self.mechanization.level_up
-        lat = math.degrees(math.asin(min(max(sine, -1.0), 1.0)))
-        found = gravity(
-            lat, float(level[ALT]), ellipsoid=find_ellipsoid(self.mechanization.ellipsoid)
-        )
-        return float(np.linalg.norm(found))
+        return self.model.transition(resting(segment) if self.rests else segment, self.step)
 
     def _run(self, state: FilterState, time: Array, rows: Array) -> tuple[FilterState, Segment]:
         """The mechanization over increments without estimated errors; the covariance as it was."""
@@ -410,7 +361,7 @@ class ErrorFilter:
             carried = self.model.from_physical(used, state.time, row) @ to_physical
             covariance = self.form.predict(covariance, carried, np.zeros_like(covariance))
         if self.rests:
-            turned = self._turned(state.row, row)
+            turned = biases_in_level(used, self.model.layout, state.row, row)
             covariance = self.form.predict(covariance, turned, np.zeros_like(covariance))
         return replace(
             state,
@@ -419,17 +370,6 @@ class ErrorFilter:
             sensors=state.sensors + physical[PHYSICAL:],
             covariance=covariance,
         )
-
-    def _turned(self, before: Array, after: Array) -> Array:
-        """How states go on where the errors of the biases stay in level axes, (n, n)."""
-        q_before, q_after = self.mechanization.levels(np.stack([before, after]))[:, ATTITUDE]
-        turn = rotation.dcm_from_quaternion(rotation.compose(rotation.conjugate(q_after), q_before))
-        out = np.eye(self.model.layout.size)
-        for name in BIASES:
-            if name in self.model.layout:
-                at = self.model.layout[name]
-                out[at, at] = turn
-        return out
 
 
 def diverged(time: float) -> DivergenceError:
@@ -445,19 +385,3 @@ def diverged(time: float) -> DivergenceError:
 def symmetric(P: Array) -> Array:
     """Return the symmetric part of a square matrix."""
     return 0.5 * (P + P.T)
-
-
-def _each(rules: Sequence[Rules], observations: Sequence[Observation]) -> list[UpdateRule] | None:
-    """One rule for each component; none at all where nothing has one."""
-    if not any(rules):
-        return None
-    out: list[UpdateRule] = []
-    for rule, one in zip(rules, observations, strict=True):
-        out += rule if isinstance(rule, Sequence) else [rule or FullUpdate()] * one.z.size
-    return out
-
-
-def _split(seen: Innovations, sizes: Sequence[int]) -> list[Innovations]:
-    cuts = np.cumsum(sizes)[:-1]
-    parts = (np.split(values, cuts) for values in (seen.nu, seen.s, seen.weight))
-    return [Innovations(*one) for one in zip(*parts, strict=True)]

@@ -19,7 +19,7 @@ from strapdown.estimation.update_rule import Step
 from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.navigation.navigator import Navigator, NavigatorState
-from strapdown.navigation.piece import NavigationPiece
+from strapdown.navigation.piece import NavigationPiece, Seen
 from strapdown.navigation.record import Span
 from strapdown.tables.checks import index_of, source_of
 
@@ -318,14 +318,31 @@ def score_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> Withhe
     ConfigError
         The aid has no fixes there.
     """
-    time, nu, s = seen_of(pieces, name, span)
+    seen = seen_of(pieces, name, span)
+    time = np.array([one.time for one in seen])
+    nu = np.array([one.innovations.nu for one in seen])
+    s = np.array([one.innovations.s for one in seen])
     marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
     P = np.array([marks[at][:2, :2] for at in time.tolist()])
-    return WithheldScore(span, time, nu, s, P + beyond_place(s, P))
+    return WithheldScore(span, time, nu, s, P + _beyond_place(s, P))
 
 
-def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> tuple[Array, Array, Array]:
-    """Time of the fixes of a span, innovations, and variances."""
+def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> list[Seen]:
+    """Return what was seen of the fixes of a span.
+
+    Parameters
+    ----------
+    pieces : sequence of NavigationPiece
+    name : str
+        Of the aid.
+    span : Span
+        For messages.
+
+    Raises
+    ------
+    ConfigError
+        There is nothing.
+    """
     seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
         raise ConfigError(
@@ -333,14 +350,10 @@ def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> tuple[A
             quantity="withhold",
             remedy="withhold where the receiver has fixes",
         )
-    return (
-        np.array([one.time for one in seen]),
-        np.array([one.innovations.nu for one in seen]),
-        np.array([one.innovations.s for one in seen]),
-    )
+    return seen
 
 
-def beyond_place(s: Array, P: Array) -> Array:
+def _beyond_place(s: Array, P: Array) -> Array:
     """Return the variance that is expected of a fix beyond that of the place, (n, 2, 2).
 
     What is expected along north and east is P, what the arm adds, and the fix's own noise: the

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown import rotation
-from strapdown.evaluation.withheld import WithheldScore, beyond_place, blinded, seen_of
+from strapdown.evaluation.withheld import WithheldScore, blinded, seen_of
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import Span
-from strapdown.tables import EULER
 
 __all__ = ["end_of_what_tells", "score_of_smoothed", "score_withheld_smoothed"]
 
@@ -83,6 +81,9 @@ def score_of_smoothed(
 ) -> WithheldScore:
     """Score what a smoother makes of a span by what came before and after it.
 
+    The place of the antenna is that of the smoothed state with the smoothed arm and the smoothed
+    offset of its clock, where these are estimated, and so is its covariance.
+
     Parameters
     ----------
     navigator : Navigator
@@ -105,28 +106,13 @@ def score_of_smoothed(
         The aid has no fixes there.
     """
     assert navigator.smoother is not None
-    time, nu, s = seen_of(pieces, name, span)
-    marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
-    before = np.array([marks[at][:2, :2] for at in time.tolist()])
+    seen = seen_of(pieces, name, span)
     smoothing = navigator.smoother.begin(navigator)
     for piece in (*pieces, *later):
         smoothing.take(piece)
-    found = smoothing.smoothed(time)
-    # The place of the antenna turns with the attitude: by -r x psi for its arm r.
-    arm = _arms(navigator, pieces, name, time)
-    off = found.mark_errors[:, :3] - np.cross(arm, found.mark_errors[:, 6:])
-    P = found.covariance[:, :2, :2]
-    noise = s - np.einsum("kii->ki", np.array([marks[at][:3, :3] for at in time.tolist()]))
-    variance = np.einsum("kii->ki", found.covariance[:, :3, :3]) + np.maximum(noise, 0.0)
-    return WithheldScore(span, time, nu - off, variance, P + beyond_place(s, before))
-
-
-def _arms(navigator: Navigator, pieces: Sequence[NavigationPiece], name: str, time: Array) -> Array:
-    """The arm of an antenna, north-east-down, at instants."""
-    used = navigator.filter.mechanization
-    stamps = np.concatenate([piece.time for piece in pieces])
-    history = np.concatenate([piece.history for piece in pieces])
-    rows = history[np.clip(np.searchsorted(stamps, time), 0, len(stamps) - 1)]
-    euler = used.trajectory(time, rows)[EULER].to_numpy()
-    arm = np.asarray(getattr(navigator.by_name[name], "lever_arm", (0.0, 0.0, 0.0)))
-    return rotation.rotate(rotation.quaternion_from_euler(euler), np.tile(arm, (len(time), 1)))
+    time = np.array([one.time for one in seen])
+    # Looked at by a rule of its own, it is no lone receiver of a compiled loop.
+    observations = [one.observation for one in seen if one.observation is not None]
+    error, covariance = smoothing.seen(time, observations)
+    variance = np.einsum("kii->ki", covariance)
+    return WithheldScore(span, time, error, variance, covariance[:, :2, :2])

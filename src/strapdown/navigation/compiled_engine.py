@@ -10,16 +10,18 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import error_loop as kernel
 from strapdown._kernels import fix_loop as fix_kernel
-from strapdown._kernels.growth import growth_arrays, growth_room, padded_width, unfold_growth
+from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL
+from strapdown._kernels.level_place import NED, WANDER
 from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.covariance_input import bad_observation
-from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
+from strapdown.estimation.error_filter import ErrorFilter, diverged
 from strapdown.estimation.error_model import PHYSICAL, refuse_damped_height
 from strapdown.estimation.joseph import Joseph, Plain
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.observed_together import Rules
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.ud import BiermanThornton
 from strapdown.estimation.wd import Chernodarov
@@ -28,6 +30,7 @@ from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState
+from strapdown.navigation.node_rows import NodeRows
 
 __all__ = ["CompiledEngine", "compiled"]
 
@@ -35,8 +38,8 @@ Array = NDArray[np.float64]
 
 # Exactly these: whatever is made from them may do otherwise.
 MECHANIZATIONS: dict[type[Mechanization], int] = {
-    NorthEastDown: kernel.NED,
-    WanderAzimuth: kernel.WANDER,
+    NorthEastDown: NED,
+    WanderAzimuth: WANDER,
 }
 FORMS: dict[type[CovarianceForm], int] = {
     Joseph: kernel.JOSEPH,
@@ -94,7 +97,7 @@ class CompiledEngine(Engine):
         refuse_damped_height(filter_.mechanization)
         used, stacked = filter_.mechanization, filter_.model.stacked
         form = FORMS[type(filter_.form)]
-        self.navigation = filter_
+        self.navigation, self.nodes = filter_, NodeRows(filter_, False)
         self._kinds = (MECHANIZATIONS[type(used)], form, used.height == "held")
         self._n = n = filter_.model.layout.size
         self._model = (
@@ -141,27 +144,34 @@ class CompiledEngine(Engine):
 
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
         """Go over steps, as `Engine.over`."""
-        why, made, self._count = kernel.over_steps(
-            self._kinds,
-            self._model,
-            self._states,
-            self._group,
-            self._count,
-            self._room,
-            self.navigation.step,
-            note_at,
-            time,
-            rows,
-            history,
-        )
+        made, why = 0, kernel.FULL
+        while why == kernel.FULL:
+            self.nodes.make_room(1)
+            why, more, self._count, self.nodes.used = kernel.over_steps(
+                self._kinds,
+                self._model,
+                self._states,
+                self._group,
+                self._count,
+                self._room,
+                self.navigation.step,
+                note_at,
+                time[made:],
+                rows[made:],
+                history[made:],
+                self.nodes.room,
+                self.nodes.used,
+            )
+            made += more
         self._after(why, time, made)
-        return int(made)
+        return made
 
     def over_fixes(
         self,
         time: Array,
         rows: Array,
         history: Array,
+        made: int,
         note_at: float,
         interval: float,
         arm: Array,
@@ -171,8 +181,12 @@ class CompiledEngine(Engine):
 
         Parameters
         ----------
-        time, rows, history, note_at
+        time, rows, history
             As `over`; `rows` are changed where a fix cuts a step.
+        made : int
+            Steps that are made already.
+        note_at : float, s
+            As `over`.
         interval : float, s
             From a mark to the next time to stop at.
         arm : ndarray, (3,), m
@@ -190,30 +204,38 @@ class CompiledEngine(Engine):
         size, k = len(fixes.time), self._n - 9
         told, at = np.empty((size, fix_kernel.TOLD, 3)), np.empty(size)
         noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
-        why, made, self._count, done = fix_kernel.over_fixes(
-            self._kinds,
-            self._model,
-            self._states,
-            self._group,
-            self._count,
-            self._room,
-            self.navigation.step,
-            note_at,
-            interval,
-            time,
-            rows,
-            history,
-            SAME_INSTANT,
-            arm,
-            POSITION_CODE,
-            fixes.time,
-            fixes.values,
-            told,
-            at,
-            noted,
-            sensors,
-            sd,
-        )
+        why, done = kernel.FULL, 0
+        while why == kernel.FULL:
+            # Of a fix a growth and an update.
+            self.nodes.make_room(2)
+            why, made, self._count, more, self.nodes.used = fix_kernel.over_fixes(
+                self._kinds,
+                self._model,
+                self._states,
+                self._group,
+                self._count,
+                self._room,
+                self.navigation.step,
+                note_at if not done else at[done - 1] + interval,
+                interval,
+                time,
+                rows,
+                history,
+                made,
+                self.nodes.room,
+                self.nodes.used,
+                SAME_INSTANT,
+                arm,
+                POSITION_CODE,
+                fixes.time[done:],
+                fixes.values[done:],
+                told[done:],
+                at[done:],
+                noted[done:],
+                sensors[done:],
+                sd[done:],
+            )
+            done += more
         if why == fix_kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
@@ -223,8 +245,16 @@ class CompiledEngine(Engine):
     def close(self) -> None:
         """Take the covariance to the newest step."""
         if self._count:
-            bad = kernel.close_group(
-                self._kinds, self._model, self._states, self._group, self._count, self._room[0]
+            self.nodes.make_room(1)
+            bad, self.nodes.used = kernel.close_group(
+                self._kinds,
+                self._model,
+                self._states,
+                self._group,
+                self._count,
+                self._room[0],
+                self.nodes.room,
+                self.nodes.used,
             )
             if bad >= 0:
                 raise self._no_covariance()
@@ -233,22 +263,17 @@ class CompiledEngine(Engine):
 
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
-    ) -> tuple[list[Innovations], Array]:
+    ) -> list[Innovations]:
         """Take what is observed now."""
-        self.filter, taken, seen = self.navigation.observe(self.filter, observations, rules)
+        met = self.filter
+        self.filter, taken, seen = self.navigation.observe(met, observations, rules)
+        self.nodes.updated(met, taken, self.filter)
         self.mechanization[:], self.row = self.filter.mechanization, self.filter.row
         self._at_covariance[:] = self.mechanization
         self._sensors[:] = self.filter.sensors
         self._covariance[:] = self.filter.covariance
         self._group[0][0] = self.row
-        return seen, taken
-
-    def grown(self) -> Array:
-        """Return how the states went on over the newest group."""
-        _, growth, *_ = self._room[0]
-        out, added = np.empty((2, self._n, self._n))
-        unfold_growth(growth, out, added)
-        return out
+        return seen
 
     def shown(self) -> Array:
         """Return the row of the newest step."""

@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.error_loop import BEYOND
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import ErrorFilter, FilterState, Rules
+from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import PHYSICAL
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.observed_together import Rules
+from strapdown.navigation.node_rows import NodeRows
 
 __all__ = ["LARGEST_GROUP", "Engine", "EngineState", "GeneralEngine"]
 
@@ -78,8 +81,16 @@ def begun(filter_: ErrorFilter, state: FilterState, feeds_back: bool = True) -> 
 
 
 class Engine(ABC):
-    """A mechanization, estimates and a covariance on their way over a piece of a log."""
+    """A mechanization, estimates and a covariance on their way over a piece of a log.
 
+    Attributes
+    ----------
+    nodes : NodeRows
+        Takes every growth of the covariance, and every update, where a smoother wants them.
+    """
+
+    navigation: ErrorFilter
+    nodes: NodeRows
     filter: FilterState
     errors: Array
     time: float
@@ -114,19 +125,16 @@ class Engine(ABC):
     @abstractmethod
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
-    ) -> tuple[list[Innovations], Array]:
-        """Take what is observed now, after `close`.
+    ) -> list[Innovations]:
+        """Take what is observed now, after `close`; return what each told."""
 
-        Returns
-        -------
-        innovations : list of Innovations
-        taken : ndarray, (p,)
-            The physical error that the estimate is without since then.
-        """
-
-    @abstractmethod
-    def grown(self) -> Array:
-        """Return how the states went on over the newest group that was closed, (n, n)."""
+    def known(self, observation: Observation) -> Observation:
+        """Return an observation of the state as it is estimated, what is kept beside taken off."""
+        if not self.errors.any():
+            return observation
+        used = self.navigation
+        T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
+        return replace(observation, z=observation.z - observation.H @ (T @ self.errors))
 
     @abstractmethod
     def shown(self) -> Array:
@@ -161,7 +169,7 @@ class GeneralEngine(Engine):
         self.mechanization = state.mechanization.copy()
         self.open_history = list(state.open_history)
         self.open_rows = list(state.open_rows)
-        self._grown = np.eye(filter_.model.layout.size)
+        self.nodes = NodeRows(filter_, False)
 
     def over(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
         """Go over steps, as `Engine.over`."""
@@ -189,35 +197,35 @@ class GeneralEngine(Engine):
             return
         ends = self.filter.time + np.cumsum([row[0] for row in self.open_rows])
         ends[-1] = self.time
-        self.filter, self._grown = self.navigation.follow(
-            self.filter,
+        begun = self.filter
+        self.filter, Phi = self.navigation.follow(
+            begun,
             ends,
             np.array(self.open_history),
             np.array(self.open_rows),
             self.mechanization,
         )
+        self.nodes.grew(begun, Phi, self.filter)
         if not self.feeds_back:
-            self.errors = self._grown @ self.errors
+            self.errors = Phi @ self.errors
         self._open_anew()
 
     def observe(
         self, observations: Sequence[Observation], rules: Sequence[Rules]
-    ) -> tuple[list[Innovations], Array]:
+    ) -> list[Innovations]:
         """Take what is observed now."""
-        used = self.navigation
+        used, met = self.navigation, self.filter
         if self.feeds_back:
-            self.filter, taken, seen = used.observe(self.filter, observations, rules)
+            self.filter, taken, seen = used.observe(met, observations, rules)
             self.mechanization, self.row = self.filter.mechanization.copy(), self.filter.row
             self._open_anew()
-            return seen, taken
-        before = self.errors
-        self.filter, self.errors, seen = used.estimate(self.filter, before, observations, rules)
-        T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
-        return seen, T @ (self.errors - before)
-
-    def grown(self) -> Array:
-        """Return how the states went on over the newest group."""
-        return self._grown
+        else:
+            before = self.errors
+            self.filter, self.errors, seen = used.estimate(met, before, observations, rules)
+            T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
+            taken = T @ (self.errors - before)
+        self.nodes.updated(met, taken, self.filter)
+        return seen
 
     def shown(self) -> Array:
         """Return the row of the newest step, estimated errors taken off."""

@@ -15,14 +15,14 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.adaptive_rule import AdaptiveRule
 from strapdown.estimation.covariance import Innovations
-from strapdown.estimation.error_filter import FilterState, Rules
 from strapdown.estimation.observation import Observation
+from strapdown.estimation.observed_together import Rules
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.navigation.compiled_engine import CompiledEngine, Fixed
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.lost_covariance import LostCovarianceError
 from strapdown.navigation.navigator_state import NavigatorState
-from strapdown.navigation.node import Node, physical_transition
+from strapdown.navigation.node_rows import NodeRows
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
 
 if TYPE_CHECKING:
@@ -61,10 +61,9 @@ class Going:
         self.seen: list[Seen] = []
         self.marks: list[Mark] = []
         self.late: list[tuple[str, float]] = []
-        self.nodes: list[Node] = []
-        self.noting = navigator.smoother is not None
-        if self.noting and state.marked == -np.inf:
-            self._node()
+        self.engine.nodes = NodeRows(navigator.filter, navigator.smoother is not None)
+        if state.marked == -np.inf:
+            self.engine.nodes.began(self.engine.filter)
         self.time: Array = np.empty(0)
         self.history: Array = np.empty((0, navigator.filter.mechanization.row))
 
@@ -118,13 +117,13 @@ class Going:
 
     def end(self) -> None:
         """Mark the newest sample."""
-        self._close()
+        self.engine.close()
         self._mark()
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
         """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
         aid, engine = self.navigator.lone_receiver, self.engine
-        if aid is None or not isinstance(engine, CompiledEngine) or self.noting:
+        if aid is None or not isinstance(engine, CompiledEngine):
             return made
         arm = np.asarray(aid.lever_arm, dtype=np.float64)
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
@@ -134,16 +133,16 @@ class Going:
             usual = self._until_outage(Epochs(queue.time[:due], queue.values[:due]))
             if not usual.time.size:
                 break
-            went, fixed, stopped = engine.over_fixes(
-                time[made:],
-                rows[made:],
-                self.history[made:],
+            made, fixed, stopped = engine.over_fixes(
+                time,
+                rows,
+                self.history,
+                made,
                 self.marked + interval,
                 interval,
                 arm,
                 usual,
             )
-            made += went
             done = len(fixed.told)
             self._fixed(aid, queue, fixed)
             queue = Epochs(queue.time[done:], queue.values[done:])
@@ -195,7 +194,7 @@ class Going:
             tuple(self.seen),
             tuple(self.marks),
             tuple(self.late),
-            tuple(self.nodes),
+            self.engine.nodes.blocks(),
         )
 
     def _steady(self, at: float) -> Array | None:
@@ -227,45 +226,15 @@ class Going:
         while made < len(time):
             # The interval is one of a decimal clock.
             note_at = self.marked + self.navigator.mark_interval * (1.0 - 1e-9)
-            begun = self.engine.filter
-            # Who smooths notes every growth of the covariance.
-            stop_at = -np.inf if self.noting else note_at
-            made += self.engine.over(time[made:], rows[made:], history[made:], stop_at)
+            made += self.engine.over(time[made:], rows[made:], history[made:], note_at)
             if made < len(time):
-                self._grown(begun)
-                if self.engine.filter.time >= note_at:
-                    self._mark()
-
-    def _close(self) -> None:
-        """Take the covariance to the newest step."""
-        begun = self.engine.filter
-        self.engine.close()
-        self._grown(begun)
-
-    def _grown(self, begun: FilterState) -> None:
-        """Note how errors grew since a state of the filter."""
-        ended = self.engine.filter
-        if self.noting and ended.time > begun.time:
-            Phi = physical_transition(self.navigator.filter, begun, self.engine.grown(), ended)
-            self._node(transition=Phi)
-
-    def _node(
-        self,
-        transition: Array | None = None,
-        before: Array | None = None,
-        taken: Array | None = None,
-    ) -> None:
-        """Note the covariance for a smoother."""
-        filter_, state = self.navigator.filter, self.engine.filter
-        turn = filter_.mechanization.level_from_ned(state.row)
-        P = filter_.physical_covariance(state)
-        self.nodes.append(Node(state.time, P, transition, before, taken, turn))
+                self._mark()
 
     def _observe(self, at: float) -> None:
         """Take everything that is observed at an instant."""
         engine, filter_ = self.engine, self.navigator.filter
         last = engine.last
-        self._close()
+        engine.close()
         view = View(
             mechanization=filter_.mechanization,
             model=filter_.model,
@@ -291,10 +260,11 @@ class Going:
                 self._mark(JUST_BEFORE)
             self.observed = at
             observations = [one for _, one in told]
+            known = [self.engine.known(one) for one in observations]
             innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
             self.seen += [
-                Seen(at, one.name, one.labels, nu)
-                for one, nu in zip(observations, innovations, strict=True)
+                Seen(at, one.name, one.labels, nu, one)
+                for one, nu in zip(known, innovations, strict=True)
             ]
         self._mark()
 
@@ -308,22 +278,12 @@ class Going:
                 asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
             else:
                 asked.append(rule)
-        met = self.engine.filter
-        innovations, taken = self.engine.observe(observations, asked)
-        if self.noting:
-            self._updated(met, taken)
+        innovations = self.engine.observe(observations, asked)
         for rule, one, nu in zip(rules, observations, innovations, strict=True):
             if isinstance(rule, AdaptiveRule):
                 before = self.scales.get(one.name) or rule.begin(one.z.size)
                 self.scales[one.name] = rule.after(before, nu, one.R)
         return innovations
-
-    def _updated(self, before: FilterState, taken: Array) -> None:
-        """Note what observations did, if they did anything."""
-        filter_ = self.navigator.filter
-        P = filter_.physical_covariance(before)
-        if taken.any() or not np.array_equal(P, filter_.physical_covariance(self.engine.filter)):
-            self._node(before=P, taken=taken)
 
     def _mark(self, before: float = 0.0) -> None:
         """Note covariance and estimates, with a stamp that is so much earlier."""

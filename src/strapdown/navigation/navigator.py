@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.gnss import Gnss
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.filter_state import FilterState
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled
@@ -50,9 +51,8 @@ class Navigator:
     damping : Damping
         Whether what is estimated is fed back.
     smoother : Smoother, optional
-        With one, its pieces have what the run is smoothed by. Place and velocity of a lone
-        receiver are then taken together, and not one after the other: the numbers differ by what
-        is of the second order in a correction.
+        With one, its pieces have what the run is smoothed by, too; the filter's numbers are the
+        same to the last bit.
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.estimation.covariance import Innovations
-from strapdown.navigation.node import Node
+from strapdown.estimation.observation import Observation
 
 __all__ = ["Mark", "NavigationPiece", "Seen"]
 
@@ -28,12 +28,16 @@ class Seen(NamedTuple):
         Of its components, with units.
     innovations : Innovations
         Computed less observed less what was expected of it; variance that was expected; weight.
+    observation : Observation, optional
+        Of the state before anything of this epoch was taken, estimates that are kept beside taken
+        off; none of a lone receiver in a compiled loop.
     """
 
     time: float
     name: str
     labels: tuple[str, ...]
     innovations: Innovations
+    observation: Observation | None = None
 
 
 class Mark(NamedTuple):
@@ -76,8 +80,8 @@ class NavigationPiece:
         ends, before it, too. The newest sample has one by `Navigator.finish`.
     late : tuple of (str, float)
         Epochs of aids that came when the navigator was beyond their time, and were not used.
-    nodes : tuple of Node
-        For a smoother, where the navigator is to be smoothed.
+    nodes : tuple of ndarray, (k, width)
+        For a smoother, where the navigator is to be smoothed: rows of `NodeRows`.
     """
 
     time: Array
@@ -85,4 +89,4 @@ class NavigationPiece:
     seen: tuple[Seen, ...]
     marks: tuple[Mark, ...]
     late: tuple[tuple[str, float], ...] = ()
-    nodes: tuple[Node, ...] = ()
+    nodes: tuple[Array, ...] = ()

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.smoothing import smooth_back
+from strapdown._kernels.smoothing import padded, smooth_back
+from strapdown._kernels.smoothing_rows import COVARIANCE, TURN
+from strapdown.estimation.observation import Observation
 from strapdown.exceptions import ConfigError
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import NavigationPiece
@@ -101,8 +104,8 @@ class Smoothing:
 
     def take(self, piece: NavigationPiece) -> None:
         """Take what came of a further piece."""
-        for node in piece.nodes:
-            self._tape.take(node)
+        for rows in piece.nodes:
+            self._tape.take(rows)
 
     def smoothed(self, marks: Array) -> Smoothed:
         """Go back over everything that was taken.
@@ -116,8 +119,7 @@ class Smoothing:
         -------
         Smoothed
         """
-        tape = self._tape
-        n, time = tape.size, tape.times()
+        n, time = self._tape.size, self._tape.times()
         of_mark = np.clip(np.searchsorted(time, marks + SAME_MARK, side="right") - 1, 0, None)
         of_mark = np.where(
             np.abs(time[of_mark] - marks) > SAME_MARK / 10.0,
@@ -126,40 +128,20 @@ class Smoothing:
             of_mark,
         )
         nodes, place = np.unique(of_mark, return_inverse=True)
-        told, less = np.zeros(n), np.zeros((n, n))
         errors = np.empty((len(time), n))
         mark_errors = np.empty((len(nodes), 9))
         covariance = np.empty((len(nodes), 9, 9))
         sensors_sd = np.empty((len(nodes), n - 9))
-        end = len(time)
-        for chunk in tape.backward():
-            begin = end - len(chunk.time)
-            first, last = np.searchsorted(nodes, [begin, end])
-            wanted = np.full(end - begin, -1)
-            wanted[nodes[first:last] - begin] = np.arange(last - first)
-            P = np.empty((last - first, n, n))
-            smooth_back(
-                chunk.kind,
-                chunk.covariance,
-                chunk.move,
-                chunk.taken,
-                told,
-                less,
-                wanted,
-                errors[begin:end],
-                P,
-            )
-            turn = chunk.turn[nodes[first:last] - begin]
-            level = errors[nodes[first:last], :9].reshape(-1, 3, 3)
-            mark_errors[first:last] = (level @ turn).reshape(-1, 9)
+        for met, P, turn in self._back(nodes, errors):
+            level = errors[nodes[met], :9].reshape(-1, 3, 3)
+            mark_errors[met] = (level @ turn).reshape(-1, 9)
             for a in (0, 3, 6):
                 for b in (0, 3, 6):
-                    covariance[first:last, a : a + 3, b : b + 3] = (
+                    covariance[met, a : a + 3, b : b + 3] = (
                         turn.transpose(0, 2, 1) @ P[:, a : a + 3, b : b + 3] @ turn
                     )
             variances = np.diagonal(P, axis1=1, axis2=2)[:, 9:]
-            sensors_sd[first:last] = np.sqrt(np.maximum(variances, 0.0))
-            end = begin
+            sensors_sd[met] = np.sqrt(np.maximum(variances, 0.0))
         return Smoothed(
             mechanization=self._navigator.filter.mechanization,
             time=time,
@@ -169,3 +151,64 @@ class Smoothing:
             sensors=errors[of_mark, 9:],
             sensors_sd=sensors_sd[place],
         )
+
+    def seen(self, times: Array, observations: Sequence[Observation]) -> tuple[Array, Array]:
+        """Return what observations that were not used are off by from the smoothed states.
+
+        Parameters
+        ----------
+        times : ndarray, (m,), s
+            Of epochs of the run, rising.
+        observations : sequence of Observation, (m,)
+            As `Seen` has them, of one number of components.
+
+        Returns
+        -------
+        error : ndarray, (m, l)
+            Smoothed less observed, to first order in what the smoother takes off: everything that
+            the observation depends on is smoothed, errors of an aid too.
+        covariance : ndarray, (m, l, l)
+            Expected of it, noise of the observation and all.
+        """
+        time = self._tape.times()
+        # The first of an instant is of the state before anything was taken at it.
+        nodes = np.clip(np.searchsorted(time, times), 0, len(time) - 1)
+        H = np.array([one.H for one in observations])
+        errors = np.empty((len(time), self._tape.size))
+        covariance = np.array([np.diag(one.R) for one in observations])
+        for met, P, _ in self._back(nodes, errors):
+            covariance[met] += H[met] @ P @ H[met].transpose(0, 2, 1)
+        z = np.array([one.z for one in observations])
+        return z - (H @ errors[nodes][:, :, None])[:, :, 0], covariance
+
+    def _back(self, nodes: NDArray[np.intp], errors: Array) -> Iterator[tuple[slice, Array, Array]]:
+        """Go back over the tape.
+
+        Parameters
+        ----------
+        nodes : ndarray, (m,)
+            Numbers of nodes, rising.
+        errors : ndarray, (count, p)
+            Filled with those of the state at each node.
+
+        Yields
+        ------
+        met : slice
+            Which of the nodes are in a chunk.
+        covariance : ndarray, (k, p, p)
+            Of these.
+        turn : ndarray, (k, 3, 3)
+            From north-east-down to level axes.
+        """
+        n, end = self._tape.size, len(errors)
+        told, less = np.zeros(padded(n)), np.zeros((n, padded(n)))
+        for rows in self._tape.backward():
+            begin = end - len(rows)
+            met = slice(*np.searchsorted(nodes, [begin, end]).tolist())
+            there = nodes[met] - begin
+            wanted = np.full(len(rows), -1)
+            wanted[there] = np.arange(len(there))
+            P = np.empty((len(there), n, n))
+            smooth_back(rows, n, told, less, wanted, errors[begin:end], P)
+            yield met, P, rows[there, TURN:COVARIANCE].reshape(-1, 3, 3)
+            end = begin

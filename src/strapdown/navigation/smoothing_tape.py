@@ -11,37 +11,15 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.smoothing import BEGIN, CORE, GROWTH, UPDATE, pack
+from strapdown._kernels.smoothing_rows import TIME, row_width
 from strapdown.exceptions import ConfigError
-from strapdown.navigation.node import Node
 
-__all__ = ["Chunk", "SmoothingTape"]
+__all__ = ["SmoothingTape"]
 
 Array = NDArray[np.float64]
 
 #: Nodes of a chunk: some megabytes.
 CHUNK = 1024
-#: Places in a row: time, kind, turn to level axes; then covariance, move and what was taken.
-TIME, KIND, TURN, START = 0, 1, slice(2, 11), 11
-
-
-class Chunk:
-    """Some nodes, one after the other.
-
-    Parameters
-    ----------
-    rows : ndarray, (k, room)
-    size : int
-        Number of physical errors, p.
-    """
-
-    def __init__(self, rows: Array, size: int) -> None:
-        half = size * (size + 1) // 2
-        self.time, self.kind = rows[:, TIME], rows[:, KIND]
-        self.turn = rows[:, TURN].reshape(-1, 3, 3)
-        self.covariance = rows[:, START : START + half]
-        self.taken = rows[:, START + half : START + half + size]
-        self.move = rows[:, START + half + size :]
 
 
 class SmoothingTape:
@@ -49,7 +27,7 @@ class SmoothingTape:
 
     A node takes ``8 (11 + p (p + 1) + p)`` bytes or a little more: 2 kB with 15 errors, 5 kB with
     24. Beyond the memory that is given, they go to a file without a name, which is gone with the
-    tape or with the process, whichever ends first.
+    tape or with the process, whichever ends first; their times alone stay.
 
     Parameters
     ----------
@@ -65,58 +43,52 @@ class SmoothingTape:
 
     def __init__(self, size: int, memory: int) -> None:
         self.size = size
-        self.count = 0
-        self._half = size * (size + 1) // 2
-        width = START + self._half + size + max(self._half, CORE * size + size - CORE)
+        self._width = row_width(size)
         self._memory = memory
         self._chunks: list[Array] = []
         self._used = CHUNK
-        self._width = width
+        self._times: list[Array] = []
         self._file: IO[bytes] | None = None
         self._written = 0
 
-    def take(self, node: Node) -> None:
-        """Take a further node."""
-        if self._used == CHUNK:
-            self._new_chunk()
-        row = self._chunks[-1][self._used]
-        row[:] = 0.0
-        row[TIME], row[TURN] = node.time, node.turn.ravel()
-        half, size = self._half, self.size
-        pack(node.covariance, row[START : START + half])
-        move = row[START + half + size :]
-        if node.taken is not None and node.before is not None:
-            row[KIND] = UPDATE
-            row[START + half : START + half + size] = node.taken
-            pack(node.before, move[:half])
-        elif node.transition is not None:
-            row[KIND] = GROWTH
-            move[: CORE * size] = node.transition[:CORE].ravel()
-            move[CORE * size : CORE * size + size - CORE] = np.diagonal(node.transition)[CORE:]
-        else:
-            row[KIND] = BEGIN
-        self._used += 1
-        self.count += 1
+    def take(self, rows: Array) -> None:
+        """Take further nodes.
+
+        Parameters
+        ----------
+        rows : ndarray, (k, width)
+            Of `NodeRows`.
+        """
+        self._times.append(rows[:, TIME].copy())
+        at = 0
+        while at < len(rows):
+            if self._used == CHUNK:
+                self._new_chunk()
+            some = rows[at : at + CHUNK - self._used]
+            self._chunks[-1][self._used : self._used + len(some)] = some
+            self._used += len(some)
+            at += len(some)
 
     def times(self) -> Array:
         """Return the time of each node, (count,), s."""
-        parts = [chunk.time.copy() for chunk in self.backward()]
-        return np.concatenate(parts[::-1]) if parts else np.empty(0)
+        self._times = [np.concatenate([np.empty(0), *self._times])]
+        return self._times[0]
 
-    def backward(self) -> Iterator[Chunk]:
-        """Give the chunks, the last one first; within each the nodes are in order of time."""
+    def backward(self) -> Iterator[Array]:
+        """Give chunks of rows, the last one first; within each they are in order of time."""
         for k in range(len(self._chunks) - 1, -1, -1):
             last = k + 1 == len(self._chunks)
-            rows = self._chunks[k][: self._used if last else CHUNK]
-            yield Chunk(rows, self.size)
+            yield self._chunks[k][: self._used if last else CHUNK]
         for k in range(self._written - 1, -1, -1):
-            yield Chunk(self._read(k), self.size)
+            yield self._read(k)
 
     def _new_chunk(self) -> None:
         most = max(self._memory // (8 * CHUNK * self._width), 1)
-        if len(self._chunks) >= most:
-            self._write(self._chunks.pop(0))
-        self._chunks.append(np.empty((CHUNK, self._width)))
+        if len(self._chunks) < most:
+            self._chunks.append(np.empty((CHUNK, self._width)))
+        else:
+            self._write(self._chunks[0])
+            self._chunks.append(self._chunks.pop(0))
         self._used = 0
 
     def _write(self, rows: Array) -> None:

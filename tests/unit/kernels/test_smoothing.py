@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown._kernels.smoothing import (
+from strapdown._kernels.smoothing import inverse, padded, smooth_back
+from strapdown._kernels.smoothing_rows import (
     BEGIN,
     CORE,
+    COVARIANCE,
     GROWTH,
+    KIND,
     UPDATE,
-    inverse,
+    begin_of_move,
+    begin_of_taken,
     pack,
-    smooth_back,
+    row_width,
     unpack,
 )
 
@@ -80,21 +84,22 @@ def system(seed, steps=12, known=()):
 
 
 def smoothed(entries):
-    half = N * (N + 1) // 2
-    k = len(entries)
-    kind, packed = np.array([e[0] for e in entries], float), np.empty((k, half))
-    move = np.zeros((k, max(half, CORE * N + N - CORE)))
-    x = np.array([e[3] for e in entries])
-    for row, (what, P, moved, _) in enumerate(entries):
-        pack(P, packed[row])
+    # What of a row is not of its kind is not read.
+    rows = np.full((len(entries), row_width(N)), np.nan)
+    move, taken_at = begin_of_move(N), begin_of_taken(N)
+    for row, (what, P, moved, taken) in zip(rows, entries, strict=True):
+        row[KIND] = what
+        pack(P, row, COVARIANCE)
         if what == GROWTH:
-            move[row, : CORE * N] = moved[:CORE].ravel()
-            move[row, CORE * N : CORE * N + N - CORE] = np.diagonal(moved)[CORE:]
+            row[move : move + CORE * N] = moved[:CORE].ravel()
+            row[move + CORE * N : move + CORE * N + N - CORE] = np.diagonal(moved)[CORE:]
         elif what == UPDATE:
-            pack(moved, move[row, :half])
+            pack(moved, row, move)
+            row[taken_at : taken_at + N] = taken
+    k = len(entries)
     errors, covariance = np.empty((k, N)), np.empty((k, N, N))
-    told, less = np.zeros(N), np.zeros((N, N))
-    smooth_back(kind, packed, move, x, told, less, np.arange(k), errors, covariance)
+    told, less = np.zeros(padded(N)), np.zeros((N, padded(N)))
+    smooth_back(rows, N, told, less, np.arange(k), errors, covariance)
     assert not told.any()
     assert not less.any()
     return errors, covariance
@@ -158,7 +163,8 @@ def test_what_is_known_exactly_has_no_inverse_and_does_no_harm():
 def test_packing():
     P = np.arange(N * N, dtype=float).reshape(N, N)
     P = P + P.T
-    packed, out = np.empty(N * (N + 1) // 2), np.empty((N, N))
-    pack(P, packed)
-    unpack(packed, out)
+    row, out = np.zeros(N * (N + 1) // 2 + 2), np.empty((N, N))
+    pack(P, row, 1)
+    unpack(row, 1, out)
     np.testing.assert_array_equal(out, P)
+    assert row[0] == row[-1] == 0.0

@@ -9,7 +9,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.earth import radii_of_curvature
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.filter_state import FilterState
 from strapdown.systems.chernodarov.setting import ELLIPSOID, SITE
 from strapdown.tables import MOTION
 from strapdown.tables.checks import values_of

@@ -13,7 +13,7 @@ from strapdown.alignment.course_fixes import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.site import Site
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_filter import FilterState
+from strapdown.estimation.filter_state import FilterState
 from strapdown.frames import geodetic_from_ned
 from strapdown.nav_state import NavState
 from strapdown.prefilter.prefilter import CHANNELS

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.estimation.error_filter import FilterState
+from strapdown.estimation.filter_state import FilterState
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.piece import NavigationPiece

@@ -12,8 +12,9 @@ from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine_result import FineResult
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
+from strapdown.estimation.error_filter import ErrorFilter, symmetric
 from strapdown.estimation.error_model import PHYSICAL
+from strapdown.estimation.filter_state import FilterState
 from strapdown.frames import geodetic_from_ned
 from strapdown.nav_state import NavState
 

@@ -19,7 +19,8 @@ from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
 from strapdown.constants import MAD_TO_SD
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.filter_state import FilterState
 from strapdown.evaluation.trajectory_at import trajectory_at
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.nav_state import NavState

@@ -12,7 +12,8 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.earth import gravity
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.error_filter import ErrorFilter, FilterState
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.observation import Observation
 from strapdown.nav_state import NavState
 from strapdown.rotation.euler_angles import euler_sd
