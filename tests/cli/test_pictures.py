@@ -15,6 +15,7 @@ import pytest
 
 from strapdown import bench_attitude, simulate
 from strapdown.config import read_trajectory_spec
+from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.report.attitude_charts import charts
@@ -23,6 +24,7 @@ from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_result import told_of
 from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
+from strapdown.systems.sins.draft import draft_navigation
 from strapdown.systems.sins.run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
 
@@ -114,6 +116,22 @@ def test_the_drive_of_the_readme_is_what_is_drawn_now(tmp_path):
     drawn = drawings(navigation_document(told_of(result), ""))
     (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
     shown = IMAGES / "drive_plan.svg"
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        draw(chart, shown)
+    draw(chart, tmp_path / "now.svg")
+    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+
+
+@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
+def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
+    """As its page does it: the file that is drafted, the latitude, the control points."""
+    path = recordings("foot/SensorConnectData_32_LLIO.mat")
+    draft = draft_navigation(LogTable(path=str(path)), folder=tmp_path, foot=True)
+    text = draft.text.replace('lat_deg = "?"', "lat_deg = 41.0")
+    (tmp_path / "foot.toml").write_text(f"{text}\n[control_points]\npath = '{path}'\n")
+    drawn = drawn_of(read_navigation_spec(tmp_path / "foot.toml"))
+    (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
+    shown = IMAGES / "walking_plan.svg"
     if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
         draw(chart, shown)
     draw(chart, tmp_path / "now.svg")

@@ -63,6 +63,16 @@ def of_inputs(gyro, of_gyros, accel, of_accels, rate, force):
 
 
 @njit(**GIVEN)
+def true_inputs(readings, gyro, accel, out):
+    """Fill rate and force (6,) of readings without errors (7, 3) of gyros and accelerometers."""
+    rate = (readings[0], readings[1], readings[2])
+    force = (readings[3], readings[4], readings[5])
+    dx, dy, dz, ex, ey, ez = of_inputs(gyro, changes(gyro), accel, changes(accel), rate, force)
+    out[0], out[1], out[2] = rate[0] - dx, rate[1] - dy, rate[2] - dz
+    out[3], out[4], out[5] = force[0] - ex, force[1] - ey, force[2] - ez
+
+
+@njit(**GIVEN)
 def compensate(rows, gyro, accel, out):
     """Fill increments without errors (7, 3) of gyros and accelerometers (`errors_of_states`).
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown._kernels.compensation import errors_of_states, true_inputs
 from strapdown._kernels.level import OMEGA_EL, Q_LB, V_L
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.estimation.error_model import PHYSICAL, ErrorModel
@@ -124,6 +125,14 @@ class View:
     def labels(self, name: str) -> tuple[str, ...]:
         """Labels of a block of states."""
         return next(s.block.labels for s in self.model.sensors if s.block.name == name)
+
+    def without_errors(self, readings: Array) -> Array:
+        """Rate and force that were read, (6,), with the estimated errors taken off."""
+        stacked, errors, out = self.model.stacked, np.empty((2, 7, 3)), np.empty(6)
+        errors_of_states(stacked.gyro_terms, self.sensors, errors[0])
+        errors_of_states(stacked.accel_terms, self.sensors, errors[1])
+        true_inputs(readings, errors[0], errors[1], out)
+        return out
 
     def estimate(self, name: str) -> Array:
         """Estimate of a block: error of what was assumed, as its block is defined."""

@@ -58,7 +58,10 @@ class ZeroRate(StandstillAid):
             return []
         earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
         C_bl = view.C_lb.T
-        H = rate_columns(view, values[MEAN_RATE], values[MEAN_FORCE])
+        # A scale factor is of the true rate, which at a rest is the Earth's: of what is read, that
+        # of an axis would be found to go with its bias.
+        readings = np.concatenate([values[MEAN_RATE], values[MEAN_FORCE]])
+        H = rate_columns(view, C_bl @ earth, view.without_errors(readings)[3:])
         z = values[MEAN_RATE] - H[:, PHYSICAL:] @ view.sensors - C_bl @ earth
         H[:, ROTATION] = -C_bl @ cross_matrix(earth)
         count = float(values[COUNT])
