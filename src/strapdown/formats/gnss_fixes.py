@@ -22,6 +22,7 @@ Sd = float | tuple[float, float, float]
 
 #: What receivers reach, m.
 POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
+VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,9 @@ class GnssOptions:
     position_sd, velocity_sd : float or tuple of float, optional, m and m/s
         Standard deviations north, east, down, or one for all three: of each fix, in place of
         those of the file.
-    unstated_position_sd : float, optional, m
-        Taken where the file states none; `attrs` of the table then have ``position_sd_taken``.
+    unstated_position_sd, unstated_velocity_sd : float, optional, m and m/s
+        Taken where the file states none; `attrs` of the table then have ``position_sd_taken``,
+        ``velocity_sd_taken``.
     repair : bool
         Leave out rows that cannot be used, and say how many, instead of refusing the file.
     """
@@ -49,10 +51,16 @@ class GnssOptions:
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
     unstated_position_sd: float | None = None
+    unstated_velocity_sd: float | None = None
     repair: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("position_sd", "velocity_sd", "unstated_position_sd"):
+        for name in (
+            "position_sd",
+            "velocity_sd",
+            "unstated_position_sd",
+            "unstated_velocity_sd",
+        ):
             value = getattr(self, name)
             if value is not None and not (
                 np.shape(value) in ((), (3,)) and np.all(np.asarray(value) > 0.0)
@@ -119,11 +127,15 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
         negative, or nowhere stated, or as `gnss_table`.
     """
     count = fixes.time.size
-    asked, taken = options.position_sd, None
-    if fixes.position_sd is None and asked is None:
-        asked = taken = options.unstated_position_sd
+    asked, taken = options.position_sd, {}
+    if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
+        asked = taken["position_sd_taken"] = options.unstated_position_sd
     position_sd = _sd(fixes, "position", asked, count)
-    velocity, velocity_sd = _velocity(fixes, options.velocity_sd, count)
+    asked = options.velocity_sd
+    unstated = fixes.velocity is not None and fixes.velocity_sd is None and asked is None
+    if unstated and options.unstated_velocity_sd is not None:
+        asked = taken["velocity_sd_taken"] = options.unstated_velocity_sd
+    velocity, velocity_sd = _velocity(fixes, asked, count)
     quality = np.ones(count) if fixes.quality is None else fixes.quality
     quality = np.where(np.isnan(quality), 0.0, quality)
     time, keep = _time(fixes, options)
@@ -148,8 +160,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
         )
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
-    if taken is not None:
-        table.attrs["position_sd_taken"] = taken
+    table.attrs.update(taken)
     table.attrs["first_row"] = first_of(fixes.rows[at])
     return table
 
@@ -263,7 +274,7 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
                     "velocities without standard deviations; they are not used",
                     file=fixes.name,
                     quantity=", ".join(VELOCITY),
-                    remedy="state velocity_sd, in m/s",
+                    remedy=f"state velocity_sd, in m/s: {VELOCITY_SDS}",
                 )
             )
             return np.full((count, 3), np.inf)

@@ -15,7 +15,7 @@ from strapdown.config.toml_text import ASK, Asked, Page, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.stated_states import STATED_STATES
 from strapdown.exceptions import Finding
-from strapdown.formats.gnss_fixes import POSITION_SDS
+from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.systems.alignment_draft import listed_kinds, log_table_keys, toml_value
 from strapdown.systems.sins.foot import HERE, STILL, on_foot
@@ -317,13 +317,17 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         if "path" in aid:
             page.key("path", string(named_from(Path(aid["path"]), folder)))
             _with_remarks(page)
-        if "position_sd_m" in aid:
-            page.key(
-                "position_sd_m",
-                repr(aid["position_sd_m"]),
-                f"assumed: the fixes do not state it; {POSITION_SDS}",
-                check=f"how well each fix knows its place, m: {POSITION_SDS}",
-            )
+        for key, what, usual in (
+            ("position_sd_m", "place, m", POSITION_SDS),
+            ("velocity_sd_m_per_s", "velocity, m/s", VELOCITY_SDS),
+        ):
+            if key in aid:
+                page.key(
+                    key,
+                    repr(aid[key]),
+                    f"assumed: the fixes do not state it; {usual}",
+                    check=f"how well each fix knows its {what}: {usual}",
+                )
         _options(page, slot.entries[aid["kind"]], aid)
     if made.drives:
         page.say(

@@ -55,7 +55,7 @@ WELL = 3.0
 #: of a receiver that is better than it says.
 RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
 #: Of fixes that do not say how well they know their places: a code receiver without corrections.
-CODE_RECEIVER = GnssOptions(unstated_position_sd=5.0)
+CODE_RECEIVER = GnssOptions(unstated_position_sd=5.0, unstated_velocity_sd=0.3)
 #: How far stamps of a receiver may be from the clock of the sensors, s: so much is looked for.
 OFFSET_SD = 0.2
 #: What the motion tells of clocks is taken where it is so many standard deviations, and a delay
@@ -245,8 +245,8 @@ def _nearest(noise: tuple[float, ...]) -> str:
 
 
 def _taken(fixes: pd.DataFrame) -> dict[str, float]:
-    sd = fixes.attrs.get("position_sd_taken")
-    return {} if sd is None else {"position_sd_m": sd}
+    keys = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
+    return {key: fixes.attrs[taken] for taken, key in keys.items() if taken in fixes.attrs}
 
 
 def _place(start: StatedStart | None) -> tuple[float, float, float] | None:
