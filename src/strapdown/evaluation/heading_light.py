@@ -28,8 +28,8 @@ __all__ = [
     "REASONS",
     "SURE",
     "WITNESSES",
-    "Heard",
     "HeadingLight",
+    "Heard",
     "LightSpan",
     "heading_light",
     "recent_scatter",
@@ -80,9 +80,6 @@ class Heard(Protocol):
     """
 
     @property
-    def kind(self) -> str: ...
-
-    @property
     def since(self) -> float: ...
     @property
     def time(self) -> Array: ...
@@ -90,6 +87,8 @@ class Heard(Protocol):
     def difference(self) -> Array: ...
     @property
     def sd(self) -> Array: ...
+    @property
+    def kind(self) -> str: ...
 
 
 @dataclass(frozen=True)

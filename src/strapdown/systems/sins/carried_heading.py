@@ -63,6 +63,7 @@ class CarriedHeading:
 
 def carry_headings(
     compasses: Sequence[Compass],
+    doubts: Sequence[float],
     steps: JoinedSteps,
     record: NavigationRecord,
     sensors: ImuUncertainty,
@@ -74,6 +75,8 @@ def carry_headings(
     ----------
     compasses : sequence of Compass
         In the order of time.
+    doubts : sequence of float, s
+        Instants at which gyros were found to have changed: nothing is carried beyond.
     steps : JoinedSteps
         From the first of them on.
     record : NavigationRecord
@@ -102,6 +105,7 @@ def carry_headings(
     out = []
     for k, one in enumerate(carried):
         until = min(one.compass.time + LONGEST, one.unbroken)
+        until = min([until, *(at for at in doubts if at > one.compass.time)])
         for later in carried[k + 1 :]:
             if later.compass.time <= until and one.agrees(later.compass):
                 until = min(until, later.compass.time)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.aiding.standstill import StandstillAid
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_findings import ROCKS
@@ -26,6 +25,7 @@ from strapdown.navigation.record import NavigationRecord
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.piece import Aligned
+from strapdown.systems.sins.rests import SHORTEST, seen_rests
 from strapdown.tables import GEODETIC
 from strapdown.tables.checks import index_of
 
@@ -33,14 +33,10 @@ __all__ = ["Compass", "compasses_of", "north_within"]
 
 Array = NDArray[np.float64]
 
-#: Two-sided quantile of 99 of 100 of Student's t with two degrees of freedom.
-STUDENT_2 = 9.924843200918
+#: Two-sided quantiles of 99 of 100 of Student's t, with one degree of freedom to three.
+STUDENT = (63.656741162872, 9.924843200918, 5.840909309733)
 #: Root mean square of normalised innovations beyond which an alignment says nothing.
 INCONSISTENT = 2.0
-#: A rest that is long enough to tell north, and the longest that is taken at once, s.
-SHORTEST, LONGEST = 60.0, 300.0
-#: Epochs of a rest are no farther apart, s.
-APART = 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +79,7 @@ def compasses_of(
     record: NavigationRecord,
     aligned: Sequence[Aligned],
     ellipsoid: Ellipsoid,
-) -> tuple[list[Compass], str]:
+) -> tuple[list[Compass], list[float], str]:
     """Return what the alignments and the rests of a run found, each by itself.
 
     Of an alignment that was told its heading, and of each rest that an aid saw, a fine alignment of
@@ -106,72 +102,99 @@ def compasses_of(
     -------
     compasses : list of Compass
         In the order of time.
+    doubts : list of float, s
+        Ends of rests at which the gyros were not what they are stated to be.
     why : str
         Why there is none, in words; empty where there is one.
     """
     found: list[Compass] = []
     refused: list[str] = []
-    rests = list(_rests(chain, record))
+    doubts: list[float] = []
+    rests = seen_rests(chain, imu, record)
     coarse: Alignment | None = None
+    fines = {one.begin for one in aligned if one.fine is not None}
     for one in aligned:
         if one.fine is None:
             coarse = one.alignment
+            # One by course moved, and one before a fine alignment is the begin of that.
+            if coarse.velocity is None and one.end not in fines and one.end - one.begin >= SHORTEST:
+                rests.append((one.begin, one.end))
             continue
         begin = float(one.fine.history.index[0])
         if one.fine.heading_given:
             rests.append((begin, one.end))
             continue
-        against = _against(one.fine, coarse)
+        against, of_gyros = _against(one.fine, coarse)
+        if of_gyros:
+            doubts.append(one.end)
         if against:
             refused.append(f"its alignment does not bear itself out ({against})")
         else:
-            found.append(_judged(one.fine, begin))
+            found.append(
+                _judged(one.fine, begin, _site(record, one.fine.alignment.time, ellipsoid))
+            )
     for begin, end in sorted(rests):
+        site = _site(record, end, ellipsoid)
         try:
-            fine, before = _aligned_anew(imu, record, sensors, begin, end, ellipsoid)
+            fine, before = _aligned_anew(imu, site, sensors, begin, end)
         except StrapdownError as error:
             refused.append(f"a rest did not tell north ({error.what.partition(': ')[0]})")
             continue
-        against = _against(fine, before)
+        against, of_gyros = _against(fine, before)
+        if of_gyros:
+            doubts.append(end)
         if against:
             refused.append(f"a rest does not bear itself out ({against})")
         else:
-            found.append(_judged(fine, begin))
+            found.append(_judged(fine, begin, site))
     if found:
-        return sorted(found, key=lambda one: one.time), ""
+        return sorted(found, key=lambda one: one.time), doubts, ""
     if refused:
-        return [], refused[-1]
-    return [], "it found north by no fine alignment, and no aid saw it stand for a minute"
+        return [], doubts, refused[-1]
+    return [], doubts, "it found north by no fine alignment, and no aid saw it stand for a minute"
 
 
-def _judged(fine: FineResult, begin: float) -> Compass:
+def _judged(fine: FineResult, begin: float, site: Site) -> Compass:
     """A heading with what its own rest shows of the gyros.
 
     An east rate that is none of the Earth's and a heading look alike. The rest shows those to the
-    north and down, which must be the Earth's: with u their number of standard deviations, the
-    heading errs by as much as they do, and is within 9.92 rms(u) of its own in 99 of 100 cases,
-    however good the gyros are (Student's t with two degrees of freedom).
+    north and down, which must be the Earth's. How good the gyros are is then known by what is
+    stated, which counts as one observation, and by these n, u of their standard deviations each:
+    the heading is within ``t sqrt((1 + sum u²)/(1 + n))`` of its own in 99 of 100 cases, with t of
+    Student's distribution of 1 + n degrees of freedom.
     """
     found = fine.alignment
-    scatter = max(1.0, _scatter(fine))
-    sd = float(found.sd_deg[2]) * scatter
-    bound = sd * max(SURE, STUDENT_2 * math.sqrt(float(np.mean(np.square(_surprise(fine))))))
+    sd = float(found.sd_deg[2]) * max(1.0, _scatter(fine))
+    u = _surprises(fine, site)
+    size = math.sqrt((1.0 + float(u @ u)) / (1.0 + len(u)))
     assert found.gyro_bias is not None
-    return Compass(begin, found.time, found.q_nb, found.gyro_bias, sd, bound)
+    return Compass(
+        begin, found.time, found.q_nb, found.gyro_bias, sd, sd * max(SURE, STUDENT[len(u)] * size)
+    )
 
 
-def _surprise(fine: FineResult) -> Array:
-    """Rates to the north and down that are none of the Earth's, by what was expected of them."""
+def _surprises(fine: FineResult, site: Site) -> Array:
+    """Rates to the north and down that are none of the Earth's, by what was expected of them.
+
+    One that was seen less well than the heading itself, as that about the vertical of a body that
+    rocks, shows nothing of the gyros.
+    """
     found = fine.alignment
     assert found.gyro_bias is not None
     C_nb = rotation.dcm_from_quaternion(found.q_nb)
     before = C_nb @ np.diag(np.square(fine.filter.model.sensors[0].sd[:3])) @ C_nb.T
     gyros = slice(PHYSICAL, PHYSICAL + 3)
     after = C_nb @ fine.filter.physical_covariance(fine.state)[gyros, gyros] @ C_nb.T
-    told = np.diagonal(before - after)[[0, 2]]
-    rate = (C_nb @ found.gyro_bias)[[0, 2]]
-    # What a rest did not tell at all surprises nobody, and bears nothing out.
-    return np.asarray(np.where(told > 0.0, rate / np.sqrt(np.where(told > 0.0, told, 1.0)), np.inf))
+    rate = C_nb @ found.gyro_bias
+    of_heading = math.radians(float(found.sd_deg[2])) * float(np.linalg.norm(site.earth_rate[:2]))
+    out = []
+    for k in (0, 2):
+        told = float(before[k, k] - after[k, k])
+        # An estimate of the variance `told` is that of a reading with this much noise.
+        noise = before[k, k] * after[k, k] / told if told > 0.0 else math.inf
+        if noise <= of_heading**2:
+            out.append(float(rate[k]) / math.sqrt(told))
+    return np.array(out)
 
 
 def _scatter(fine: FineResult) -> float:
@@ -185,66 +208,44 @@ def _scatter(fine: FineResult) -> float:
     return worst
 
 
-def _against(fine: FineResult, coarse: Alignment | None) -> str:
-    """What speaks against an alignment, in a few words; empty if nothing does."""
-    for one in fine.findings:
-        if one.quantity != ROCKS:
-            return one.what.partition(":")[0].partition(" (")[0]
+def _against(fine: FineResult, coarse: Alignment | None) -> tuple[str, bool]:
+    """What speaks against an alignment, in a few words, and whether it is the gyros.
+
+    A vehicle that does not quite stand tells nothing; gyros that read what they should not have
+    changed since they were believed.
+    """
+    told = [one for one in fine.findings if one.quantity != ROCKS]
+    for one in told:
+        if (one.quantity or "").startswith("gyro"):
+            return one.what.partition(",")[0], True
+    if told:
+        return told[0].what.partition(":")[0].partition(" (")[0].partition(",")[0], False
     scatter = _scatter(fine)
     if scatter > INCONSISTENT:
-        return f"what it observed scatters {scatter:.2g} times as much as it should"
+        return f"what it observed scatters {scatter:.2g} times as much as it should", False
     if coarse is None or coarse.heading_given:
-        return ""
+        return "", False
     beside = fine.at_start if abs(coarse.time - fine.at_start.time) < 1.0 else fine.alignment
     apart = rotation.within_half_turn(coarse.roll_pitch_heading[2] - beside.roll_pitch_heading[2])
     if abs(float(apart)) > SURE * math.hypot(float(coarse.sd_deg[2]), float(beside.sd_deg[2])):
-        return f"coarse and fine alignment differ by {abs(float(apart)):.2g}°"
-    return ""
+        return f"coarse and fine alignment differ by {abs(float(apart)):.2g}°", True
+    return "", False
 
 
 def _aligned_anew(
-    imu: pd.DataFrame,
-    record: NavigationRecord,
-    sensors: ImuUncertainty,
-    begin: float,
-    end: float,
-    ellipsoid: Ellipsoid,
+    imu: pd.DataFrame, site: Site, sensors: ImuUncertainty, begin: float, end: float
 ) -> tuple[FineResult, Alignment]:
     """A fine alignment of a rest, from its samples and its place alone."""
     time = index_of(imu)
     first, last = np.searchsorted(time, [begin - 1e-6, end + 1e-6])
     part = imu.iloc[first:last]
     part.attrs = dict(imu.attrs)
-    row = min(int(np.searchsorted(index_of(record.trajectory), end)), len(record.trajectory) - 1)
-    lat_deg, lon_deg, alt = (float(record.trajectory[c].iloc[row]) for c in GEODETIC)
-    site = Site(lat_deg, lon_deg, alt, ellipsoid)
     coarse = InertialFrame().align(part, site, sensors)
     return FineAlignment().align(part, site, sensors, coarse), coarse
 
 
-def _rests(chain: Chain, record: NavigationRecord) -> Iterator[tuple[float, float]]:
-    """Begins and ends of the rests that aids saw, in parts that are not too long."""
-    windows = {aid.name: aid.window for aid in chain.navigator.aids if _stands(aid)}
-    told = [
-        (index_of(table), windows[name.rpartition(".")[0]])
-        for name, table in record.innovations.items()
-        if name.rpartition(".")[0] in windows and len(table)
-    ]
-    if not told:
-        return
-    time = np.unique(np.concatenate([one for one, _ in told]))
-    window = max(one for _, one in told)
-    starts = np.flatnonzero(np.diff(time, prepend=-math.inf) > APART)
-    for k, upto in zip(starts.tolist(), [*starts[1:].tolist(), len(time)], strict=True):
-        # The first and the last second of a stop are those of its braking and starting.
-        begin, end = float(time[k]), float(time[upto - 1]) - window
-        count = max(1, math.floor((end - begin) / LONGEST))
-        if end - begin < SHORTEST:
-            continue
-        edges = np.linspace(begin, end, count + 1)
-        yield from zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True)
-
-
-def _stands(aid: object) -> bool:
-    """Whether an aid tells the rests of a vehicle: a foot stands for no minute, and turns."""
-    return isinstance(aid, StandstillAid)
+def _site(record: NavigationRecord, time: float, ellipsoid: Ellipsoid) -> Site:
+    """Where a run says that it was."""
+    row = min(int(np.searchsorted(index_of(record.trajectory), time)), len(record.trajectory) - 1)
+    lat_deg, lon_deg, alt = (float(record.trajectory[c].iloc[row]) for c in GEODETIC)
+    return Site(lat_deg, lon_deg, alt, ellipsoid)

@@ -17,8 +17,8 @@ from strapdown.config.navigation_modules import make_filter
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.evaluation.heading_light import (
     SURE,
-    Heard,
     HeadingLight,
+    Heard,
     LightSpan,
     heading_light,
     recent_scatter,
@@ -210,12 +210,12 @@ def _carried(
     if not SURE * north <= spec.trust.heading_limit_deg:
         return [], f"its gyros find north to ± {north:.2g}° only"
     try:
-        found, why = compasses_of(chain, sensors, imu, record, aligned, ellipsoid)
+        found, doubts, why = compasses_of(chain, sensors, imu, record, aligned, ellipsoid)
         if not found:
             return [], why
         end = float(record.trajectory.index[-1])
         steps = joined_steps(chain.intake, imu, found[0].time, end)
-        return carry_headings(found, steps, record, sensors, ellipsoid), ""
+        return carry_headings(found, doubts, steps, record, sensors, ellipsoid), ""
     except StrapdownError as error:
         return [], f"its gyros could not be followed ({error.what})"
 
