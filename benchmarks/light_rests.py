@@ -49,7 +49,7 @@ def inertial(
     stops = int(rng.integers(1, 4)) if stops is None else stops
     table: dict[str, object] = {
         "simulation": {
-            "rate_hz": 50.0,
+            "rate_hz": 25.0,
             "seed": seed,
             "motion": {
                 "kind": "car",
@@ -76,15 +76,20 @@ def autonomous(seed: int) -> Case:
     return inertial(seed, stops=0, length=3300.0)
 
 
-def with_steps(seed: int, least: float, most: float, stops: int | None, zero_rate: bool) -> Case:
-    """A gyro whose bias changes after the alignment, by so many of its standard deviations."""
-    case = inertial(seed, stops)
+def with_steps(
+    seed: int, least: float, most: float, stops: int, zero_rate: bool, length: float
+) -> Case:
+    """A gyro whose bias changes after the alignment, by so many of its standard deviations.
+
+    Half of them are the vertical one, which the velocity shows last.
+    """
+    case = inertial(seed, stops, length)
     if zero_rate:
         case.table["aiding"]["rate"] = {"kind": "zero_rate"}
     bias = bias_of(case)
     step = np.zeros(3)
     size = np.exp(case.rng.uniform(np.log(least), np.log(most)))
-    step[case.rng.integers(3)] = case.rng.choice([-1.0, 1.0]) * size * bias
+    step[case.rng.choice([0, 1, 2, 2])] = case.rng.choice([-1.0, 1.0]) * size * bias
     at = case.rng.uniform(COARSE + FINE, COARSE + FINE + 900.0)
 
     def imu(table: pd.DataFrame) -> pd.DataFrame:
@@ -102,15 +107,15 @@ def bias_of(case: Case) -> float:
 
 
 def step_with_stops(seed: int) -> Case:
-    return with_steps(seed, 30.0, 1000.0, None, bool(seed % 2))
+    return with_steps(seed, 100.0, 1000.0, 3, bool(seed % 2), 3000.0)
 
 
 def small_step(seed: int) -> Case:
-    return with_steps(seed, 3.0, 30.0, 0, False)
+    return with_steps(seed, 3.0, 30.0, 0, False, 3300.0)
 
 
 def large_step(seed: int) -> Case:
-    return with_steps(seed, 300.0, 3000.0, 0, False)
+    return with_steps(seed, 300.0, 3000.0, 0, False, 3300.0)
 
 
 def wrong_latitude(seed: int) -> Case:

@@ -29,7 +29,6 @@ __all__ = [
     "SURE",
     "WITNESSES",
     "HeadingLight",
-    "Heard",
     "LightSpan",
     "heading_light",
     "recent_scatter",

@@ -88,7 +88,7 @@ def light_picture(result: NavigationResult) -> Picture:
     carried = np.where(np.isfinite(table["carried"]), table["carried"], light.red)
     curves = [
         _Curve("bound of the run itself (95 %)", time, bound, BLUE),
-        _Curve("bound that a second reckoning bears out (99 %)", time, carried, INK, 2.2),
+        _Curve("bound that a witness bears out (99 %)", time, carried, INK, 2.2),
     ]
     error = heading_error(result, time)
     if error is not None:

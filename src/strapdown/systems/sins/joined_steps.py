@@ -43,7 +43,7 @@ class JoinedSteps:
 
 
 def steps_of(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> Iterator[JoinedSteps]:
-    """Give the motion increments within a span as they are, a minute at a time; see `joined_steps`."""
+    """Give motion increments within a span as they are, a minute at a time."""
     time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
     state = intake.begin(imu.attrs["sampling"], None)
     cuts = np.searchsorted(

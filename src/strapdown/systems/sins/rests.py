@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -71,5 +72,5 @@ def seen_rests(
             continue
         count = max(1, math.floor((end - begin) / LONGEST))
         edges = np.linspace(begin, end, count + 1).tolist()
-        out += list(zip(edges[:-1], edges[1:], strict=True))
+        out += itertools.pairwise(edges)
     return out
