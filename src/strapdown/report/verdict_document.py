@@ -182,7 +182,7 @@ def _heading(result: NavigationResult) -> tuple[Block, ...]:
                 "warning",
             )
         )
-    if trust.advice:
+    if any(a.options for a in trust.advice):
         rows = tuple(
             (
                 f"{a.span.colour.capitalize()}, {span_words(a.span)}",
@@ -192,16 +192,15 @@ def _heading(result: NavigationResult) -> tuple[Block, ...]:
         )
         blocks += [
             Paragraph(
-                "What would have helped, at the end of the longest stretches that were not green"
-                + (
-                    " (by the covariance of the filter, taken over the manoeuvre, without what was "
-                    "assumed of the heading):"
-                    if any(a.options for a in trust.advice)
-                    else ":"
-                )
+                "What would have helped, at the end of the longest stretches that were not green "
+                "(by the covariance of the filter, taken over the manoeuvre, without what was "
+                "assumed of the heading):"
             ),
             Items(rows),
         ]
+    elif trust.advice:
+        said = advice_words(trust.advice[-1], trust)
+        blocks.append(Paragraph(f"What would have helped: {said}."))
     table = _against_truth(result)
     return (*blocks, *(() if table is None else (table,)))
 

@@ -138,7 +138,7 @@ def compasses_of(
         try:
             fine, before = _aligned_anew(imu, site, sensors, begin, end)
         except StrapdownError as error:
-            refused.append(f"a rest did not tell north ({error.what.partition(': ')[0]})")
+            refused.append(f"a rest did not tell north ({error.finding.what.partition(': ')[0]})")
             continue
         against, of_gyros = _against(fine, before)
         if of_gyros:

@@ -151,7 +151,7 @@ def trust_of(
     progress("judging the heading", 0.0)
     consistency = consistency_of_all(record.innovations)
     evidence: list[Evidence] = []
-    made, why = None, _unable(record)
+    made, why = None, _unable(chain, record)
     try:
         if not why:
             made = witnesses_of(make_filter(spec, sensors), chain, imu, tables, record, consistency)
@@ -217,7 +217,7 @@ def _carried(
         steps = joined_steps(chain.intake, imu, found[0].time, end)
         return carry_headings(found, doubts, steps, record, sensors, ellipsoid), ""
     except StrapdownError as error:
-        return [], f"its gyros could not be followed ({error.what})"
+        return [], f"its gyros could not be followed ({error.finding.what})"
 
 
 def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationRecord) -> float:
@@ -225,8 +225,10 @@ def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationR
     return north_within(sensors, lat_deg, find_ellipsoid(spec.ellipsoid))
 
 
-def _unable(record: NavigationRecord) -> str:
-    """Why witnesses cannot be begun from a record."""
+def _unable(chain: Chain, record: NavigationRecord) -> str:
+    """Why witnesses by fixes cannot be begun from a record."""
+    if not any(type(aid) is Gnss for aid in chain.navigator.aids):
+        return "it took no fixes of a satellite receiver"
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     if len(time) < 2 or float(np.median(np.diff(time))) > LONGEST_STEP:
         return "the recorder keeps fewer than four states a second"

@@ -206,7 +206,7 @@ def test_what_nobody_sees_grows_by_the_hour(sound):
     sd = first["witness_sd"].to_numpy()
     hours = (first.index[-1] - first.index[0]) / 3600.0
     bias = np.hypot(0.01, 0.003)
-    # Noise of 0.001 deg/√h, the bias itself, and 110 deg by a scale factor and an axis that are off.
+    # Noise of 0.001 deg/√h, the bias, and 110 deg by a scale factor and an axis that are off.
     scale = 110.0 * np.hypot(10e-6, 0.05e-3)
     chance = np.sqrt(0.001**2 * hours + (bias * hours) ** 2 + scale**2)
     expected = UNSEEN * bias * hours + SURE * chance
