@@ -138,6 +138,8 @@ def compasses_of(
         try:
             fine, before = _aligned_anew(imu, site, sensors, begin, end)
         except StrapdownError as error:
+            # It stood, by its aids, and its gyros do not show that.
+            doubts.append(end)
             refused.append(f"a rest did not tell north ({error.finding.what.partition(': ')[0]})")
             continue
         against, of_gyros = _against(fine, before)
@@ -216,7 +218,7 @@ def _against(fine: FineResult, coarse: Alignment | None) -> tuple[str, bool]:
     """
     told = [one for one in fine.findings if one.quantity != ROCKS]
     for one in told:
-        if (one.quantity or "").startswith("gyro"):
+        if (one.quantity or "").startswith("gyro") or "rad/s" in (one.quantity or ""):
             return one.what.partition(",")[0], True
     if told:
         return told[0].what.partition(":")[0].partition(" (")[0].partition(",")[0], False
