@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown._kernels.attitude import quaternion_advance
 from strapdown.ellipsoids import Ellipsoid
-from strapdown.evaluation.heading_light import SURE, seconds_of
+from strapdown.evaluation.heading_light import GROWS, SURE, seconds_of
 from strapdown.frames import q_ne
 from strapdown.navigation.record import NavigationRecord
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -167,7 +167,8 @@ class _Carried:
         scale = float(np.max(np.hypot(gyro.axis("scale"), gyro.axis("misalignment"))))
         turned = np.interp(time, self.time, self.turned)
         chance = np.sqrt(noise**2 * since + (bias * since) ** 2 + (scale * turned) ** 2)
-        grown = np.degrees(SURE * chance + UNSEEN * bias * since)
+        unseen = UNSEEN * bias + GROWS * self.compass.unsteady
+        grown = np.degrees(SURE * chance + unseen * since)
         return self.compass.bound + grown, SURE * self.compass.sd + grown
 
     def agrees(self, later: Compass) -> bool:

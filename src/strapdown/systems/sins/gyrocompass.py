@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -26,8 +26,8 @@ from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.piece import Aligned
 from strapdown.systems.sins.rests import SHORTEST, seen_rests
-from strapdown.tables import GEODETIC
-from strapdown.tables.checks import index_of
+from strapdown.tables import GEODETIC, GYRO
+from strapdown.tables.checks import index_of, values_of
 
 __all__ = ["Compass", "compasses_of", "north_within"]
 
@@ -37,6 +37,8 @@ Array = NDArray[np.float64]
 STUDENT = (63.656741162872, 9.924843200918, 5.840909309733)
 #: Root mean square of normalised innovations beyond which an alignment says nothing.
 INCONSISTENT = 2.0
+#: A body whose turns about the vertical, each second, scatter more rocks, rad/s.
+ROCKS_BY = math.radians(0.01)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,19 +51,26 @@ class Compass:
         Of the rest, and the instant at which it holds.
     q_nb : ndarray, (4,)
     gyro_bias : ndarray, (3,), rad/s
+    lat_deg : float, deg
+        Of the place.
     sd : float, deg
         Of the heading, by what is stated of the gyros, times what its innovations scatter too
         much.
     bound : float, deg
         Of 99 of 100 headings, by what the rest itself shows of the gyros.
+    unsteady : float, rad/s
+        Mean rate about the vertical that is neither the Earth's nor the bias that was found: a
+        gyro that changed within the rest.
     """
 
     begin: float
     time: float
     q_nb: Array
     gyro_bias: Array
+    lat_deg: float
     sd: float
     bound: float
+    unsteady: float = 0.0
 
 
 def north_within(sensors: ImuUncertainty, lat_deg: float, ellipsoid: Ellipsoid) -> float:
@@ -149,6 +158,7 @@ def compasses_of(
             refused.append(f"a rest does not bear itself out ({against})")
         else:
             found.append(_judged(fine, begin, site))
+    found = [replace(one, unsteady=_unsteady(imu, one, sensors, ellipsoid)) for one in found]
     if found:
         return sorted(found, key=lambda one: one.time), doubts, ""
     if refused:
@@ -171,8 +181,33 @@ def _judged(fine: FineResult, begin: float, site: Site) -> Compass:
     size = math.sqrt((1.0 + float(u @ u)) / (1.0 + len(u)))
     assert found.gyro_bias is not None
     return Compass(
-        begin, found.time, found.q_nb, found.gyro_bias, sd, sd * max(SURE, STUDENT[len(u)] * size)
+        begin,
+        found.time,
+        found.q_nb,
+        found.gyro_bias,
+        site.lat_deg,
+        sd,
+        sd * max(SURE, STUDENT[len(u)] * size),
     )
+
+
+def _unsteady(
+    imu: pd.DataFrame, one: Compass, sensors: ImuUncertainty, ellipsoid: Ellipsoid
+) -> float:
+    """Mean rate about the vertical over a rest, less the Earth's and the bias; rad/s."""
+    time = index_of(imu)
+    first, last = np.searchsorted(time, [one.begin, one.time])
+    rates = values_of(imu, GYRO)[first:last]
+    C_nb = rotation.dcm_from_quaternion(one.q_nb)
+    down = (rates - one.gyro_bias) @ C_nb[2]
+    length = max(one.time - one.begin, 1.0)
+    parts = max(2, round(length))
+    turns = np.array([part.mean() for part in np.array_split(down, parts)])
+    if float(np.std(turns)) > ROCKS_BY:
+        return 0.0
+    earth = float(Site(one.lat_deg, 0.0, 0.0, ellipsoid).earth_rate[2])
+    noise = float(np.max(sensors.gyro.axis("noise_density"))) / math.sqrt(length)
+    return max(0.0, abs(float(down.mean()) - earth) - 3.0 * noise)
 
 
 def _surprises(fine: FineResult, site: Site) -> Array:
