@@ -2,7 +2,10 @@
 
 Green is a promise: the heading is within the limit that was asked for. It is given where two
 reckonings say so that do not share what was assumed at the start: the run by its own bound, and a
-witness that began with no heading at all (`systems.sins.heading_witness`) by its own.
+witness by its own. That is a reckoning by fixes that began with no heading at all
+(`systems.sins.heading_witness`), what the gyros found of north at rest and carried on
+(`systems.sins.carried_heading`), or two sources that share nothing
+(`systems.sins.heading_sources`).
 """
 
 from __future__ import annotations
@@ -20,7 +23,17 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.exceptions import ConfigError
 from strapdown.navigation.record import NavigationRecord
 
-__all__ = ["COLOURS", "REASONS", "HeadingLight", "LightSpan", "heading_light", "recent_scatter"]
+__all__ = [
+    "COLOURS",
+    "REASONS",
+    "SURE",
+    "WITNESSES",
+    "HeadingLight",
+    "LightSpan",
+    "heading_light",
+    "recent_scatter",
+    "seconds_of",
+]
 
 Array = NDArray[np.float64]
 
@@ -35,6 +48,12 @@ REASONS: dict[str, str] = {
     "scatter": "observations scatter more than they should",
     "apart": "a reckoning that began without a heading says otherwise",
     "unknown": "it is hardly known",
+}
+#: Who bears a heading out, by kind.
+WITNESSES: dict[str, str] = {
+    "motion": "a second reckoning by fixes",
+    "gyrocompass": "north as the gyros found it at rest",
+    "sources": "two sources of a heading that share nothing",
 }
 #: Two-sided quantile of 99 of 100 normal numbers: beyond it nothing is by chance, and within it a
 #: witness bounds an error.
@@ -54,7 +73,10 @@ CLIP, REJECTED = 4.0, 3.0
 
 
 class Heard(Protocol):
-    """What a witness said: see `systems.sins.heading_witness.Evidence`."""
+    """What a witness said: see `systems.sins.heading_witness.Evidence`.
+
+    Its `kind` is one of `WITNESSES`.
+    """
 
     @property
     def since(self) -> float: ...
@@ -64,6 +86,8 @@ class Heard(Protocol):
     def difference(self) -> Array: ...
     @property
     def sd(self) -> Array: ...
+    @property
+    def kind(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -95,8 +119,8 @@ class HeadingLight:
         of `REASONS`), ``bound`` (1.96 standard deviations of the run, deg), ``difference`` (run
         less witness, deg), ``witness_sd`` (deg), ``witnessed`` (`SURE` standard deviations of the
         witness and the difference, deg), ``carried`` (that, or an earlier one with what was added
-        since, deg: what green goes by), ``witness_since`` (s), ``scatter`` (of the innovations, by
-        what was expected).
+        since, deg: what green goes by), ``witness_since`` (s), ``witness`` (a key of `WITNESSES`,
+        or empty), ``scatter`` (of the innovations, by what was expected).
     green, red : float, deg
         Limits.
     """
@@ -177,8 +201,7 @@ def heading_light(
     after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
     before = np.clip(after - 1, 0, None)
     own = np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))
-    best = _best(seconds, evidence)
-    difference, witness, since = best
+    difference, witness, since, who = _best(seconds, evidence)
     witnessed = np.abs(difference) + SURE * witness
     spread = np.ones(count) if scatter is None else scatter
     bound = TWO_SIDED_95 * own
@@ -213,6 +236,7 @@ def heading_light(
             "witnessed": witnessed,
             "carried": carried,
             "witness_since": since,
+            "witness": who,
             "scatter": spread,
         },
         index=pd.Index(seconds, name="time"),
@@ -267,9 +291,12 @@ def recent_scatter(record: NavigationRecord) -> Array:
     return worst
 
 
-def _best(seconds: Array, evidence: Sequence[Heard]) -> tuple[Array, Array, Array]:
-    """Difference, standard deviation and begin of the witness that bounds each second best."""
+def _best(
+    seconds: Array, evidence: Sequence[Heard]
+) -> tuple[Array, Array, Array, NDArray[np.object_]]:
+    """Difference, deviation, begin and kind of the witness that bounds each second best."""
     difference, sd, since = (np.full(len(seconds), np.nan) for _ in range(3))
+    who = np.full(len(seconds), "", dtype=object)
     least = np.full(len(seconds), np.inf)
     for one in evidence:
         at = np.searchsorted(seconds, one.time - 1e-6)
@@ -278,8 +305,9 @@ def _best(seconds: Array, evidence: Sequence[Heard]) -> tuple[Array, Array, Arra
         better = np.abs(d) + SURE * s < least[at]
         at = at[better]
         difference[at], sd[at], since[at] = d[better], s[better], one.since
+        who[at] = one.kind
         least[at] = (np.abs(d) + SURE * s)[better]
-    return difference, sd, since
+    return difference, sd, since, who
 
 
 def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.bool_]) -> Array:

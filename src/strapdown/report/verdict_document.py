@@ -37,7 +37,9 @@ from strapdown.report.verdict_words import (
     promise,
     repeated_words,
     span_words,
+    witness_words,
 )
+from strapdown.systems.sins.carried_heading import UNSEEN
 from strapdown.systems.sins.result import NavigationResult
 
 __all__ = ["light_section", "verdict_document"]
@@ -175,14 +177,17 @@ def _heading(result: NavigationResult) -> tuple[Block, ...]:
     if trust.unwitnessed:
         blocks.append(
             Paragraph(
-                f"Nothing could bear the heading out, for {trust.unwitnessed}: it rests on its "
-                "start, or on one aid alone, and is not green at any time.",
+                f"Nothing could bear the heading out: {trust.unwitnessed}. It rests on its start, "
+                "or on one source alone, and is not green at any time.",
                 "warning",
             )
         )
-    if trust.advice:
+    if any(a.options for a in trust.advice):
         rows = tuple(
-            (f"{a.span.colour.capitalize()}, {span_words(a.span)}", _capital(advice_words(a)))
+            (
+                f"{a.span.colour.capitalize()}, {span_words(a.span)}",
+                _capital(advice_words(a, trust)),
+            )
             for a in trust.advice
         )
         blocks += [
@@ -193,6 +198,9 @@ def _heading(result: NavigationResult) -> tuple[Block, ...]:
             ),
             Items(rows),
         ]
+    elif trust.advice:
+        said = advice_words(trust.advice[-1], trust)
+        blocks.append(Paragraph(f"What would have helped: {said}."))
     table = _against_truth(result)
     return (*blocks, *(() if table is None else (table,)))
 
@@ -204,7 +212,10 @@ def _reasons(result: NavigationResult) -> TableBlock:
         those = table[table["light"] == number]
         for reason, count in those["reason"].value_counts().items():
             share = share_words(count / len(table))
-            rows.append((colour, REASONS[str(reason)], f"{count}", share))
+            why = REASONS[str(reason)]
+            if colour == "green" and witness_words(result.trust):
+                why = f"{why}: the run, and {witness_words(result.trust)}"
+            rows.append((colour, why, f"{count}", share))
     return TableBlock(
         ("light", "why", "seconds", "of the time"), tuple(rows), (0, 1), "The light, and why"
     )
@@ -306,7 +317,9 @@ def _first(result: NavigationResult) -> tuple[Block, ...]:
 def _limits() -> Block:
     return Paragraph(
         "What no light can tell: a record whose fixes are all wrong in the same way, as of a "
-        "receiver that is led astray with a motion of its own, agrees with itself.",
+        "receiver that is led astray with a motion of its own, agrees with itself. And a gyro that "
+        f"changes by more than {UNSEEN:g} standard deviations of its bias after the last rest, in "
+        "a run without fixes, is seen by nothing before the next one.",
         "note",
     )
 

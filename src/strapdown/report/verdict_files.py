@@ -16,7 +16,13 @@ from strapdown.navigation.first_inconsistency import Inconsistency
 from strapdown.report.document_files import write_text
 from strapdown.report.document_html import document_page
 from strapdown.report.verdict_document import verdict_document
-from strapdown.report.verdict_words import answer, first_words, promise, repeated_words
+from strapdown.report.verdict_words import (
+    answer,
+    first_words,
+    promise,
+    repeated_words,
+    witness_words,
+)
 from strapdown.systems.sins.repeat_without import Repeated
 from strapdown.systems.sins.result import NavigationResult
 
@@ -45,6 +51,7 @@ def write_verdict(result: NavigationResult, name: str, folder: Path) -> None:
             "reason": np.array([str(r) for r in table["reason"]], dtype=np.str_),
             "bound_95_deg": table["bound"].to_numpy(dtype=np.float64),
             "borne_out_99_deg": table["carried"].to_numpy(dtype=np.float64),
+            "witness": np.array([str(w) for w in table["witness"]], dtype=np.str_),
             "witness_difference_deg": table["difference"].to_numpy(dtype=np.float64),
             "witness_sd_deg": table["witness_sd"].to_numpy(dtype=np.float64),
             "witness_since_s": table["witness_since"].to_numpy(dtype=np.float64),
@@ -76,6 +83,7 @@ def verdict_json(result: NavigationResult) -> dict[str, Any]:
             "red_beyond_deg": light.red,
             "borne_out": not trust.unwitnessed,
             "why_not": trust.unwitnessed or None,
+            "borne_out_by": witness_words(trust) or None,
             "share": {c: light.share(c) for c in COLOURS},
             "at_end": spans[-1].colour if spans else None,
             "spans": [

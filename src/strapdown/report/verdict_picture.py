@@ -83,14 +83,16 @@ def light_picture(result: NavigationResult) -> Picture:
     bound = table["bound"].to_numpy(dtype=np.float64)
     # Decades from below the best that is known up to where it is hardly known.
     known = min(float(np.nanmin(bound)), light.green) if np.isfinite(bound).any() else light.green
+    error = heading_error(result, time)
+    if error is not None and np.isfinite(error).any():
+        known = min(known, max(float(np.nanmedian(np.abs(error))), 1e-3))
     least = 10.0 ** math.floor(math.log10(max(known, 1e-4)))
     frame = _Frame(8.0 + STRIP + GAP, PANEL, begin, end, light.red, least, log=True)
     carried = np.where(np.isfinite(table["carried"]), table["carried"], light.red)
     curves = [
         _Curve("bound of the run itself (95 %)", time, bound, BLUE),
-        _Curve("bound that a second reckoning bears out (99 %)", time, carried, INK, 2.2),
+        _Curve("bound that a witness bears out (99 %)", time, carried, INK, 2.2),
     ]
-    error = heading_error(result, time)
     if error is not None:
         name = f"error against {result.source.truth_name}"
         curves.append(_Curve(name, time, np.abs(error), VERMILLION, 1.6, "dot"))

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from strapdown.evaluation.heading_light import REASONS, LightSpan
+from strapdown.evaluation.heading_light import REASONS, SURE, WITNESSES, LightSpan
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.first_inconsistency import Inconsistency
 from strapdown.report.alignment_values import instant
@@ -32,6 +32,7 @@ __all__ = [
     "repeated_words",
     "span_words",
     "terminal_lines",
+    "witness_words",
 ]
 
 _KINDS = {
@@ -83,6 +84,9 @@ def heading_words(trust: Trust) -> str:
     now = "at the end it is " + (
         "green." if last.colour == "green" else f"{last.colour}: {REASONS[last.reason]}."
     )
+    witness = witness_words(trust)
+    if witness and last.colour == "green":
+        now = f"{now[:-1]}, borne out by {witness}."
     if trust.unwitnessed:
         now += f" Nothing could bear it out: {trust.unwitnessed}."
     return f"Heading: {said} of the time; {now}"
@@ -95,20 +99,23 @@ def promise(trust: Trust) -> tuple[tuple[str, str], ...]:
         (
             "Green",
             f"the heading is within {green}°. Two reckonings say so that share no assumption of "
-            f"it: the run's own bound of 95{GAP}% is below {green}°, and a second reckoning, "
-            "which began with no heading at all and was told fixes alone, puts the run within "
-            f"{green}° with 99{GAP}% (now, or within the last minute with what the gyros may have "
-            "added since); and what was observed scatters as it should.",
+            f"it: the run's own bound of 95{GAP}% is below {green}°, and a witness puts the run "
+            f"within {green}° with 99{GAP}%: a second reckoning that began with no heading at all "
+            "and was told fixes alone (now, or within the last minute with what the gyros may have "
+            "added since); or north as the gyros found it at rest, where the rest itself shows "
+            "how good they are, with what they may have added since; or two sources that share "
+            "nothing. And what was observed scatters as it should.",
         ),
         (
             "Amber",
             f"it may be good, but nothing bears it out: its own bound is below {green}° and rests "
-            "on the start, on an alignment or on one aid; or that bound is beyond "
+            "on the start, on an alignment that does not show how good it is, or on one aid; or "
+            "that bound is beyond "
             f"{green}°; or observations scatter more than twice as much as they should.",
         ),
         (
             "Red",
-            f"do not use it: its bound is beyond {red}°, the second reckoning contradicts it, or "
+            f"do not use it: its bound is beyond {red}°, a witness contradicts it, or "
             "observations scatter more than three times as much as they should.",
         ),
     )
@@ -122,13 +129,10 @@ def span_words(span: LightSpan) -> str:
     )
 
 
-def advice_words(advice: Advice) -> str:
+def advice_words(advice: Advice, trust: Trust) -> str:
     """What would have helped then."""
     if not advice.options:
-        return (
-            "no motion can tell it without fixes of a satellite receiver; with them, or with two "
-            "antennas, it would be known"
-        )
+        return _without_fixes(trust)
     best, sd = advice.options[0]
     text = (
         f"{best.what} with fixes would bring its standard deviation from "
@@ -136,6 +140,30 @@ def advice_words(advice: Advice) -> str:
     )
     others = [f"{one.what} to {degrees_words(after)}" for one, after in advice.options[1:]]
     return text + (f"; {', '.join(others)}" if others else "")
+
+
+def _without_fixes(trust: Trust) -> str:
+    """What would bear a heading out where there are no fixes."""
+    north = f"these gyros find north to ±{GAP}{degrees_words(trust.north_sd)} (one sd)"
+    if SURE * trust.north_sd <= trust.light.green:
+        return (
+            f"{north}: a fine alignment, or a stop of some minutes that an aid sees (kind = "
+            '"zero_velocity"), would bear it out; so would fixes of a satellite receiver, over a '
+            "change of speed or a turn"
+        )
+    return (
+        f"{north}, so that no rest bears it out: fixes of a satellite receiver would, over a "
+        "change of speed or a turn, or a second source of its own kind beside the first, as a "
+        "compass beside two antennas"
+    )
+
+
+def witness_words(trust: Trust) -> str:
+    """Who bore the heading out while it was green, the longest first; empty if nobody."""
+    table = trust.light.table
+    green = table[(table["light"] == 0) & (table["witness"] != "")]
+    kinds = green["witness"].value_counts().index
+    return "; ".join(WITNESSES[str(kind)] for kind in kinds)
 
 
 def kind_words(one: Inconsistency) -> str:
@@ -215,7 +243,7 @@ def terminal_lines(result: NavigationResult) -> list[tuple[str, str]]:
         if said:
             lines.append((said, ""))
     elif trust.advice and trust.light.spans[-1].colour != "green":
-        lines.append((f"For the heading: {advice_words(trust.advice[-1])}.", ""))
+        lines.append((f"For the heading: {advice_words(trust.advice[-1], trust)}.", ""))
     return lines
 
 

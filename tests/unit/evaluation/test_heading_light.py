@@ -27,6 +27,7 @@ class Heard:
     time: np.ndarray
     difference: np.ndarray
     sd: np.ndarray
+    kind: str = "motion"
 
 
 def record_of(heading_sd, innovations=None):

@@ -73,6 +73,7 @@ class Evidence:
         By how much more its innovations scatter, and last, than it expected: 1 or more.
     covariance : ndarray, (n, 9, 9)
         As `NavigationRecord.covariance`, of the witness.
+    kind : str
     """
 
     since: float
@@ -81,6 +82,7 @@ class Evidence:
     sd: Array
     scale: Array
     covariance: Array
+    kind: str = "motion"
 
 
 def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> list[Evidence]:

@@ -130,6 +130,7 @@ def run_navigation(
         source.imu,
         source.tables,
         run.record,
+        run.aligned,
         lambda stage, share: progress(stage, ENDED + 0.02 * share),
     )
     files = () if file is None else (input_files("configuration", str(file), (file,)),)

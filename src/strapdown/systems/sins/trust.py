@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,9 @@ from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import make_filter
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.evaluation.heading_light import (
+    SURE,
     HeadingLight,
+    Heard,
     LightSpan,
     heading_light,
     recent_scatter,
@@ -28,9 +30,14 @@ from strapdown.navigation.first_inconsistency import Inconsistency, inconsistenc
 from strapdown.navigation.record import NavigationRecord
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.progress import Progress
+from strapdown.systems.sins.carried_heading import CarriedHeading, carry_headings
 from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.gyrocompass import compasses_of, north_within
+from strapdown.systems.sins.heading_sources import agreeing_sources
 from strapdown.systems.sins.heading_witness import Evidence, hear_witnesses
+from strapdown.systems.sins.joined_steps import joined_steps
 from strapdown.systems.sins.manoeuvre import Manoeuvre, manoeuvres_from, sd_after
+from strapdown.systems.sins.piece import Aligned
 from strapdown.systems.sins.repeat_without import Repeated, repeat_without
 from strapdown.systems.sins.witness_source import Witnesses, witnesses_of
 from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
@@ -77,6 +84,8 @@ class Trust:
     light : HeadingLight
     unwitnessed : str
         Why nothing could tell a heading by itself, in words; empty where something could.
+    north_sd : float, deg
+        To how much these gyros find north at rest, one standard deviation.
     advice : tuple of Advice
         Of the longest spans that are not green.
     consistency : mapping of str to ObservationConsistency
@@ -89,6 +98,7 @@ class Trust:
 
     light: HeadingLight
     unwitnessed: str
+    north_sd: float
     advice: tuple[Advice, ...]
     consistency: Mapping[str, ObservationConsistency]
     inconsistencies: tuple[Inconsistency, ...]
@@ -112,6 +122,7 @@ def trust_of(
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame],
     record: NavigationRecord,
+    aligned: Sequence[Aligned],
     progress: Progress,
 ) -> Trust:
     """Judge a run.
@@ -127,6 +138,8 @@ def trust_of(
         By name of the aid.
     record : NavigationRecord
         What came of it.
+    aligned : sequence of Aligned
+        Its alignments.
     progress : callable
         Told a stage, and the share of it that is done.
 
@@ -138,7 +151,7 @@ def trust_of(
     progress("judging the heading", 0.0)
     consistency = consistency_of_all(record.innovations)
     evidence: list[Evidence] = []
-    made, why = None, _unable(record)
+    made, why = None, _unable(chain, record)
     try:
         if not why:
             made = witnesses_of(make_filter(spec, sensors), chain, imu, tables, record, consistency)
@@ -148,9 +161,12 @@ def trust_of(
     except StrapdownError as error:
         # Where a second reckoning is not possible, the first one stands without it.
         made, evidence, why = None, [], f"a second reckoning was not possible ({error})"
+    carried, no_north = _carried(spec, chain, sensors, imu, record, aligned)
+    sources = agreeing_sources(chain, record, carried)
+    heard: list[Heard] = [*evidence, *carried, *sources]
     light = heading_light(
         record,
-        evidence,
+        heard,
         recent_scatter(record),
         green=asked.heading_limit_deg,
         red=asked.heading_red_deg,
@@ -171,7 +187,8 @@ def trust_of(
         )
     return Trust(
         light=light,
-        unwitnessed=why,
+        unwitnessed="" if heard or not why else f"{why}; {no_north}",
+        north_sd=_north_sd(spec, sensors, record),
         advice=_advice(light, evidence, made, record),
         consistency=consistency,
         inconsistencies=found,
@@ -179,8 +196,39 @@ def trust_of(
     )
 
 
-def _unable(record: NavigationRecord) -> str:
-    """Why witnesses cannot be begun from a record."""
+def _carried(
+    spec: NavigationSpec,
+    chain: Chain,
+    sensors: ImuUncertainty,
+    imu: pd.DataFrame,
+    record: NavigationRecord,
+    aligned: Sequence[Aligned],
+) -> tuple[list[CarriedHeading], str]:
+    """What rests tell of the headings after them, or why they tell nothing."""
+    ellipsoid = find_ellipsoid(spec.ellipsoid)
+    north = _north_sd(spec, sensors, record)
+    if not SURE * north <= spec.trust.heading_limit_deg:
+        return [], f"its gyros find north to ± {north:.2g}° only"
+    try:
+        found, doubts, why = compasses_of(chain, sensors, imu, record, aligned, ellipsoid)
+        if not found:
+            return [], why
+        end = float(record.trajectory.index[-1])
+        steps = joined_steps(chain.intake, imu, found[0].time, end)
+        return carry_headings(found, doubts, steps, record, sensors, ellipsoid), ""
+    except StrapdownError as error:
+        return [], f"its gyros could not be followed ({error.finding.what})"
+
+
+def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationRecord) -> float:
+    lat_deg = float(record.trajectory["lat"].iloc[0])
+    return north_within(sensors, lat_deg, find_ellipsoid(spec.ellipsoid))
+
+
+def _unable(chain: Chain, record: NavigationRecord) -> str:
+    """Why witnesses by fixes cannot be begun from a record."""
+    if not any(type(aid) is Gnss for aid in chain.navigator.aids):
+        return "it took no fixes of a satellite receiver"
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     if len(time) < 2 or float(np.median(np.diff(time))) > LONGEST_STEP:
         return "the recorder keeps fewer than four states a second"

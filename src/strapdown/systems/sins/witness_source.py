@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown._kernels.motion_blocks import join_blocks
 from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.influence_igg3 import Igg3
@@ -22,20 +21,15 @@ from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import NavigationRecord
 from strapdown.systems.sins.chain import Chain
-from strapdown.systems.sins.intake import Intake
-from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import index_of, values_of
+from strapdown.systems.sins.joined_steps import NEAR, joined_steps
+from strapdown.tables.checks import index_of
 
 __all__ = ["Witnesses", "witnesses_of"]
 
 Array = NDArray[np.float64]
 
-#: Increments are joined to so much, s; fixes are taken no denser, s.
-JOINED, FIXES_APART = 0.1, 1.0
-#: Of the record that is taken at a time, s.
-AT_ONCE = 60.0
-#: Stamps are the same within this, s.
-NEAR = 1e-6
+#: Fixes are taken no denser, s.
+FIXES_APART = 1.0
 #: Nearer to a pole the local north is none.
 POLAR = 85.0
 
@@ -98,7 +92,8 @@ def witnesses_of(
     if not receivers:
         return None
     span = record.trajectory.index
-    time, rows = _joined(chain.intake, imu, float(span[0]), float(span[-1]))
+    steps = joined_steps(chain.intake, imu, float(span[0]), float(span[-1]))
+    time, rows = steps.time, steps.rows
     if len(time) < 2:
         return None
     robust = filter_.rule is not None or any(_robust(aid, consistency) for aid in receivers)
@@ -146,30 +141,6 @@ def _robust(aid: Gnss, consistency: Mapping[str, ObservationConsistency]) -> boo
         if name.partition(".")[0] == aid.name
         for one in of.components
     )
-
-
-def _joined(intake: Intake, imu: pd.DataFrame, begin: float, end: float) -> tuple[Array, Array]:
-    """Motion increments within a span, joined to a tenth of a second."""
-    time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
-    state = intake.begin(imu.attrs["sampling"], None)
-    cuts = np.searchsorted(
-        time, [*np.arange(time[0] + AT_ONCE, time[-1], AT_ONCE), np.inf]
-    ).tolist()
-    ends, joined, at = [np.empty(0)], [np.empty((0, 10))], 0
-    for cut in cuts:
-        state, steps = intake.advance(state, time[at:cut], values[at:cut], cut == len(time))
-        at = cut
-        used = (steps.time > begin + NEAR) & (steps.time <= end + NEAR)
-        rows = np.ascontiguousarray(steps.rows[used])
-        if not len(rows):
-            continue
-        dt = np.ascontiguousarray(rows[:, 0])
-        last, out = np.empty(len(dt), dtype=np.int64), np.empty_like(rows)
-        samples = max(1, round(JOINED / float(np.median(dt))))
-        count = int(join_blocks(dt, samples, rows, last, out))
-        ends.append(steps.time[used][last[:count]])
-        joined.append(out[:count].copy())
-    return np.concatenate(ends), np.concatenate(joined)
 
 
 def _thinned(table: pd.DataFrame) -> pd.DataFrame:

@@ -1,0 +1,126 @@
+"""One drive with truth, run and judged, for the trial of the heading light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown.aiding.heading import Heading
+from strapdown.config.choice import make_choice
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.navigation_checks import given_of, uncertainty_of
+from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.slots import SLOTS
+from strapdown.navigation.navigator import with_states
+from strapdown.systems.progress import silent
+from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.drive import run_batch
+from strapdown.systems.sins.source import NavigationSource, read_navigation_source
+from strapdown.systems.sins.trust import trust_of
+
+LIMIT = 3.0
+KNOWN = 1.0  # deg, stated of the heading at the start
+
+
+@dataclass
+class Case:
+    """A drive that is about to be run; a fault changes it.
+
+    One that aligns itself has a table of its site, and no state at its start.
+    """
+
+    table: dict[str, object]
+    rng: np.random.Generator
+    heading_error: float
+    imu: Callable[[pd.DataFrame], pd.DataFrame] = lambda imu: imu
+    tables: Callable[[dict[str, pd.DataFrame]], dict[str, pd.DataFrame]] = lambda t: t
+    chain: Callable[[Chain], Chain] = lambda c: c
+    truth_turned: float = 0.0
+    extra: Callable[[pd.DataFrame], dict[str, pd.DataFrame]] = lambda truth: {}
+    aligns: bool = False
+
+
+def with_aid(aid: Heading) -> Callable[[Chain], Chain]:
+    def added(chain: Chain) -> Chain:
+        navigator = chain.navigator
+        aids = (*navigator.aids, aid)
+        return replace(
+            chain,
+            navigator=replace(navigator, aids=aids, filter=with_states(navigator.filter, (aid,))),
+        )
+
+    return added
+
+
+def add_antennas(case: Case, offset: float, name: str = "antennas") -> None:
+    """Two antennas once a second, off by some degrees and stated to half of one."""
+    before, told = case.chain, case.extra
+
+    def extra(truth: pd.DataFrame) -> dict[str, pd.DataFrame]:
+        rows = truth.iloc[:: max(1, round(1.0 / float(np.median(np.diff(truth.index)))))]
+        heading = rows["heading"].to_numpy() + offset + 0.5 * case.rng.standard_normal(len(rows))
+        out = pd.DataFrame(
+            {"heading": heading % 360.0, "heading_sd": np.full(len(rows), 0.5)}, index=rows.index
+        )
+        return {**told(truth), name: out}
+
+    case.extra = extra
+    case.chain = lambda chain: with_aid(Heading(name=name))(before(chain))
+
+
+def started(case: Case) -> dict[str, object]:
+    if case.aligns:
+        return case.table
+    motion = case.table["simulation"]["motion"]
+    heading = motion["heading_deg"]
+    speed = motion["speed_m_per_s"]
+    return {
+        **case.table,
+        "start": {
+            "lat_deg": motion["lat_deg"],
+            "lon_deg": motion["lon_deg"],
+            "alt_m": motion["alt_m"],
+            "v_ned_m_per_s": [
+                speed * float(np.cos(np.radians(heading))),
+                speed * float(np.sin(np.radians(heading))),
+                0.0,
+            ],
+            "roll_deg": 0.0,
+            "pitch_deg": 0.0,
+            "heading_deg": (heading + case.heading_error) % 360.0,
+            "position_sd_m": 1.0,
+            "velocity_sd_m_per_s": 0.1,
+            "tilt_sd_deg": 0.5,
+            "heading_sd_deg": KNOWN,
+        },
+    }
+
+
+def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Light, error of the heading in deg, and bound of the run, second by second."""
+    spec: NavigationSpec = navigation_spec(started(case))
+    source: NavigationSource = read_navigation_source(spec)
+    sensors = uncertainty_of(spec)
+    imu = case.imu(source.imu)
+    imu.attrs = dict(source.imu.attrs)
+    tables = case.tables(dict(source.tables))
+    for name, table in tables.items():
+        table.attrs = dict(source.tables[name].attrs)
+    tables |= case.extra(source.truth)
+    chain = case.chain(make_chain(spec, sensors))
+    recorder = make_choice(spec.recorder, SLOTS["recorder"], given_of(spec))
+    ran = run_batch(chain, imu, tables, recorder)
+    record = ran.record
+    light = trust_of(spec, chain, sensors, imu, tables, record, ran.aligned, silent).light.table
+    time = light.index.to_numpy()
+    own = np.interp(
+        time, record.trajectory.index, np.unwrap(np.radians(record.trajectory["heading"]))
+    )
+    true = np.interp(time, source.truth.index, np.unwrap(np.radians(source.truth["heading"])))
+    error = rotation.within_half_turn(np.degrees(own - true) - case.truth_turned)
+    return light["light"].to_numpy(), error, light["bound"].to_numpy()

@@ -1,0 +1,288 @@
+"""What a body at rest tells of its heading by the Earth's rate, and how far it bears itself out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.alignment.alignment import Alignment
+from strapdown.alignment.fine import FineAlignment
+from strapdown.alignment.fine_findings import ROCKS
+from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment.inertial_frame import InertialFrame
+from strapdown.alignment.site import Site
+from strapdown.ellipsoids import Ellipsoid
+from strapdown.estimation.error_model import PHYSICAL
+from strapdown.evaluation.heading_light import SURE
+from strapdown.exceptions import StrapdownError
+from strapdown.navigation.record import NavigationRecord
+from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.piece import Aligned
+from strapdown.systems.sins.rests import SHORTEST, seen_rests
+from strapdown.tables import GEODETIC, GYRO
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["Compass", "compasses_of", "north_within"]
+
+Array = NDArray[np.float64]
+
+#: Two-sided quantiles of 99 of 100 of Student's t, with one degree of freedom to three.
+STUDENT = (63.656741162872, 9.924843200918, 5.840909309733)
+#: Root mean square of normalised innovations beyond which an alignment says nothing.
+INCONSISTENT = 2.0
+#: A body whose turns about the vertical, each second, scatter more rocks, rad/s.
+ROCKS_BY = math.radians(0.01)
+
+
+@dataclass(frozen=True, eq=False)
+class Compass:
+    """A heading that the gyros found at rest, from nothing that was known of it before.
+
+    Attributes
+    ----------
+    begin, time : float, s
+        Of the rest, and the instant at which it holds.
+    q_nb : ndarray, (4,)
+    gyro_bias : ndarray, (3,), rad/s
+    lat_deg : float, deg
+        Of the place.
+    sd : float, deg
+        Of the heading, by what is stated of the gyros, times what its innovations scatter too
+        much.
+    bound : float, deg
+        Of 99 of 100 headings, by what the rest itself shows of the gyros.
+    unsteady : float, rad/s
+        Mean rate about the vertical that is neither the Earth's nor the bias that was found: a
+        gyro that changed within the rest.
+    """
+
+    begin: float
+    time: float
+    q_nb: Array
+    gyro_bias: Array
+    lat_deg: float
+    sd: float
+    bound: float
+    unsteady: float = 0.0
+
+
+def north_within(sensors: ImuUncertainty, lat_deg: float, ellipsoid: Ellipsoid) -> float:
+    """Return to how many degrees gyros as stated find north: one standard deviation, deg."""
+    bias = np.hypot(sensors.gyro.axis("bias"), sensors.gyro_drift.triad)
+    across = float(np.linalg.norm(Site(lat_deg, 0.0, 0.0, ellipsoid).earth_rate[:2]))
+    worst = float(np.max(bias))
+    return math.degrees(math.atan2(worst, across))
+
+
+def compasses_of(
+    chain: Chain,
+    sensors: ImuUncertainty,
+    imu: pd.DataFrame,
+    record: NavigationRecord,
+    aligned: Sequence[Aligned],
+    ellipsoid: Ellipsoid,
+) -> tuple[list[Compass], list[float], str]:
+    """Return what the alignments and the rests of a run found, each by itself.
+
+    Of an alignment that was told its heading, and of each rest that an aid saw, a fine alignment of
+    its own is made, that begins with north as the inertial frame shows it.
+
+    Parameters
+    ----------
+    chain : Chain
+        Of the run.
+    sensors : ImuUncertainty
+    imu : DataFrame
+        Its samples.
+    record : NavigationRecord
+        What came of it.
+    aligned : sequence of Aligned
+        Its alignments.
+    ellipsoid : Ellipsoid
+
+    Returns
+    -------
+    compasses : list of Compass
+        In the order of time.
+    doubts : list of float, s
+        Ends of rests at which the gyros were not what they are stated to be.
+    why : str
+        Why there is none, in words; empty where there is one.
+    """
+    found: list[Compass] = []
+    refused: list[str] = []
+    doubts: list[float] = []
+    rests = seen_rests(chain, imu, record)
+    coarse: Alignment | None = None
+    fines = {one.begin for one in aligned if one.fine is not None}
+    for one in aligned:
+        if one.fine is None:
+            coarse = one.alignment
+            # One by course moved, and one before a fine alignment is the begin of that.
+            if coarse.velocity is None and one.end not in fines and one.end - one.begin >= SHORTEST:
+                rests.append((one.begin, one.end))
+            continue
+        begin = float(one.fine.history.index[0])
+        if one.fine.heading_given:
+            rests.append((begin, one.end))
+            continue
+        against, of_gyros = _against(one.fine, coarse)
+        if of_gyros:
+            doubts.append(one.end)
+        if against:
+            refused.append(f"its alignment does not bear itself out ({against})")
+        else:
+            found.append(
+                _judged(one.fine, begin, _site(record, one.fine.alignment.time, ellipsoid))
+            )
+    for begin, end in sorted(rests):
+        site = _site(record, end, ellipsoid)
+        try:
+            fine, before = _aligned_anew(imu, site, sensors, begin, end)
+        except StrapdownError as error:
+            # It stood, by its aids, and its gyros do not show that.
+            doubts.append(end)
+            refused.append(f"a rest did not tell north ({error.finding.what.partition(': ')[0]})")
+            continue
+        against, of_gyros = _against(fine, before)
+        if of_gyros:
+            doubts.append(end)
+        if against:
+            refused.append(f"a rest does not bear itself out ({against})")
+        else:
+            found.append(_judged(fine, begin, site))
+    found = [replace(one, unsteady=_unsteady(imu, one, sensors, ellipsoid)) for one in found]
+    if found:
+        return sorted(found, key=lambda one: one.time), doubts, ""
+    if refused:
+        return [], doubts, refused[-1]
+    return [], doubts, "it found north by no fine alignment, and no aid saw it stand for a minute"
+
+
+def _judged(fine: FineResult, begin: float, site: Site) -> Compass:
+    """A heading with what its own rest shows of the gyros.
+
+    An east rate that is none of the Earth's and a heading look alike. The rest shows those to the
+    north and down, which must be the Earth's. How good the gyros are is then known by what is
+    stated, which counts as one observation, and by these n, u of their standard deviations each:
+    the heading is within ``t sqrt((1 + sum u²)/(1 + n))`` of its own in 99 of 100 cases, with t of
+    Student's distribution of 1 + n degrees of freedom.
+    """
+    found = fine.alignment
+    sd = float(found.sd_deg[2]) * max(1.0, _scatter(fine))
+    u = _surprises(fine, site)
+    size = math.sqrt((1.0 + float(u @ u)) / (1.0 + len(u)))
+    assert found.gyro_bias is not None
+    return Compass(
+        begin,
+        found.time,
+        found.q_nb,
+        found.gyro_bias,
+        site.lat_deg,
+        sd,
+        sd * max(SURE, STUDENT[len(u)] * size),
+    )
+
+
+def _unsteady(
+    imu: pd.DataFrame, one: Compass, sensors: ImuUncertainty, ellipsoid: Ellipsoid
+) -> float:
+    """Mean rate about the vertical over a rest, less the Earth's and the bias; rad/s."""
+    time = index_of(imu)
+    first, last = np.searchsorted(time, [one.begin, one.time])
+    rates = values_of(imu, GYRO)[first:last]
+    C_nb = rotation.dcm_from_quaternion(one.q_nb)
+    down = (rates - one.gyro_bias) @ C_nb[2]
+    length = max(one.time - one.begin, 1.0)
+    parts = max(2, round(length))
+    turns = np.array([part.mean() for part in np.array_split(down, parts)])
+    if float(np.std(turns)) > ROCKS_BY:
+        return 0.0
+    earth = float(Site(one.lat_deg, 0.0, 0.0, ellipsoid).earth_rate[2])
+    noise = float(np.max(sensors.gyro.axis("noise_density"))) / math.sqrt(length)
+    return max(0.0, abs(float(down.mean()) - earth) - 3.0 * noise)
+
+
+def _surprises(fine: FineResult, site: Site) -> Array:
+    """Rates to the north and down that are none of the Earth's, by what was expected of them.
+
+    One that was seen less well than the heading itself, as that about the vertical of a body that
+    rocks, shows nothing of the gyros.
+    """
+    found = fine.alignment
+    assert found.gyro_bias is not None
+    C_nb = rotation.dcm_from_quaternion(found.q_nb)
+    before = C_nb @ np.diag(np.square(fine.filter.model.sensors[0].sd[:3])) @ C_nb.T
+    gyros = slice(PHYSICAL, PHYSICAL + 3)
+    after = C_nb @ fine.filter.physical_covariance(fine.state)[gyros, gyros] @ C_nb.T
+    rate = C_nb @ found.gyro_bias
+    of_heading = math.radians(float(found.sd_deg[2])) * float(np.linalg.norm(site.earth_rate[:2]))
+    out = []
+    for k in (0, 2):
+        told = float(before[k, k] - after[k, k])
+        # An estimate of the variance `told` is that of a reading with this much noise.
+        noise = before[k, k] * after[k, k] / told if told > 0.0 else math.inf
+        if noise <= of_heading**2:
+            out.append(float(rate[k]) / math.sqrt(told))
+    return np.array(out)
+
+
+def _scatter(fine: FineResult) -> float:
+    """Root mean square of its normalised innovations, of the worst component."""
+    worst = 0.0
+    for table in fine.innovations.values():
+        late = table.iloc[len(table) // 10 :]
+        parts = len(late.columns) // 3
+        nu, s = late.iloc[:, :parts].to_numpy(), late.iloc[:, parts : 2 * parts].to_numpy()
+        worst = max(worst, float(np.sqrt(np.mean(np.square(nu) / s, axis=0)).max()))
+    return worst
+
+
+def _against(fine: FineResult, coarse: Alignment | None) -> tuple[str, bool]:
+    """What speaks against an alignment, in a few words, and whether it is the gyros.
+
+    A vehicle that does not quite stand tells nothing; gyros that read what they should not have
+    changed since they were believed.
+    """
+    told = [one for one in fine.findings if one.quantity != ROCKS]
+    for one in told:
+        if (one.quantity or "").startswith("gyro") or "rad/s" in (one.quantity or ""):
+            return one.what.partition(",")[0], True
+    if told:
+        return told[0].what.partition(":")[0].partition(" (")[0].partition(",")[0], False
+    scatter = _scatter(fine)
+    if scatter > INCONSISTENT:
+        return f"what it observed scatters {scatter:.2g} times as much as it should", False
+    if coarse is None or coarse.heading_given:
+        return "", False
+    beside = fine.at_start if abs(coarse.time - fine.at_start.time) < 1.0 else fine.alignment
+    apart = rotation.within_half_turn(coarse.roll_pitch_heading[2] - beside.roll_pitch_heading[2])
+    if abs(float(apart)) > SURE * math.hypot(float(coarse.sd_deg[2]), float(beside.sd_deg[2])):
+        return f"coarse and fine alignment differ by {abs(float(apart)):.2g}°", True
+    return "", False
+
+
+def _aligned_anew(
+    imu: pd.DataFrame, site: Site, sensors: ImuUncertainty, begin: float, end: float
+) -> tuple[FineResult, Alignment]:
+    """A fine alignment of a rest, from its samples and its place alone."""
+    time = index_of(imu)
+    first, last = np.searchsorted(time, [begin - 1e-6, end + 1e-6])
+    part = imu.iloc[first:last]
+    part.attrs = dict(imu.attrs)
+    coarse = InertialFrame().align(part, site, sensors)
+    return FineAlignment().align(part, site, sensors, coarse), coarse
+
+
+def _site(record: NavigationRecord, time: float, ellipsoid: Ellipsoid) -> Site:
+    """Where a run says that it was."""
+    row = min(int(np.searchsorted(index_of(record.trajectory), time)), len(record.trajectory) - 1)
+    lat_deg, lon_deg, alt = (float(record.trajectory[c].iloc[row]) for c in GEODETIC)
+    return Site(lat_deg, lon_deg, alt, ellipsoid)

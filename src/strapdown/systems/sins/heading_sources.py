@@ -1,0 +1,118 @@
+"""Two sources of a heading that share nothing, and agree: neither bears itself out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.aiding.heading import Heading
+from strapdown.evaluation.heading_light import RECENT, SURE, seconds_of
+from strapdown.navigation.record import NavigationRecord
+from strapdown.systems.sins.carried_heading import CarriedHeading
+from strapdown.systems.sins.chain import Chain
+from strapdown.tables.checks import index_of
+
+__all__ = ["AgreeingSources", "agreeing_sources"]
+
+Array = NDArray[np.float64]
+
+#: Fewest readings that tell.
+FEWEST = 5
+
+
+@dataclass(frozen=True, eq=False)
+class AgreeingSources:
+    """What the second best of several sources tells, where all agree; as `heading_light.Heard`.
+
+    Attributes
+    ----------
+    since : float, s
+    time : ndarray, (n,), s
+        Seconds at which there are two or more, and all agree.
+    difference, sd : ndarray, (n,), deg
+        Heading of the run less that of the second best, and its standard deviation.
+    kind : str
+    """
+
+    since: float
+    time: Array
+    difference: Array
+    sd: Array
+    kind: str = "sources"
+
+
+def agreeing_sources(
+    chain: Chain, record: NavigationRecord, carried: Sequence[CarriedHeading]
+) -> list[AgreeingSources]:
+    """Return what heading aids, and the gyros that found north, say together.
+
+    A heading aid that is wrong by a constant says so nowhere, and a filter that takes it says that
+    it knows. Two that share nothing, as a magnetic compass and two antennas, or two antennas and
+    the gyros' north, are not wrong alike: what the worse of them allows holds, while all agree with
+    the run within 2.58 standard deviations. A misalignment that is estimated makes an aid none.
+
+    Parameters
+    ----------
+    chain : Chain
+    record : NavigationRecord
+    carried : sequence of CarriedHeading
+
+    Returns
+    -------
+    list of AgreeingSources
+        One, or none.
+    """
+    seconds = seconds_of(record)
+    told = [
+        one
+        for aid in chain.navigator.aids
+        if isinstance(aid, Heading) and aid.misalignment_sd_deg == 0.0
+        for one in [_of_aid(record, aid.name, seconds)]
+        if one is not None
+    ]
+    if carried:
+        told.append(_of_gyros(carried, seconds))
+    if len(told) < 2:
+        return []
+    d, s = np.array([x for x, _ in told]), np.array([x for _, x in told])
+    known = np.isfinite(s)
+    bound = np.where(known, np.abs(d) + SURE * s, np.inf)
+    own = np.interp(seconds, index_of(record.sd), record.sd["heading"])
+    agree = (~known | (np.abs(d) <= SURE * np.hypot(s, own))).all(axis=0)
+    good = agree & (known.sum(axis=0) >= 2)
+    second = np.argsort(bound, axis=0)[1]
+    column = np.arange(len(seconds))
+    d, s = d[second, column], s[second, column]
+    if not good.any():
+        return []
+    return [AgreeingSources(float(seconds[good][0]), seconds[good], d[good], s[good])]
+
+
+def _of_aid(record: NavigationRecord, name: str, seconds: Array) -> tuple[Array, Array] | None:
+    """Run less an aid, and how well that is known: its readings may all be wrong alike."""
+    table = record.innovations.get(f"{name}.heading")
+    if table is None or not len(table):
+        return None
+    time = index_of(table)
+    nu, s = (np.degrees(table.iloc[:, 0]), np.degrees(np.sqrt(table.iloc[:, 1])))
+    nu, s = nu.to_numpy(dtype=np.float64), s.to_numpy(dtype=np.float64)
+    first = np.searchsorted(time, seconds - RECENT, side="right")
+    last = np.searchsorted(time, seconds + 1e-6, side="right")
+    d, sd = np.full(len(seconds), np.nan), np.full(len(seconds), np.inf)
+    for k, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+        if b - a >= FEWEST:
+            d[k], sd[k] = np.median(nu[a:b]), np.median(s[a:b])
+    return d, sd
+
+
+def _of_gyros(carried: Sequence[CarriedHeading], seconds: Array) -> tuple[Array, Array]:
+    """Run less the newest rest that is carried on, by what is stated of the gyros."""
+    d, sd = np.full(len(seconds), np.nan), np.full(len(seconds), np.inf)
+    for one in carried:
+        at = np.searchsorted(seconds, one.time - 1e-6)
+        inside = at < len(seconds)
+        d[at[inside]], sd[at[inside]] = one.difference[inside], one.plain[inside]
+    return d, sd

@@ -1,0 +1,76 @@
+"""When a vehicle stood, by the detectors of its aids and not by what was computed."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.aiding.standstill import StandstillAid
+from strapdown.navigation.record import NavigationRecord
+from strapdown.systems.sins.chain import Chain
+from strapdown.systems.sins.joined_steps import steps_of
+from strapdown.tables import VELOCITY
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["SHORTEST", "seen_rests"]
+
+Array = NDArray[np.float64]
+
+#: A rest that is long enough to tell north, and the longest that is taken at once, s.
+SHORTEST, LONGEST = 60.0, 300.0
+#: Epochs of a rest are no farther apart, s.
+APART = 2.5
+#: A vehicle still brakes, or starts softly, so long within what a detector takes for a rest, s.
+SOFT = 5.0
+#: What is computed to be faster glides, m/s. A run whose gyros changed may well be off by less, and
+#: then takes no zero velocity any more: its rests must be seen all the same.
+GLIDES = 5.0
+
+
+def seen_rests(
+    chain: Chain, imu: pd.DataFrame, record: NavigationRecord
+) -> list[tuple[float, float]]:
+    """Return begins and ends of the rests of a run, in parts that are not too long, s.
+
+    Parameters
+    ----------
+    chain : Chain
+    imu : DataFrame
+        Its samples.
+    record : NavigationRecord
+        What came of it.
+
+    Returns
+    -------
+    list of (float, float)
+        None where no aid looks for a rest.
+    """
+    aids = [aid for aid in chain.navigator.aids if isinstance(aid, StandstillAid)]
+    if not aids:
+        return []
+    memories = [aid.begin() for aid in aids]
+    seen: list[Array] = []
+    span = record.trajectory.index
+    for steps in steps_of(chain.intake, imu, float(span[0]), float(span[-1])):
+        for k, aid in enumerate(aids):
+            memories[k], epochs = aid.watch(memories[k], steps.time, steps.rows)
+            seen.append(epochs.time)
+    time = np.unique(np.concatenate(seen)) if seen else np.empty(0)
+    speed = np.linalg.norm(values_of(record.trajectory, VELOCITY), axis=1)
+    time = time[np.interp(time, index_of(record.trajectory), speed) < GLIDES]
+    if not len(time):
+        return []
+    starts = np.flatnonzero(np.diff(time, prepend=-math.inf) > APART).tolist()
+    out: list[tuple[float, float]] = []
+    for first, upto in zip(starts, [*starts[1:], len(time)], strict=True):
+        begin, end = float(time[first]) + SOFT, float(time[upto - 1]) - SOFT
+        if end - begin < SHORTEST:
+            continue
+        count = max(1, math.floor((end - begin) / LONGEST))
+        edges = np.linspace(begin, end, count + 1).tolist()
+        out += itertools.pairwise(edges)
+    return out
