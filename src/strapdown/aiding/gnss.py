@@ -29,7 +29,7 @@ __all__ = ["Gnss"]
 Array = NDArray[np.float64]
 
 #: What an epoch is of: the first of its values.
-POSITION_CODE, VELOCITY_CODE = 0.0, 1.0
+POSITION_CODE, VELOCITY_CODE, HORIZONTAL_CODE = 0.0, 1.0, 2.0
 PLACE = ("north, m", "east, m", "down, m")
 SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
 #: Beyond this a time offset is a wrong clock, and no longer an arc of the second order, s.
@@ -170,7 +170,10 @@ class Gnss(TableAid):
         return self.time_offset_sd > 0.0
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
-        """Return an epoch for each place and for each velocity; see `TableAid.epochs`."""
+        """Return an epoch for each place and for each velocity; see `TableAid.epochs`.
+
+        A velocity without a vertical component is one of two components.
+        """
         check_gnss(table)
         time = index_of(table) - self.time_offset
         good = np.isin(values_of(table, ["quality"])[:, 0], self.qualities)
@@ -196,13 +199,20 @@ class Gnss(TableAid):
             ),
         ):
             value, sd = values_of(table, columns), values_of(table, sds)
-            told = good & np.isfinite(sd).all(axis=1) & used
-            sd = np.maximum(factor * sd, least)
-            _refuse_certain(table, told, sd, sds, code)
+            measured = np.isfinite(sd)
+            told = good & measured.all(axis=1) & used
+            codes = np.full(len(value), code)
             if code == POSITION_CODE:
                 value = np.column_stack([np.radians(value[:, :2]), value[:, 2]])
+            elif used:
+                # Speed and course are all that many a receiver tells.
+                level = good & measured[:, :2].all(axis=1) & ~measured[:, 2]
+                codes[level], told = HORIZONTAL_CODE, told | level
+                value, sd = np.where(measured, value, 0.0), np.where(measured, sd, np.inf)
+            sd = np.maximum(factor * sd, least)
+            _refuse_certain(table, told, sd, sds, code)
             times.append(time[told] - delay)
-            rows.append(np.column_stack([np.full(len(value), code), value, sd**2])[told])
+            rows.append(np.column_stack([codes, value, sd**2])[told])
         at = np.concatenate(times)
         order = np.argsort(at, kind="stable")
         return Epochs(at[order], np.concatenate(rows)[order])
@@ -225,13 +235,14 @@ class Gnss(TableAid):
         else:
             z -= values[1:4]
         name, labels = self.names(float(values[0]))
-        return [Observation(name, z, H, values[4:7], labels)]
+        n = len(labels)
+        return [Observation(name, z[:n], H[:n], values[4 : 4 + n], labels)]
 
     def names(self, code: float) -> tuple[str, tuple[str, ...]]:
         """Return the name of the observation of an epoch, and the labels of its components."""
         if code == POSITION_CODE:
             return f"{self.name}.position", PLACE
-        return f"{self.name}.velocity", SPEED
+        return f"{self.name}.velocity", SPEED[:2] if code == HORIZONTAL_CODE else SPEED
 
     @property
     def _arm(self) -> str:

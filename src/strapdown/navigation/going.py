@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown._kernels.split_increment import split_increment
 from strapdown._kernels.steady_motion import steady_motion
 from strapdown.aiding.aid import Aid, Epochs, WatchingAid
-from strapdown.aiding.gnss import Gnss
+from strapdown.aiding.gnss import HORIZONTAL_CODE, Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.adaptive_rule import AdaptiveRule
 from strapdown.estimation.covariance import Innovations
@@ -152,12 +152,13 @@ class Going:
         return made
 
     def _until_outage(self, queue: Epochs) -> Epochs:
-        """Epochs that follow each other, and the last observation, without an outage."""
+        """Whole epochs that follow each other, and the last observation, without an outage."""
         if not queue.time.size:
             return queue
         longest = ALONE * self.navigator.mark_interval
         apart = np.diff(queue.time, prepend=self.observed) > longest
-        count = int(np.argmax(apart)) if apart.any() else len(apart)
+        ends = apart | (queue.values[:, 0] == HORIZONTAL_CODE)
+        count = int(np.argmax(ends)) if ends.any() else len(ends)
         return Epochs(queue.time[:count], queue.values[:count])
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: Fixed) -> None:

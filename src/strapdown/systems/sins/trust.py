@@ -246,11 +246,14 @@ def _advice(
     longest = sorted(spans, key=lambda s: s.begin - s.end)[:MOST_ADVISED]
     out = []
     for span in sorted(longest, key=lambda s: s.begin):
-        time = span.end - 1.0
         if made is None:
-            out.append(Advice(span, time, math.nan, ()))
+            out.append(Advice(span, span.end - 1.0, math.nan, ()))
             continue
-        out.append(_advised(span, time, evidence, made, record))
+        # The newest instant at which one was heard: none is at the very end of a run.
+        times = [e.time[(e.time >= span.begin) & (e.time < span.end)] for e in evidence]
+        heard = np.concatenate([*times, []])
+        if heard.size:
+            out.append(_advised(span, float(heard.max()), evidence, made, record))
     return tuple(out)
 
 
@@ -264,8 +267,6 @@ def _advised(
     told = [(e, int(np.searchsorted(e.time, time))) for e in evidence]
     told = [(e, k) for e, k in told if k < len(e.time) and e.time[k] == time]
     start = _state(record, time)
-    if not told:
-        return Advice(span, time, math.nan, ())
     best, at = min(told, key=lambda pair: pair[0].sd[pair[1]])
     filter_ = made.navigator.filter
     mark = max(int(np.searchsorted(index_of(record.sd), time + 1e-6)) - 1, 0)
