@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 __all__ = ["CourseFit", "CourseModel", "Found"]
 
 # Errors of velocity and attitude are estimate less truth, of sensors truth less estimate.
-SIGN = np.where(HANDED < OF_SENSORS.start, 1.0, -1.0)
+SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Nothing is known of a velocity, m/s, or of an attitude, rad.
 UNKNOWN = (100.0, 3.0)
 # The scatter of the fixes is judged by so many velocities more than what is asked for takes.

@@ -243,6 +243,11 @@ class CompiledEngine(Engine):
         self._group[0][0] = self.row
         return seen, taken
 
+    def widen(self, Q: Array) -> None:
+        """Know less of the states."""
+        self.filter = self.navigation.widened(self.filter, Q)
+        self._covariance[:] = self.filter.covariance
+
     def grown(self) -> Array:
         """Return how the states went on over the newest group."""
         _, growth, *_ = self._room[0]

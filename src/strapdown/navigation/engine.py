@@ -125,6 +125,10 @@ class Engine(ABC):
         """
 
     @abstractmethod
+    def widen(self, Q: Array) -> None:
+        """Know less of the states by a covariance, (n, n), now."""
+
+    @abstractmethod
     def grown(self) -> Array:
         """Return how the states went on over the newest group that was closed, (n, n)."""
 
@@ -214,6 +218,10 @@ class GeneralEngine(Engine):
         self.filter, self.errors, seen = used.estimate(self.filter, before, observations, rules)
         T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
         return seen, T @ (self.errors - before)
+
+    def widen(self, Q: Array) -> None:
+        """Know less of the states."""
+        self.filter = self.navigation.widened(self.filter, Q)
 
     def grown(self) -> Array:
         """Return how the states went on over the newest group."""
