@@ -125,7 +125,7 @@ class Found:
     @property
     def by_input(self) -> Array:
         """Errors in proportion to what is sensed, (27,), as `Alignment.by_input`."""
-        return self.errors[HANDED[ASKED:] - OF_SENSORS.start]
+        return np.asarray(self.errors[HANDED[ASKED:] - OF_SENSORS.start])
 
 
 @dataclass(frozen=True, eq=False)
