@@ -39,11 +39,15 @@ class Alignment:
         Where the method tells it without the site's: from gravity and the Earth's rate.
     velocity : ndarray, (3,), m/s, optional
         North, east, down, where the method tells it.
-    joint : ndarray, (12, 12), optional
-        Covariance of the errors of velocity, of the rotation as above, and of gyros and
-        accelerometers, SI, where the method tells how they go together: with a bias that is not
+    joint : ndarray, (39, 39), optional
+        Covariance of the errors of velocity, of the rotation as above, of gyros and accelerometers,
+        SI, and of `by_input`, where the method tells how they go together: with a bias that is not
         known an attitude errs the way the bias turned it. Errors are computed less true, those of
         the sensors what they still read too much: bias less estimate.
+    by_input : ndarray, (27,), optional
+        Where the method tells it, errors in proportion to what is sensed above the means of the
+        record, at which the biases are: elements (i, j) of what axis i reads too much by input j,
+        nine of gyros by rates, nine of gyros by forces, nine of accelerometers by forces.
     findings : tuple of Finding
         Assumptions that do not hold, and what the sensors cannot tell.
     """
@@ -61,6 +65,7 @@ class Alignment:
     measured_latitude_sd_deg: float | None = None
     velocity: Array | None = None
     joint: Array | None = None
+    by_input: Array | None = None
     findings: tuple[Finding, ...] = field(default=())
 
     @property

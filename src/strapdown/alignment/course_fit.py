@@ -23,6 +23,7 @@ from strapdown.alignment.course_unknowns import (
     GYRO_BY_FORCE,
     GYRO_MATRIX,
     GYRO_NOISE,
+    HANDED,
     OF_ACCELS,
     OF_GYROS,
     OF_SENSORS,
@@ -44,7 +45,7 @@ Array = NDArray[np.float64]
 __all__ = ["CourseFit", "CourseModel", "Found"]
 
 # Errors of velocity and attitude are estimate less truth, of sensors truth less estimate.
-SIGN = np.repeat([1.0, -1.0], ASKED // 2)
+SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Nothing is known of a velocity, m/s, or of an attitude, rad.
 UNKNOWN = (100.0, 3.0)
 # The scatter of the fixes is judged by so many velocities more than what is asked for takes.
@@ -96,7 +97,7 @@ class Found:
         At the end.
     errors : ndarray, rad/s, m/s² and relative
         Of the sensors, the columns `course_unknowns.OF_SENSORS`; reading less truth.
-    covariance : ndarray, (12, 12)
+    covariance : ndarray, (39, 39)
         As `Alignment.joint`.
     fitted : ndarray, (k, 3), m/s
         Velocities at the fixes, north, east, down, near which courses are linear.
@@ -121,6 +122,11 @@ class Found:
     def bias(self) -> Array:
         """Of gyros and accelerometers, (6,), rad/s and m/s²."""
         return self.errors[:6]
+
+    @property
+    def by_input(self) -> Array:
+        """Errors in proportion to what is sensed, (27,), as `Alignment.by_input`."""
+        return np.asarray(self.errors[HANDED[ASKED:] - OF_SENSORS.start])
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +212,7 @@ class CourseFit:
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
             found.velocity + x[VELOCITY],
             found.errors + x[OF_SENSORS],
-            inverse[:ASKED, :ASKED] * np.outer(SIGN, SIGN),
+            inverse[np.ix_(HANDED, HANDED)] * np.outer(SIGN, SIGN),
             np.einsum("kij,kj->ki", level[:k], there[:k] + by[:k] @ x),
             weight,
             scale,

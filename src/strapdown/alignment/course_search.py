@@ -13,7 +13,7 @@ from strapdown import rotation
 from strapdown.alignment.course_fit import CourseFit, CourseModel, Found
 from strapdown.alignment.course_fixes import CourseFixes
 from strapdown.alignment.course_rests import RestRate
-from strapdown.alignment.course_unknowns import ACCEL_NOISE, GYRO_NOISE, OF_SENSORS
+from strapdown.alignment.course_unknowns import ACCEL_NOISE, ASKED, GYRO_NOISE, HANDED, OF_SENSORS
 from strapdown.alignment.drive_sums import drive_sums
 from strapdown.alignment.forward_sign import check_forward
 from strapdown.alignment.site import Site
@@ -156,7 +156,7 @@ class CourseSearch:
             off = np.degrees(course - np.arctan2(back[:, 1, 0], back[:, 0, 0]))
             heading += math.radians(_middle_turn(off))
         C = _attitude(gained / length, force_n, heading)
-        nothing = np.zeros((12, 12))
+        nothing = np.zeros((len(HANDED), len(HANDED)))
         return Found(C, v1, bias, nothing, _smooth(fixes), _near_neighbours(fixes), 1.0)
 
 
@@ -183,7 +183,7 @@ def _converged(fit: CourseFit, found: Found, influence: Influence) -> Found:
     """Step until nothing moves."""
     for _ in range(STEPS):
         before, found = found, fit.step(found, influence)
-        sd = np.sqrt(np.diagonal(found.covariance))
+        sd = np.sqrt(np.diagonal(found.covariance)[:ASKED])
         turn = rotation.rotation_vector_from_dcm(found.C @ before.C.T)
         moved = [found.velocity - before.velocity, turn, found.bias - before.bias]
         if (np.abs(np.concatenate(moved)) <= SMALL * sd).all():

@@ -17,6 +17,7 @@ __all__ = [
     "GYRO_BY_FORCE",
     "GYRO_MATRIX",
     "GYRO_NOISE",
+    "HANDED",
     "OFFSET",
     "OF_ACCELS",
     "OF_GYROS",
@@ -50,3 +51,5 @@ COUNT: Final = YAW + 3
 OF_GYROS = np.r_[GYRO, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]
 OF_ACCELS = np.r_[ACCEL, ACCEL_MATRIX, ACCEL_NOISE]
 OF_SENSORS = slice(GYRO.start, ACCEL_NOISE.stop)
+#: What is known beyond the record: all but its own noise, and what is of the vehicle and the fixes.
+HANDED = np.r_[:ASKED, GYRO_MATRIX, GYRO_BY_FORCE, ACCEL_MATRIX]

@@ -141,9 +141,10 @@ class GnssCourse(CoarseAlignment):
             gyro_bias=found.bias[:3],
             accel_bias=found.bias[3:],
             gyro_bias_sd=np.sqrt(np.diagonal(joint)[6:9]),
-            accel_bias_sd=np.sqrt(np.diagonal(joint)[9:]),
+            accel_bias_sd=np.sqrt(np.diagonal(joint)[9:12]),
             heading_given=True,
             velocity=found.velocity,
             joint=joint,
+            by_input=found.by_input,
             findings=findings,
         )

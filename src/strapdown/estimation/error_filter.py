@@ -320,6 +320,11 @@ class ErrorFilter:
         )
         return replace(state, covariance=covariance), x, split_innovations(seen, observations)
 
+    def widened(self, state: FilterState, Q: Array) -> FilterState:
+        """Return a state of which less is known by a covariance of the states, (n, n)."""
+        nothing_moves = np.eye(len(Q))
+        return replace(state, covariance=self.form.predict(state.covariance, nothing_moves, Q))
+
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
         P = self.form.matrix(state.covariance)

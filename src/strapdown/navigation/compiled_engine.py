@@ -275,6 +275,12 @@ class CompiledEngine(Engine):
         self._group[0][0] = self.row
         return seen
 
+    def widen(self, Q: Array) -> None:
+        """Know less of the states."""
+        self.filter = self.navigation.widened(self.filter, Q)
+        self.nodes.widened(self.filter)
+        self._covariance[:] = self.filter.covariance
+
     def shown(self) -> Array:
         """Return the row of the newest step."""
         return self.row

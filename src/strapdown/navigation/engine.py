@@ -137,6 +137,10 @@ class Engine(ABC):
         return replace(observation, z=observation.z - observation.H @ (T @ self.errors))
 
     @abstractmethod
+    def widen(self, Q: Array) -> None:
+        """Know less of the states by a covariance, (n, n), now."""
+
+    @abstractmethod
     def shown(self) -> Array:
         """Return the row of the newest step, estimated errors taken off."""
 
@@ -226,6 +230,11 @@ class GeneralEngine(Engine):
             taken = T @ (self.errors - before)
         self.nodes.updated(met, taken, self.filter)
         return seen
+
+    def widen(self, Q: Array) -> None:
+        """Know less of the states."""
+        self.filter = self.navigation.widened(self.filter, Q)
+        self.nodes.widened(self.filter)
 
     def shown(self) -> Array:
         """Return the row of the newest step, estimated errors taken off."""

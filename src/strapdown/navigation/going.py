@@ -15,6 +15,8 @@ from strapdown.aiding.gnss import HORIZONTAL_CODE, Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.adaptive_rule import AdaptiveRule
 from strapdown.estimation.covariance import Innovations
+from strapdown.estimation.filter_state import FilterState
+from strapdown.estimation.large_tilt import is_large, unlearnt_force
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.observed_together import Rules
 from strapdown.estimation.update_rule import UpdateRule
@@ -55,6 +57,7 @@ class Going:
         self.marked = state.marked
         self.observed = state.observed
         self.scales = dict(state.scales)
+        self.tilted = state.tilted
         self.steady = state.steady.copy()
         self.begun_steady = state.steady
         self.steadies: Array | None = None
@@ -123,7 +126,7 @@ class Going:
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
         """Go as far as the fixes of a lone receiver reach without an outage; return the steps."""
         aid, engine = self.navigator.lone_receiver, self.engine
-        if aid is None or not isinstance(engine, CompiledEngine):
+        if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
             return made
         arm = np.asarray(aid.lever_arm, dtype=np.float64)
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
@@ -185,6 +188,7 @@ class Going:
             self.observed,
             self.scales,
             self.steady,
+            self.tilted,
         )
 
     def piece(self) -> NavigationPiece:
@@ -279,12 +283,26 @@ class Going:
                 asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
             else:
                 asked.append(rule)
+        met = self.engine.filter
         innovations = self.engine.observe(observations, asked)
+        self._unlearn(met)
         for rule, one, nu in zip(rules, observations, innovations, strict=True):
             if isinstance(rule, AdaptiveRule):
                 before = self.scales.get(one.name) or rule.begin(one.z.size)
                 self.scales[one.name] = rule.after(before, nu, one.R)
         return innovations
+
+    def _unlearn(self, met: FilterState) -> None:
+        """Know less of what was learnt about a large tilt, where it was corrected."""
+        if not self.tilted or not self.navigator.damping.feeds_back:
+            return
+        filter_, engine = self.navigator.filter, self.engine
+        before = filter_.physical_covariance(met)
+        after = filter_.physical_covariance(engine.filter)
+        Q = unlearnt_force(filter_, met, before, after)
+        if Q is not None:
+            engine.widen(Q)
+        self.tilted = is_large(after)
 
     def _mark(self, before: float = 0.0) -> None:
         """Note covariance and estimates, with a stamp that is so much earlier."""

@@ -14,6 +14,7 @@ from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.filter_state import FilterState
+from strapdown.estimation.large_tilt import is_large
 from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled
@@ -114,6 +115,7 @@ class Navigator:
             memories={aid.name: aid.begin() for aid in self.aids if isinstance(aid, WatchingAid)},
             marked=-np.inf,
             observed=state.time,
+            tilted=is_large(self.filter.physical_covariance(state)),
         )
 
     def tell(self, state: NavigatorState, name: str, table: pd.DataFrame) -> NavigatorState:

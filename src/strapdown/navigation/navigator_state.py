@@ -39,6 +39,8 @@ class NavigatorState:
         By name of an observation whose rule learns: what it has learnt of each component.
     steady : ndarray, (7,)
         Fading means of rate and force (`_kernels.steady_motion`), where an aid wants them.
+    tilted : bool
+        Whether the tilt is, since the start, known so badly that its second order counts.
     """
 
     engine: EngineState
@@ -48,6 +50,7 @@ class NavigatorState:
     observed: float
     scales: Mapping[str, Scales] = field(default_factory=dict)
     steady: Array = field(default_factory=lambda: np.zeros(STEADY))
+    tilted: bool = False
 
     @property
     def time(self) -> float:

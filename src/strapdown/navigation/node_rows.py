@@ -95,10 +95,12 @@ class NodeRows:
         if not model.states_are_physical:
             E = model.from_physical(used, begun.time, begun.row)
             Phi = model.to_physical(used, ended.time, ended.row) @ Phi @ E
-        move = self._row(GROWTH, ended)[begin_of_move(self._size) :]
-        core = CORE * self._size
-        move[:core] = Phi[:CORE].ravel()
-        move[core : core + self._size - CORE] = np.diagonal(Phi)[CORE:]
+        self._growth(Phi, ended)
+
+    def widened(self, state: FilterState) -> None:
+        """Note a state of which less is known than just before: a growth by noise alone."""
+        if self.wanted:
+            self._growth(np.eye(self._size), state)
 
     def updated(self, before: FilterState, taken: Array, after: FilterState) -> None:
         """Note what observations did, if they did anything.
@@ -117,6 +119,13 @@ class NodeRows:
         row, at = self._row(UPDATE, after), begin_of_taken(self._size)
         pack(P, row, begin_of_move(self._size))
         row[at : at + self._size] = taken
+
+    def _growth(self, Phi: Array, ended: FilterState) -> None:
+        """A row of a growth of the physical errors."""
+        move = self._row(GROWTH, ended)[begin_of_move(self._size) :]
+        core = CORE * self._size
+        move[:core] = Phi[:CORE].ravel()
+        move[core : core + self._size - CORE] = np.diagonal(Phi)[CORE:]
 
     def _row(self, kind: int, state: FilterState) -> Array:
         """A further row, with all that is not of its kind alone."""

@@ -28,7 +28,7 @@ from strapdown.tables import MOTION
 if TYPE_CHECKING:
     from strapdown.systems.sins.chain import Chain, ChainState
 
-__all__ = ["align", "handed_over"]
+__all__ = ["align", "handed_over", "unused_fixes"]
 
 Array = NDArray[np.float64]
 
@@ -134,6 +134,33 @@ def handed_over(chain: Chain, state: ChainState, found: Aligned) -> FilterState:
     P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
     by_others = None if chain.site is not None else _by_antenna(chain, q_nb, still, still)
     return from_alignment(filter_, found.alignment, start, P, rest, by_others)
+
+
+def unused_fixes(
+    chain: Chain, state: ChainState, begun: float
+) -> dict[str, tuple[pd.DataFrame, ...]]:
+    """What is left of the tables of a receiver by whose fixes navigation has begun.
+
+    Parameters
+    ----------
+    chain : Chain
+    state : ChainState
+        At the end of a mode of alignment.
+    begun : float, s
+        When navigation begins.
+
+    Returns
+    -------
+    dict of str to tuple of DataFrame
+        By name of the aid: rows that an alignment by course has not met yet. A fix at the very end
+        of it has told place and velocity already, and would count twice.
+    """
+    mode, name = chain.modes[state.mode], chain.fixes_from
+    if name is None or not (isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse)):
+        return {}
+    offset = float(getattr(_receiver(chain), "time_offset", 0.0))
+    out = [table[table.index - offset > begun + INSTANT] for table in state.told[name]]
+    return {name: tuple(table for table in out if len(table))}
 
 
 def _by_antenna(chain: Chain, q_nb: Array, velocity: Array, turn: Array) -> Array | None:

@@ -13,7 +13,7 @@ from strapdown.exceptions import DataError, DivergenceError
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import Event, Span
-from strapdown.systems.sins.aligning import align, handed_over
+from strapdown.systems.sins.aligning import align, handed_over, unused_fixes
 from strapdown.systems.sins.gaps import Hole, widened
 from strapdown.systems.sins.handover import from_state
 from strapdown.systems.sins.intake import Steps
@@ -21,6 +21,8 @@ from strapdown.systems.sins.modes import CoarseMode
 from strapdown.systems.sins.piece import Aligned, ChainPiece
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from strapdown.systems.sins.chain import Chain, ChainState
 
 __all__ = ["Going"]
@@ -283,7 +285,7 @@ class Going:
         if chain.modes[place].kind == "navigation":
             begun = handed_over(chain, state, found)
             self._begin_mode(place, state.time)
-            self._begin_navigation(begun)
+            self._begin_navigation(begun, without=unused_fixes(chain, state, begun.time))
             rest = kept[kept[:, TIME] > begun.time + INSTANT]
             if len(rest):
                 self._navigate(rest)
@@ -312,11 +314,13 @@ class Going:
         self._state = replace(state, begun=state.time)
         self._begin_navigation(from_state(self._chain.navigator.filter, known, start.covariance))
 
-    def _begin_navigation(self, begun: FilterState) -> None:
+    def _begin_navigation(
+        self, begun: FilterState, without: dict[str, tuple[pd.DataFrame, ...]] | None = None
+    ) -> None:
         chain, state = self._chain, self._state
         anew = chain.intake.gaps.beyond == "align"
         navigator = chain.navigator.begin_from(begun)
-        for name, tables in state.told.items():
+        for name, tables in {**state.told, **(without or {})}.items():
             for table in tables:
                 navigator = chain.navigator.tell(navigator, name, table)
         self._state = replace(

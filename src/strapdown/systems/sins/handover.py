@@ -22,6 +22,9 @@ __all__ = ["from_alignment", "from_fine", "from_state"]
 
 Array = NDArray[np.float64]
 
+# Errors of sensors that go together to this part of them are one.
+SAME = 1e-9
+
 
 def from_state(filter_: ErrorFilter, start: NavState, P: Array) -> FilterState:
     """Begin a filter with a state and the covariance of its nine errors.
@@ -81,9 +84,13 @@ def from_alignment(
         P = _levelled(filter_, whole, found.q_nb, rest)
         return filter_.begin(start, _added(P, by_others))
     assert found.gyro_bias_sd is not None and found.accel_bias_sd is not None
-    joint = np.zeros((PHYSICAL + 6, PHYSICAL + 6))
-    joint[:PHYSICAL, :PHYSICAL] = whole
+    told = np.concatenate([found.gyro_bias, found.accel_bias])
     sd = np.concatenate([found.gyro_bias_sd, found.accel_bias_sd])
+    if found.by_input is not None:
+        told = np.concatenate([told, found.by_input])
+        sd = np.concatenate([sd, np.zeros(len(found.by_input))])
+    joint = np.zeros((PHYSICAL + len(told), PHYSICAL + len(told)))
+    joint[:PHYSICAL, :PHYSICAL] = whole
     joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
     if found.joint is not None:
         joint[3:, 3:] = found.joint
@@ -91,7 +98,6 @@ def from_alignment(
         # the alignment knows to go with the velocity.
         joint[:3, 3:] = np.linalg.solve(P[3:, 3:], P[3:, :3]).T @ found.joint[:3]
         joint[3:, :3] = joint[:3, 3:].T
-    told = np.concatenate([found.gyro_bias, found.accel_bias])
     return _with_biases(filter_, start, joint, told, rest, by_others)
 
 
@@ -195,13 +201,20 @@ def _with_biases(
     rest: Array,
     by_others: Array | None = None,
 ) -> FilterState:
-    """Begin with a state whose errors are correlated with biases that were found."""
+    """Begin with a state whose errors are correlated with errors of sensors that were found.
+
+    Of these the first six are what is read too much at the mean, and any more are by input.
+    """
     P0 = np.diag(np.square(filter_.model.stacked.sd))
-    A = _read_at_rest(filter_, rest - told)
-    parts = A @ P0 @ A.T
-    known = np.diagonal(parts) > 0.0
-    A, at = A[known], PHYSICAL + np.flatnonzero(known)
-    K = P0 @ A.T @ np.linalg.inv(A @ P0 @ A.T) if len(at) else np.zeros((len(P0), 0))
+    A = _read_at_rest(filter_, rest - told[:6])
+    if len(told) > len(A):
+        A = np.vstack([A, _read_by_input(filter_)])
+    size = np.sqrt(np.diagonal(A @ P0 @ A.T))
+    known = size > 0.0
+    A, at, size = A[known], PHYSICAL + np.flatnonzero(known), size[known]
+    # Where scale factors are all that a channel errs by, its bias is one of them.
+    parts = np.linalg.pinv(A @ P0 @ A.T / np.outer(size, size), SAME, hermitian=True)
+    K = P0 @ A.T @ (parts / np.outer(size, size))
     P = _with_sensors(filter_, joint[:PHYSICAL, :PHYSICAL])
     left = symmetric(P0 - K @ A @ P0)
     P[PHYSICAL:, PHYSICAL:] = symmetric(K @ joint[np.ix_(at, at)] @ K.T) + left
@@ -216,3 +229,10 @@ def _read_at_rest(filter_: ErrorFilter, rest: Array) -> Array:
     stacked = filter_.model.stacked
     inputs = np.concatenate([[1.0], rest])
     return np.vstack([np.tensordot(inputs, of, axes=1) for of in (stacked.gyro, stacked.accel)])
+
+
+def _read_by_input(filter_: ErrorFilter) -> Array:
+    """What each state of the sensors adds to `Alignment.by_input`, (27, k)."""
+    stacked = filter_.model.stacked
+    parts = (stacked.gyro[1:4], stacked.gyro[4:7], stacked.accel[4:7])
+    return np.concatenate([one.transpose(1, 0, 2).reshape(9, -1) for one in parts])
