@@ -17,7 +17,7 @@ from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.sensors.antenna import antenna_motion
-from strapdown.tables import gnss_table
+from strapdown.tables import VELOCITY_SD, gnss_table
 
 ARM = (1.2, -0.4, -0.9)
 START = NavState.from_degrees(
@@ -226,3 +226,17 @@ def test_states_are_only_those_that_are_to_be_estimated():
     assert names == ["rtk.lever_arm", "rtk.time_offset"]
     walking = Gnss(name="rtk", time_offset_sd=0.1, time_offset_drift=2e-4).states()[0]
     assert walking.drive == pytest.approx([2e-4])
+
+
+def test_a_velocity_without_a_vertical_component_is_one_of_two():
+    table = table_of((55.0, 37.0, 300.0), (30.0, -20.0, 1.0))
+    level = table.assign(VD=0.0, **{VELOCITY_SD[2]: np.inf})
+    aid = Gnss(name="rtk", lever_arm=ARM)
+    view = view_of("ned", aid)
+    (whole,), (part,) = (aid.observe(view, aid.epochs(one).values[1]) for one in (table, level))
+    assert whole.name == "rtk.velocity"
+    assert part.name == whole.name
+    assert part.labels == whole.labels[:2]
+    np.testing.assert_array_equal(part.z, whole.z[:2])
+    np.testing.assert_array_equal(part.H, whole.H[:2])
+    np.testing.assert_array_equal(part.R, whole.R[:2])

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests import aided_drives
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.estimation.covariances import COVARIANCES
@@ -27,6 +28,7 @@ from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Origin, SineVelocityMotion, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.tables import VELOCITY_SD
 
 MOTION = SineVelocityMotion(
     40.0, Origin(55.0, 37.0, 150.0), (6.0, -3.0, 0.0), (4.0, 5.0, 0.3), 25.0
@@ -300,3 +302,24 @@ def test_what_diverges_names_the_sample(log):
     navigator, state = started(aids=LONE)
     with pytest.raises(DivergenceError, match=f"{time[300]:.9g}"):
         navigator.advance(state, time, wild)
+
+
+def test_speed_and_course_alone_tell_what_a_vertical_velocity_of_no_weight_leaves():
+    navigator = aided_drives.navigator_of((Gnss(name="gnss"),))
+    motion = aided_drives.drive()
+    fixes = aided_drives.gnss_of(motion, 1)
+    ends, told = [], []
+    for unknown in (np.inf, 1e5):
+        table = fixes.assign(**{"VD": 0.0, VELOCITY_SD[2]: unknown})
+        state, pieces = aided_drives.run(navigator, motion, 1, {"gnss": table})
+        ends.append(state.engine.filter)
+        seen = [one for piece in pieces for one in piece.seen if one.name == "gnss.velocity"]
+        told.append({len(one.labels) for one in seen})
+    assert told == [{2}, {3}]
+    level, weightless = ends
+    # 1e5 m/s beside 0.1 m/s has 1e-12 of the weight, at each of 120 epochs; the loops round apart.
+    sd = np.sqrt(np.diagonal(weightless.covariance))
+    assert level.covariance / sd / sd[:, None] == pytest.approx(
+        weightless.covariance / sd / sd[:, None], abs=1e-8
+    )
+    assert level.row == pytest.approx(weightless.row, rel=1e-10, abs=1e-7)
