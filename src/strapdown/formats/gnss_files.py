@@ -37,7 +37,7 @@ GNSS_READERS: dict[str, GnssReader] = {
         "receiver of a comma2k19 segment, its folder", gnss_comma2k19.detect, gnss_comma2k19.read
     ),
     "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
-    "nmea": GnssReader("NMEA 0183: GGA, RMC, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
+    "nmea": GnssReader("NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
     "kf-gins": GnssReader(
         "KF-GINS fixes, 7 or 13 columns without a header", gnss_kf_gins.detect, gnss_kf_gins.read
     ),

@@ -1,8 +1,9 @@
-"""Fixes of a receiver's sentences (NMEA 0183): GGA, with the date of RMC or ZDA, GST's deviations.
+"""Fixes of a receiver's sentences (NMEA 0183): GGA, with RMC, VTG, ZDA and GST of its instant.
 
 Sentences of one instant follow each other. GGA has the place, its quality and the height over the
 geoid with that of the geoid; RMC and ZDA the date; GST the standard deviations of latitude,
-longitude and height. Speed and course of RMC are no velocity, for none says how fast it climbs.
+longitude and height; RMC or VTG speed and true course over ground, a velocity north and east.
+None says how fast it climbs.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ __all__ = ["detect", "read"]
 
 _SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})\s*$")
 _DAY = 86400.0
+_KNOT = 1852.0 / 3600.0  # m/s
 _NAN3 = (np.nan, np.nan, np.nan)
 
 
@@ -45,6 +47,7 @@ class _Epoch:
     time: float
     place: tuple[float, float, float] = _NAN3
     sd: tuple[float, float, float] = _NAN3
+    velocity: tuple[float, float, float] = _NAN3
     quality: float = np.nan
     day: float | None = None
 
@@ -98,12 +101,14 @@ def read(path: Path, options: GnssOptions) -> Fixes:
         )
     time, clock = _times(fixed)
     sd = np.array([e.sd for e in fixed])
+    velocity = np.array([e.velocity for e in fixed])
     return Fixes(
         name=path.name,
         time=time,
         place=np.array([e.place for e in fixed]),
         rows=np.array([e.row for e in fixed], dtype=np.int64),
         clock=clock,
+        velocity=velocity if np.isfinite(velocity).any() else None,
         position_sd=sd if np.isfinite(sd).any() else None,
         quality=np.array([e.quality for e in fixed]),
         zero_is_unknown=True,
@@ -117,7 +122,7 @@ def _whole(match: re.Match[str]) -> bool:
 
 
 def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: str) -> None:
-    needed = {"GGA": 11, "GST": 8, "RMC": 9, "ZDA": 4}.get(kind)
+    needed = {"GGA": 11, "GST": 8, "RMC": 9, "VTG": 5, "ZDA": 4}.get(kind)
     if needed is None:
         return
     if len(fields) < needed:
@@ -128,7 +133,7 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
             quantity=kind,
             remedy="correct or delete that line",
         )
-    if not fields[0]:
+    if not fields[0] and kind != "VTG":
         return
 
     def number(k: int, what: str) -> float:
@@ -143,6 +148,11 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
                 remedy="correct or delete that line",
             ) from None
 
+    if kind == "VTG":
+        # It has no time: it goes with what came before it, where that has no velocity yet.
+        if epochs and np.isnan(epochs[-1].velocity[0]):
+            epochs[-1].velocity = _over_ground(number(4, "speed"), number(0, "course"))
+        return
     clock = number(0, "time")
     time = 3600.0 * (clock // 1e4) + 60.0 * (clock // 1e2 % 1e2) + round(clock % 1e2, 6)
     if not epochs or epochs[-1].time != time:
@@ -166,12 +176,24 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
                 )
     elif kind == "GST":
         epoch.sd = (number(5, "latitude"), number(6, "longitude"), number(7, "height"))
-    elif kind == "RMC" and len(fields[8]) == 6:
+    elif kind == "RMC":
+        if fields[1] == "A":
+            epoch.velocity = _over_ground(number(6, "speed"), number(7, "course"))
+        if len(fields[8]) != 6:
+            return
         date = int(number(8, "date"))
         year = date % 100
         epoch.day = _day(year + (2000 if year < 80 else 1900), date // 100 % 100, date // 10000)
     elif kind == "ZDA" and fields[3]:
         epoch.day = _day(*(int(number(k, "date")) for k in (3, 2, 1)))
+
+
+def _over_ground(knots: float, course_deg: float) -> tuple[float, float, float]:
+    """Velocity north and east, m/s; where it stands, it has no course."""
+    speed, course = _KNOT * knots, np.radians(course_deg)
+    if speed == 0.0:
+        return (0.0, 0.0, np.nan)
+    return (float(speed * np.cos(course)), float(speed * np.sin(course)), np.nan)
 
 
 def _angle(value: float, letter: str, negative: str) -> float:

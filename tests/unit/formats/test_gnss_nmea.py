@@ -5,11 +5,13 @@ from __future__ import annotations
 from functools import reduce
 from operator import xor
 
+import numpy as np
+import numpy as np
 import pytest
 
 from strapdown.exceptions import DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
-from strapdown.tables.columns import GEODETIC, POSITION_SD
+from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY_SD
 
 # 2024-01-15 23:59:59.5 UTC.
 LATE = 1705363199.5
@@ -99,3 +101,17 @@ def test_refused(tmp_path, lines, message):
         read_gnss(written(tmp_path, lines), GnssOptions(position_sd=1.0))
     assert message in str(error.value) and "rover.nmea" in str(error.value)
     assert error.value.finding.remedy
+
+
+def test_speed_and_course_are_a_velocity_without_its_vertical_part(tmp_path):
+    lines = [gga("120000.00"), rmc("120000.00", "150124")]
+    lines += [gga("120001.00"), sentence("GNVTG,180.0,T,,M,36.0,N,66.7,K,A")]
+    lines += [gga("120002.00"), sentence("GNVTG,,T,,M,0.0,N,0.0,K,A")]
+    lines += [gga("120003.00"), sentence("GNVTG,,T,,M,0.2,N,0.4,K,A")]
+    table = read_gnss(written(tmp_path, lines), GnssOptions(position_sd=2.0, velocity_sd=0.1))
+    # A knot is 1852 m an hour: 10 to the east, 36 to the south; a stand; no course of a creep.
+    knot = 1852.0 / 3600.0
+    told = table[["VN", "VE"]].to_numpy()
+    assert told == pytest.approx(np.array([[0, 10], [-36, 0], [0, 0], [0, 0]]) * knot, abs=1e-12)
+    known = np.isfinite(table[VELOCITY_SD].to_numpy())
+    assert known.tolist() == [[True, True, False]] * 3 + [[False] * 3]
