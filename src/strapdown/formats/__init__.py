@@ -9,6 +9,7 @@ from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError, nearest
 from strapdown.formats import (
+    asl,
     broad,
     comma2k19,
     csv,
@@ -50,6 +51,7 @@ READERS: dict[str, Reader] = {
     "comma2k19": Reader(
         "comma2k19 segment, with its pose as truth", comma2k19.detect, comma2k19.read
     ),
+    "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, asl.read),
     "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, sensorstream.read),
     "sensor-logger": Reader(
         "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, sensor_logger.read

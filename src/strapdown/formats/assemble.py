@@ -12,7 +12,7 @@ from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import ConfigError, DataError, Finding, nearest
 from strapdown.formats.assemble_truth import truth_of_log
 from strapdown.formats.clocks import RELATIVE, Clock, clock_of_name, with_clock
-from strapdown.formats.columns import parse_axes, parse_unit, says_increment
+from strapdown.formats.columns import parse_axes, says_increment
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import (
@@ -27,6 +27,7 @@ from strapdown.formats.plausibility import report_absurd, report_gaps
 from strapdown.formats.recording import Origin, RawLog, ReadOptions, Recording
 from strapdown.formats.stamps import Stamps, read_stamps
 from strapdown.formats.summed import OPEN, SUMS, intervals, sampling_of_sums
+from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.results import Reading
 from strapdown.tables import SAMPLINGS, imu_table
 
@@ -89,7 +90,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     body: dict[str, Array] = {}
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     for triad, (unit, why) in units.items():
-        factor = {**UNITS[triad], **SUMS[triad]}[unit]
+        factor = factor_of(unit, {**UNITS[triad], **SUMS[triad]})
         # A long log is a large part of the memory there is: in place, and nothing kept beside it.
         block = values.pop(triad)
         first = block[kept[0]].copy()

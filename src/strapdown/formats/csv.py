@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
-from strapdown.formats.columns import UNIT_OF
 from strapdown.formats.csv_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.formats.day_time import is_day_time
 from strapdown.formats.recording import RawLog
+from strapdown.formats.unit_words import unit_of
 from strapdown.tables import SAMPLINGS
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
@@ -222,7 +222,7 @@ def is_data(field: str) -> bool:
 def _units(line: str, separator: str | None, width: int) -> list[str] | None:
     """Units of a second header line, where every field of it is one."""
     fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
-    known = [f.lower() in UNIT_OF for f in fields if f]
+    known = [unit_of(f) is not None for f in fields if f]
     return fields if len(fields) == width and known and all(known) else None
 
 

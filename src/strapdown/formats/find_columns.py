@@ -9,11 +9,11 @@ from strapdown.formats.columns import (
     INDEXED,
     QUANTITIES,
     TRIADS,
-    UNIT_OF,
     read_name,
     says_increment,
 )
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.unit_words import unit_of
 
 AXES = "xyz"
 
@@ -131,7 +131,7 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
 
 def _unit_of(raw: RawLog, column: str) -> str | None:
     if column in raw.units:
-        return UNIT_OF.get(raw.units[column].strip("[]() ").lower())
+        return unit_of(raw.units[column])
     return read_name(column).unit
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import ConfigError, DataError, nearest
 from strapdown.formats.columns import CLOCKS, EULERS, TIMES
-from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
+from strapdown.formats.unit_words import UNIT_OF as UNITS_OF_LOGS
+from strapdown.formats.unit_words import unit_of
 from strapdown.tables import TRAJECTORY
 
 __all__ = ["QUANTITIES", "TrajectoryColumn", "find_trajectory_columns"]
@@ -191,7 +192,7 @@ def _factor(quantity: str, unit: str | None, word: str, name: str, file: str) ->
     if unit is None:
         # A clock that is called millis says its unit.
         return kind[CLOCKS[word]] if quantity == "time" and word in CLOCKS else 1.0
-    known = _SPELLINGS.get(unit, unit)
+    known = _SPELLINGS.get(unit) or unit_of(unit) or unit
     if known not in kind:
         raise DataError(
             f"'{unit}' is no unit of it (column '{name}')",
