@@ -27,7 +27,9 @@ from strapdown.formats import (
     pyins,
     sensor_folder,
     sensor_logger,
+    sensorlog,
     sensorstream,
+    xsens,
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.recording import RawLog, ReadOptions, Recording
@@ -52,10 +54,12 @@ READERS: dict[str, Reader] = {
         "comma2k19 segment, with its pose as truth", comma2k19.detect, comma2k19.read
     ),
     "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, asl.read),
+    "xsens": Reader("Xsens MT Manager export (.txt .csv)", xsens.detect, xsens.read),
     "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, sensorstream.read),
     "sensor-logger": Reader(
         "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, sensor_logger.read
     ),
+    "sensorlog": Reader("SensorLog of iOS, wide CSV", sensorlog.detect, sensorlog.read),
     "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, phyphox.read),
     "sensor-folder": Reader(
         "folder or zip of one text table a sensor", sensor_folder.detect, sensor_folder.read

@@ -20,8 +20,8 @@ from strapdown.formats.unit_words import unit_of
 from strapdown.tables import SAMPLINGS
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
-COMMENTS = ("#", "%")
-_META = re.compile(r"[#%]\s*(\w+)\s*:\s*(.+?)\s*$")
+COMMENTS = ("#", "%", "//")
+_META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, apart by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
@@ -49,7 +49,8 @@ def read(path: Path) -> RawLog:
     -------
     RawLog
         Columns that hold anything but numbers are left as text. Lines at the top that begin
-        with ``#`` or ``%`` are comments; ``# sampling: mean`` among them is understood.
+        with ``#``, ``%``, ``//`` or ``;`` are comments; ``# sampling: mean`` among them is
+        understood.
 
     Raises
     ------
@@ -208,8 +209,9 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is a comment."""
-    return line.lstrip().startswith(COMMENTS)
+    """Whether a line is a comment; a semicolon begins one where it does not separate fields."""
+    text = line.strip()
+    return text.startswith(COMMENTS) or (text.startswith(";") and ";" not in text.lstrip(";"))
 
 
 def is_data(field: str) -> bool:
@@ -228,7 +230,7 @@ def _units(line: str, separator: str | None, width: int) -> list[str] | None:
 
 def _above(comments: list[str], fields: list[str], separator: str | None) -> list[str]:
     """Names of columns without a header: the last comment, where it is one; else numbers."""
-    text = comments[-1].strip().lstrip("".join(COMMENTS)).strip() if comments else ""
+    text = comments[-1].strip().lstrip("#%/;").strip() if comments else ""
     names = fields_of(text, separator)
     if len(names) == len(fields) and not any(is_data(n) for n in names):
         return names
