@@ -14,9 +14,11 @@ from strapdown.formats import (
     comma2k19,
     csv,
     foot_mounted,
+    gnss_logger,
     hdf5,
     join,
     kf_gins,
+    kitti,
     matlab,
     mpu6050,
     npy_folder,
@@ -25,6 +27,7 @@ from strapdown.formats import (
     phyphox,
     psins,
     pyins,
+    ronin,
     sensor_folder,
     sensor_logger,
     sensorlog,
@@ -53,6 +56,8 @@ READERS: dict[str, Reader] = {
     "comma2k19": Reader(
         "comma2k19 segment, with its pose as truth", comma2k19.detect, comma2k19.read
     ),
+    "kitti": Reader("KITTI raw, folder oxts", kitti.detect, kitti.read),
+    "ronin": Reader("RoNIN, HDF5 of a phone", ronin.detect, ronin.read),
     "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, asl.read),
     "xsens": Reader("Xsens MT Manager export (.txt .csv)", xsens.detect, xsens.read),
     "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, sensorstream.read),
@@ -60,6 +65,9 @@ READERS: dict[str, Reader] = {
         "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, sensor_logger.read
     ),
     "sensorlog": Reader("SensorLog of iOS, wide CSV", sensorlog.detect, sensorlog.read),
+    "gnss-logger": Reader(
+        "GnssLogger of Android, device_imu.csv", gnss_logger.detect, gnss_logger.read
+    ),
     "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, phyphox.read),
     "sensor-folder": Reader(
         "folder or zip of one text table a sensor", sensor_folder.detect, sensor_folder.read

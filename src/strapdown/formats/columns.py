@@ -37,6 +37,7 @@ TRIADS = {
     ],
     "accel": [
         "accel",
+        "acce",
         "acc",
         "accelerometer",
         "accelerometers",
@@ -50,6 +51,7 @@ TRIADS = {
     "mag": [
         "mag",
         "magn",
+        "magnet",
         "magnetometer",
         "magnetometers",
         "magneticfield",

@@ -9,7 +9,15 @@ from pathlib import Path
 import pandas as pd
 
 from strapdown.exceptions import ConfigError, DataError, nearest
-from strapdown.formats import gnss_columns, gnss_kf_gins, gnss_nmea, gnss_pos, pyins
+from strapdown.formats import (
+    gnss_columns,
+    gnss_kf_gins,
+    gnss_logger,
+    gnss_nmea,
+    gnss_pos,
+    kitti,
+    pyins,
+)
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions, table_of_fixes
 
 __all__ = ["GNSS_READERS", "GnssOptions", "GnssReader", "read_gnss"]
@@ -28,6 +36,10 @@ class GnssReader:
 GNSS_READERS: dict[str, GnssReader] = {
     "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
     "nmea": GnssReader("NMEA 0183: GGA, RMC, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
+    "gnss-logger": GnssReader(
+        "GnssLogger of Android: lines Fix", gnss_logger.detect_fixes, gnss_logger.read_fixes
+    ),
+    "kitti": GnssReader("KITTI raw, folder oxts", kitti.detect, kitti.read_fixes),
     "kf-gins": GnssReader(
         "KF-GINS fixes, 7 or 13 columns without a header", gnss_kf_gins.detect, gnss_kf_gins.read
     ),
@@ -68,13 +80,7 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     path, asked = Path(path), options or GnssOptions()
     if not path.exists():
         raise ConfigError("there is no such file", file=str(path), remedy="check the path")
-    if path.is_dir():
-        raise DataError(
-            "this is a folder, and fixes are read from one file",
-            file=path.resolve().name,
-            remedy="give one file of it",
-        )
-    if path.stat().st_size == 0:
+    if path.is_file() and path.stat().st_size == 0:
         raise DataError(
             "the file is empty",
             file=path.name,
@@ -90,6 +96,12 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     for reader in readers:
         if asked.format or reader.detect(path):
             return table_of_fixes(reader.read(path, asked), asked)
+    if path.is_dir():
+        raise DataError(
+            "this is a folder, and fixes are read from one file",
+            file=path.resolve().name,
+            remedy="give one file of it",
+        )
     kinds = "; ".join(r.title for r in GNSS_READERS.values())
     raise DataError(
         f"the ending '{path.suffix}' is of no known format of fixes",
