@@ -22,6 +22,7 @@ from strapdown.tables import SAMPLINGS
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%", "//")
 _META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
+_SEPARATOR = re.compile(r"sep=.?", re.I)
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, apart by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
@@ -209,9 +210,14 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is a comment; a semicolon begins one where it does not separate fields."""
+    """Whether a line is a comment, or Excel's ``sep=;``.
+
+    A semicolon begins one where it does not separate fields.
+    """
     text = line.strip()
-    return text.startswith(COMMENTS) or (text.startswith(";") and ";" not in text.lstrip(";"))
+    if text.startswith(COMMENTS) or _SEPARATOR.fullmatch(text):
+        return True
+    return text.startswith(";") and ";" not in text.lstrip(";")
 
 
 def is_data(field: str) -> bool:
@@ -273,6 +279,7 @@ def _whole_lines(
 ) -> tuple[list[int], list[str]]:
     """Return rows and lines of one width; a last line that was cut is left out."""
     rows, lines = [], []
+    amid: list[tuple[int, str]] = []
     ended = text.endswith(("\n", "\r"))
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
@@ -290,14 +297,25 @@ def _whole_lines(
         if count == width + 1 and separator and line.rstrip().endswith(separator):
             line, count = line.rstrip()[:-1], width
         if count != width:
+            if is_comment(line):
+                amid.append((row, line))
+                continue
+            doubled = separator == "," and count >= 2 * width - 1 > 1
             raise DataError(
                 f"{count} fields, where the first line has {width}",
                 file=name,
                 row=row,
-                remedy="correct or delete that row",
+                remedy="if the comma is the decimal sign, too, export it with semicolons or tabs "
+                "between the fields, or with decimal points"
+                if doubled
+                else "correct or delete that row",
             )
         rows.append(row)
         lines.append(line)
+    if amid:
+        row, line = amid[0]
+        what = f"comments among the rows, {len(amid)} in all, are not read: '{line.strip()[:60]}'"
+        findings.append(Finding(what, file=name, row=row))
     return rows, lines
 
 
@@ -328,7 +346,7 @@ def _was_cut(
 
 def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Columns:
     """Parse the lines under the header, each number to the double nearest to it."""
-    decimal = "," if separator != "," and _comma_is_decimal(lines, separator) else "."
+    decimal = "," if _comma_is_decimal(lines, separator) else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
     # Arrow reads 0xFFF0 as a number; what a sensor meant by it is not known.

@@ -315,8 +315,6 @@ def _of_one_provider(
     keep: NDArray[np.bool_] = np.asarray(said == chosen)
     if not keep.all():
         others = ", ".join(sorted(set(said[~keep])))
-        what = (
-            f"fixes of {chosen} alone are used, {int(keep.sum())} of {keep.size}; not of {others}"
-        )
+        what = f"{int(keep.sum())} of {keep.size} fixes are used, of {chosen}; not of {others}"
         findings.append(Finding(what, file=path.name, quantity="Provider"))
     return keep
