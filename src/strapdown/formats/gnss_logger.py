@@ -49,6 +49,10 @@ FIX_FIELDS = {
     "utc": ("UnixTimeMillis", "(UTC)TimeInMs"),
     "elapsed": ("elapsedRealtimeNanos",),
     "vertical": ("VerticalAccuracyMeters",),
+    "speed": ("SpeedMps", "Speed"),
+    "speed_sd": ("SpeedAccuracyMps",),
+    "bearing": ("BearingDegrees",),
+    "bearing_sd": ("BearingAccuracyDegrees",),
 }
 # Of places: those of the receiver before those that are fused with the phone's other sensors.
 PROVIDERS = ("gps", "gt", "flp", "fused")
@@ -210,9 +214,16 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
                 quantity="down_sd",
             )
         )
+    # Of a velocity whose speed or bearing is not stated, nothing is used; down nothing is known.
+    speed, speed_sd = values("speed"), values("speed_sd")
+    bearing, bearing_sd = np.radians(values("bearing")), np.radians(values("bearing_sd"))
+    down = np.full(speed.size, np.nan)
+    sd = np.hypot(speed_sd, speed * bearing_sd)
     return Fixes(
         name=path.name,
         time=time,
+        velocity=np.column_stack([speed * np.cos(bearing), speed * np.sin(bearing), down]),
+        velocity_sd=np.column_stack([np.where(sd > 0.0, sd, np.nan)] * 2 + [down]),
         place=np.column_stack([values("lat"), values("lon"), values("alt")]),
         rows=rows[keep],
         clock=Clock(UNIX),

@@ -102,7 +102,7 @@ def test_euroc_truth_between_poses_is_interpolated(tmp_path):
     recording = read_log(mav0(tmp_path, every=2), ReadOptions(axes="x,-y,-z"))
     exact = read_log(mav0(tmp_path / "all"), ReadOptions(axes="x,-y,-z")).truth
     names = ["q_w", "q_x", "q_y", "q_z"]
-    # The rate changes by less than 4 rad/s² here; over a step h of 20 ms a constant rate leaves h²/8
+    # The rate changes by less than 4 rad/s² here; over a step h of 20 ms a constant one leaves h²/8
     # of that in the middle.
     at = exact.loc[recording.truth.index, names]
     off = rotation.rotation_angle(recording.truth[names], at)
