@@ -153,6 +153,17 @@ def read_trajectory(path: Path) -> pd.DataFrame:
     return with_clock(table, Clock(UNIX))
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Files that fixes or a trajectory are read from.
+
+    Parameters
+    ----------
+    path : Path
+        As `read`.
+    """
+    return _values(path)[2]
+
+
 def _oxts(path: Path) -> Path | None:
     if not path.is_dir():
         return None
