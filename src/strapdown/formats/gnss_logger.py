@@ -204,7 +204,7 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
         findings.append(Finding(what, file=path.name, quantity="time"))
     horizontal = values("radius") / RADIUS
     vertical = values("vertical")
-    if np.isnan(vertical).any():
+    if np.isnan(vertical).any() and np.isfinite(horizontal).any():
         vertical = np.where(np.isnan(vertical), UNSTATED_VERTICAL * horizontal, vertical)
         findings.append(
             Finding(
@@ -219,15 +219,20 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     bearing, bearing_sd = np.radians(values("bearing")), np.radians(values("bearing_sd"))
     down = np.full(speed.size, np.nan)
     sd = np.hypot(speed_sd, speed * bearing_sd)
+    moves = np.isfinite(sd * np.cos(bearing)).any()
     return Fixes(
         name=path.name,
         time=time,
-        velocity=np.column_stack([speed * np.cos(bearing), speed * np.sin(bearing), down]),
+        velocity=np.column_stack([speed * np.cos(bearing), speed * np.sin(bearing), down])
+        if moves
+        else None,
         velocity_sd=np.column_stack([np.where(sd > 0.0, sd, np.nan)] * 2 + [down]),
         place=np.column_stack([values("lat"), values("lon"), values("alt")]),
         rows=rows[keep],
         clock=Clock(UNIX),
-        position_sd=np.column_stack([horizontal, horizontal, vertical]),
+        position_sd=np.column_stack([horizontal, horizontal, vertical])
+        if np.isfinite(horizontal).any()
+        else None,
         findings=findings,
     )
 

@@ -84,7 +84,7 @@ def read(path: Path) -> RawLog:
     if source is not None:
         columns[source] = stamps
         stated[source] = ("time", "us")
-    if source == STAMP and np.array_equal(stamps, raw.columns[STAMP]):
+    if source is None or (source == STAMP and np.array_equal(stamps, raw.columns[STAMP])):
         # A DOT, which counts µs, writes deg/s; the numbers are asked.
         stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", None) for axis in "XYZ"}
     return dataclasses.replace(raw, columns=columns, stated=stated, rate=rate, findings=findings)

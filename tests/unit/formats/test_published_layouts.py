@@ -16,7 +16,7 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import DataError
 from strapdown.formats import READERS, read_log
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.formats.trajectory_readers import read_trajectory
@@ -269,6 +269,20 @@ def test_gnss_logger_fixes_are_on_the_clock_of_its_sensors(tmp_path):
     assert any(
         "3 of 4 fixes are used, of gps; not of flp" in f.what for f in table.attrs["findings"]
     )
+
+
+def test_ground_truth_of_the_challenge_asks_how_well_it_is_known(tmp_path):
+    top = "MessageType,Provider,LatitudeDegrees,LongitudeDegrees,AltitudeMeters,SpeedMps,"
+    top += "AccuracyMeters,BearingDegrees,UnixTimeMillis\n"
+    rows = [line("Fix", "GT", 37.4, -122.1, 33.2, 1.0, "", 0.5, 1_619_650_832_000 + 1000 * k)
+            for k in range(5)]  # fmt: skip
+    path = tmp_path / "ground_truth.csv"
+    path.write_text(top + "\n".join(rows) + "\n")
+    with pytest.raises(DataError, match="no standard deviations of the places"):
+        read_gnss(path)
+    table = read_gnss(path, GnssOptions(position_sd=0.1))
+    np.testing.assert_allclose(np.diff(table.index), 1.0, atol=1e-6)
+    assert np.isinf(table["VN_sd"]).all()
 
 
 # --- KITTI ------------------------------------------------------------------------------
