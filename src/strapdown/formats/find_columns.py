@@ -102,13 +102,14 @@ def _refuse_nameless(raw: RawLog, left_out: str) -> NoReturn:
     first = ", ".join(f"{k}: {column[0]}" for k, column in enumerate(raw.columns.values(), 1))
     # Increments of KF-GINS are the usual layout of seven.
     seven = len(raw.columns) == 7
+    force = ",accel_x=5,accel_y=6,accel_z=7" if len(raw.columns) >= 7 else ""
     raise DataError(
         f"no column was recognised as gyro_x, gyro_y, gyro_z, for its {len(raw.columns)} columns "
         f"have no names; the first row holds {first}{left_out}",
         file=raw.name,
         row=raw.row(0),
         remedy="say which is which by these numbers, as in --columns time=1,gyro_x=2,gyro_y=3,"
-        "gyro_z=4,accel_x=5,accel_y=6,accel_z=7, with their units (--gyro-unit, --accel-unit, "
+        f"gyro_z=4{force}, with their units (--gyro-unit, --accel-unit, "
         "--time-unit) where the numbers do not tell them"
         + ("; or state the format, as in kf-gins for increments" if seven else ""),
     )
