@@ -362,6 +362,15 @@ CASES = [
         fails=False,
     ),
     Case("Unknown columns", lambda f: text(f / "log.csv", rows(), "a,b,c,d")),
+    Case("Columns without names", lambda f: text(f / "log.csv", rows(), None)),
+    Case(
+        "Raw counts of a sensor",
+        lambda f: text(
+            f / "log.csv",
+            [f"{10 * k},{100 * k},{-7 * k},{k}" for k in range(50)],
+            "millis,gx,gy,gz",
+        ),
+    ),
     Case(
         "A column that is not there",
         lambda f: text(f / "log.csv", rows(), "time_s,wx,wy,wz"),

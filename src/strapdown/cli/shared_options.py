@@ -92,14 +92,17 @@ class LogFlags:
     gyro_unit: Annotated[
         str | None,
         typer.Option(
-            metavar="UNIT", help="rad/s, deg/s, …; rad, deg: increments.", rich_help_panel=LOG_PANEL
+            metavar="UNIT",
+            help="rad/s, deg/s, …; of raw counts deg/s/131; rad, deg: increments.",
+            rich_help_panel=LOG_PANEL,
         ),
     ] = None
     accel_unit: Annotated[
         str | None,
         typer.Option(
             metavar="UNIT",
-            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS); m/s: increments.",
+            help="m/s2, g, mg; -g or -m/s2 for the other sign (iOS); of raw counts g/16384; m/s: "
+            "increments.",
             rich_help_panel=LOG_PANEL,
         ),
     ] = None

@@ -9,7 +9,8 @@ from typing import Any
 from strapdown.config.alignment import AxesTable, LogTable, SensorsTable
 from strapdown.config.crash_checks import Written
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.formats.columns import parse_axes, parse_unit
+from strapdown.formats.columns import parse_axes
+from strapdown.formats.unit_words import parse_unit
 from strapdown.sensors.axes_matrix import NAMED_AXES, check_axes_matrix
 
 __all__ = ["MOST_SAMPLES", "SourceChecks"]

@@ -9,13 +9,16 @@ from pathlib import Path
 
 from strapdown.exceptions import ConfigError, DataError, StrapdownError, nearest
 from strapdown.formats import (
+    asl,
     broad,
     comma2k19,
     csv,
     foot_mounted,
+    gnss_logger,
     hdf5,
     join,
     kf_gins,
+    kitti,
     matlab,
     mpu6050,
     npy_folder,
@@ -24,9 +27,12 @@ from strapdown.formats import (
     phyphox,
     psins,
     pyins,
+    ronin,
     sensor_folder,
     sensor_logger,
+    sensorlog,
     sensorstream,
+    xsens,
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
@@ -51,9 +57,17 @@ READERS: dict[str, Reader] = {
     "comma2k19": Reader(
         "comma2k19 segment, with its pose as truth", comma2k19.detect, comma2k19.read
     ),
+    "kitti": Reader("KITTI raw, folder oxts", kitti.detect, kitti.read),
+    "ronin": Reader("RoNIN, HDF5 of a phone", ronin.detect, ronin.read),
+    "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, asl.read),
+    "xsens": Reader("Xsens MT Manager export (.txt .csv)", xsens.detect, xsens.read),
     "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, sensorstream.read),
     "sensor-logger": Reader(
         "Sensor Logger: zip, folder, CSV, JSON", sensor_logger.detect, sensor_logger.read
+    ),
+    "sensorlog": Reader("SensorLog of iOS, wide CSV", sensorlog.detect, sensorlog.read),
+    "gnss-logger": Reader(
+        "GnssLogger of Android, device_imu.csv", gnss_logger.detect, gnss_logger.read
     ),
     "phyphox": Reader("phyphox: CSV, zip, folder", phyphox.detect, phyphox.read),
     "sensor-folder": Reader(

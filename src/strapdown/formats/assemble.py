@@ -19,6 +19,7 @@ from strapdown.formats.sampling import sampling_of_rates
 from strapdown.formats.summed import SUMS, intervals, sampling_of_sums
 from strapdown.formats.triad_units import told_by_numbers, units_of_triads
 from strapdown.formats.triad_values import values_of_triads
+from strapdown.formats.unit_words import factor_of
 from strapdown.formats.usable_rows import finite_rows
 from strapdown.results.inputs import Reading
 from strapdown.tables import imu_table
@@ -74,7 +75,9 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     for triad, (unit, why) in units.items():
         first = values[triad][kept[0]].copy()
-        body[triad] = _turned(values, triad, axes, {**UNITS[triad], **SUMS[triad]}[unit], kept)
+        body[triad] = _turned(
+            values, triad, axes, factor_of(unit, {**UNITS[triad], **SUMS[triad]}), kept
+        )
         if triad in summed:
             body[triad] /= intervals(time, kept)
         readings += _readings_of_triad(found, triad, axes, (unit, why), first)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats.body_axes import axes_matrix, mirrored
-from strapdown.formats.columns import EULERS, QUATERNIONS, parse_unit
+from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import Origin, RawLog, ReadOptions
 from strapdown.formats.stamps import read_stamps
+from strapdown.formats.unit_words import parse_unit
 from strapdown.results.inputs import Reading
 from strapdown.tables import attitude_table
 
@@ -96,7 +97,8 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
     ----------
     raw : RawLog
     options : ReadOptions
-        Whether to repair is used.
+        Whether to repair is used, and the axes of the log where the attitude is that of its
+        sensor.
     origin : Origin
         What the log's time counts from.
 
@@ -111,7 +113,10 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
         Time cannot be used.
     """
     found = find_columns(raw, ReadOptions())
-    q, _ = _quaternions(raw, found)
+    if raw.truth is not None:
+        q: Array | None = _of_body(raw, raw.truth.q_ns, options.axes)
+    else:
+        q, _ = _quaternions(raw, found)
     if q is None or "time" not in found:
         return None
     ticks, dated = ticks_of(raw, found["time"])
@@ -142,6 +147,17 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
             remedy="name its column with the unit of time, as in time_ms",
         ) from None
     return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
+
+
+def _of_body(raw: RawLog, q_ns: Array, text: str | None) -> Array:
+    """Attitude of the body whose axes a log is read in, from that of the sensor."""
+    axes = parse_axes(text) if text else AS_THEY_ARE
+    if axes == AS_THEY_ARE:
+        return q_ns
+    known = _known(q_ns)
+    q = np.full_like(q_ns, np.nan)
+    q[known] = rotation.compose(q_ns[known], _sensor_from_body(raw, axes))
+    return q
 
 
 def _known(q: Array) -> NDArray[np.bool_]:

@@ -5,22 +5,15 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from strapdown.constants import (
-    ACCEL_SUMS,
-    ACCEL_UNITS,
-    GYRO_SUMS,
-    GYRO_UNITS,
-    MAG_UNITS,
-    TIME_UNITS,
-)
+from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import ConfigError, nearest
+from strapdown.formats.unit_words import UNIT_OF, unit_of
 
 __all__ = [
     "QUANTITIES",
     "ColumnName",
     "parse_axes",
     "parse_column_option",
-    "parse_unit",
     "read_name",
     "says_increment",
 ]
@@ -44,6 +37,7 @@ TRIADS = {
     ],
     "accel": [
         "accel",
+        "acce",
         "acc",
         "accelerometer",
         "accelerometers",
@@ -57,6 +51,7 @@ TRIADS = {
     "mag": [
         "mag",
         "magn",
+        "magnet",
         "magnetometer",
         "magnetometers",
         "magneticfield",
@@ -121,34 +116,8 @@ QUANTITIES = [
     *EULERS,
 ]
 
-# Units as people write them, each to the word that stands for it here.
-_SPELLINGS = {
-    "rad/s": "rad/s rad_s rads rad_per_s rad/sec radps rad·s-1 rad*s^-1 rad.s-1",
-    "mrad/s": "mrad/s mrad_s",
-    "deg/s": "deg/s deg_s degs dps °/s °_s º/s deg_per_s deg/sec degps",
-    "mdeg/s": "mdeg/s mdps mdeg_s",
-    "deg/h": "deg/h deg/hr deg_h deg_per_h °/h",
-    "m/s2": "m/s2 m/s^2 m/s² m_s2 ms2 ms-2 mps2 m_per_s2 m/s/s m·s-2 m*s^-2",
-    "g": "g g0 gs",
-    "m/s": "m/s m_s mps m_per_s m/sec m·s-1 m*s^-1",
-    "g*s": "g*s g·s g_s",
-    "mg": "mg",
-    "uT": "ut µt μt microtesla",
-    "nT": "nt nanotesla",
-    "gauss": "gauss",
-    "mG": "mgauss milligauss",
-    "T": "tesla",
-    "s": "s sec secs second seconds",
-    "ms": "ms msec millis milliseconds",
-    "us": "us µs μs usec micros microseconds",
-    "ns": "ns nsec nanos nanoseconds",
-    "min": "min minutes",
-    "deg": "deg ° degree degrees",
-    "rad": "rad radian radians",
-}
 # The letter of gauss is that of gravity, too.
 _MAGNETIC = {"g": "gauss", "mg": "mG"}
-UNIT_OF = {spelling: unit for unit, text in _SPELLINGS.items() for spelling in text.split()}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
 # By word, the axis of the body and its sign.
@@ -199,7 +168,7 @@ def read_name(name: str) -> ColumnName:
     if match := INDEXED.fullmatch(text):
         text, index = match.groups()
     bracket = _BRACKETS.search(text)
-    unit = UNIT_OF.get(bracket.group(1).lower().replace(" ", "")) if bracket else None
+    unit = unit_of(bracket.group(1)) if bracket else None
     if bracket:
         text = text[: bracket.start()]
     said = ColumnName(None, unit)
@@ -272,38 +241,6 @@ def says_increment(name: str) -> bool:
         (word := "".join(words[start:])) in known or (word[-1:] in _AXES and word[:-1] in known)
         for start in range(len(words))
     )
-
-
-def parse_unit(text: str, kind: str) -> str:
-    """Check a unit that the user stated.
-
-    Parameters
-    ----------
-    text : str
-    kind : {'gyro', 'accel', 'mag', 'time'}
-
-    Returns
-    -------
-    str
-        In this package's spelling.
-
-    Raises
-    ------
-    ConfigError
-        It is no unit of that kind.
-    """
-    known = {
-        "gyro": {**GYRO_UNITS, **GYRO_SUMS},
-        "accel": {**ACCEL_UNITS, **ACCEL_SUMS},
-        "mag": MAG_UNITS,
-        "time": TIME_UNITS,
-    }[kind]
-    unit = UNIT_OF.get(text.strip().lower(), text)
-    if unit not in known:
-        raise ConfigError(
-            f"'{text}' is no unit of it", quantity=f"--{kind}-unit", remedy=nearest(text, known)
-        )
-    return unit
 
 
 def parse_column_option(items: list[str]) -> dict[str, str]:

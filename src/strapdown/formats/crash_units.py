@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.formats.columns import UNIT_OF
+from strapdown.formats.unit_words import UNIT_OF
+from strapdown.formats.unit_words import unit_of as plain_unit_of
 
 __all__ = ["FACTORS", "factor_of", "state_unit", "unit_of"]
 
@@ -60,8 +61,8 @@ def unit_of(text: str) -> tuple[str, str] | None:
         of them.
     """
     plain = text.lower().replace(" ", "").strip("[]\t")
-    unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()"))
-    return None if unit is None else (_QUANTITY[unit], unit)
+    unit = _UNIT_OF.get(plain) or _UNIT_OF.get(plain.strip("()")) or plain_unit_of(plain)
+    return (_QUANTITY[unit], unit) if unit in _QUANTITY else None
 
 
 def factor_of(quantity: str, unit: str) -> float | None:

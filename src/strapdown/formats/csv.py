@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
-from strapdown.formats.columns import UNIT_OF
 from strapdown.formats.csv_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.formats.day_time import is_day_time
 from strapdown.formats.recording import RawLog
+from strapdown.formats.unit_words import unit_of
 from strapdown.tables import SAMPLINGS
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
-COMMENTS = ("#", "%")
-_META = re.compile(r"[#%]\s*(\w+)\s*:\s*(.+?)\s*$")
+COMMENTS = ("#", "%", "//")
+_META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
+_SEPARATOR = re.compile(r"sep=.?", re.I)
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, apart by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
@@ -49,7 +50,8 @@ def read(path: Path) -> RawLog:
     -------
     RawLog
         Columns that hold anything but numbers are left as text. Lines at the top that begin
-        with ``#`` or ``%`` are comments; ``# sampling: mean`` among them is understood.
+        with ``#``, ``%``, ``//`` or ``;`` are comments; ``# sampling: mean`` among them is
+        understood.
 
     Raises
     ------
@@ -208,8 +210,14 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
 
 
 def is_comment(line: str) -> bool:
-    """Whether a line is a comment."""
-    return line.lstrip().startswith(COMMENTS)
+    """Whether a line is a comment, or Excel's ``sep=;``.
+
+    A semicolon begins one where it does not separate fields.
+    """
+    text = line.strip()
+    if text.startswith(COMMENTS) or _SEPARATOR.fullmatch(text):
+        return True
+    return text.startswith(";") and ";" not in text.lstrip(";")
 
 
 def is_data(field: str) -> bool:
@@ -222,13 +230,13 @@ def is_data(field: str) -> bool:
 def _units(line: str, separator: str | None, width: int) -> list[str] | None:
     """Units of a second header line, where every field of it is one."""
     fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
-    known = [f.lower() in UNIT_OF for f in fields if f]
+    known = [unit_of(f) is not None for f in fields if f]
     return fields if len(fields) == width and known and all(known) else None
 
 
 def _above(comments: list[str], fields: list[str], separator: str | None) -> list[str]:
     """Names of columns without a header: the last comment, where it is one; else numbers."""
-    text = comments[-1].strip().lstrip("".join(COMMENTS)).strip() if comments else ""
+    text = comments[-1].strip().lstrip("#%/;").strip() if comments else ""
     names = fields_of(text, separator)
     if len(names) == len(fields) and not any(is_data(n) for n in names):
         return names
@@ -271,6 +279,7 @@ def _whole_lines(
 ) -> tuple[list[int], list[str]]:
     """Return rows and lines of one width; a last line that was cut is left out."""
     rows, lines = [], []
+    amid: list[tuple[int, str]] = []
     ended = text.endswith(("\n", "\r"))
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
@@ -288,14 +297,25 @@ def _whole_lines(
         if count == width + 1 and separator and line.rstrip().endswith(separator):
             line, count = line.rstrip()[:-1], width
         if count != width:
+            if is_comment(line):
+                amid.append((row, line))
+                continue
+            doubled = separator == "," and count >= 2 * width - 1 > 1
             raise DataError(
                 f"{count} fields, where the first line has {width}",
                 file=name,
                 row=row,
-                remedy="correct or delete that row",
+                remedy="if the comma is the decimal sign, too, export it with semicolons or tabs "
+                "between the fields, or with decimal points"
+                if doubled
+                else "correct or delete that row",
             )
         rows.append(row)
         lines.append(line)
+    if amid:
+        row, line = amid[0]
+        what = f"comments among the rows, {len(amid)} in all, are not read: '{line.strip()[:60]}'"
+        findings.append(Finding(what, file=name, row=row))
     return rows, lines
 
 
@@ -326,7 +346,7 @@ def _was_cut(
 
 def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Columns:
     """Parse the lines under the header, each number to the double nearest to it."""
-    decimal = "," if separator != "," and _comma_is_decimal(lines, separator) else "."
+    decimal = "," if _comma_is_decimal(lines, separator) else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
     # Arrow reads 0xFFF0 as a number; what a sensor meant by it is not known.

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NoReturn
 
 from strapdown.exceptions import ConfigError, DataError, nearest
 from strapdown.formats.columns import (
     INDEXED,
     QUANTITIES,
     TRIADS,
-    UNIT_OF,
     read_name,
     says_increment,
 )
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.unit_words import unit_of
 
 AXES = "xyz"
 
@@ -85,14 +86,31 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     if not missing:
         return
     left_out = "".join(f"; {f.what}" for f in raw.findings if f.what.startswith("left out"))
-    # Of numbers without names the increments of KF-GINS are the usual layout.
-    seven = len(raw.columns) == 7 and all(name.startswith("column ") for name in raw.columns)
+    if raw.columns and all(name == f"column {k}" for k, name in enumerate(raw.columns, 1)):
+        _refuse_nameless(raw, left_out)
     raise DataError(
         f"no column was recognised as {', '.join(missing)}; it has: "
         f"{', '.join(raw.columns) or 'none'}{left_out}",
         file=raw.name,
         remedy="name them, as in --columns time=t,gyro_x=wx,gyro_y=wy,gyro_z=wz (a number "
-        "counts columns from 1)"
+        "counts columns from 1)",
+    )
+
+
+def _refuse_nameless(raw: RawLog, left_out: str) -> NoReturn:
+    """Show what stands in columns without names, by which a person can tell them apart."""
+    first = ", ".join(f"{k}: {column[0]}" for k, column in enumerate(raw.columns.values(), 1))
+    # Increments of KF-GINS are the usual layout of seven.
+    seven = len(raw.columns) == 7
+    force = ",accel_x=5,accel_y=6,accel_z=7" if len(raw.columns) >= 7 else ""
+    raise DataError(
+        f"no column was recognised as gyro_x, gyro_y, gyro_z, for its {len(raw.columns)} columns "
+        f"have no names; the first row holds {first}{left_out}",
+        file=raw.name,
+        row=raw.row(0),
+        remedy="say which is which by these numbers, as in --columns time=1,gyro_x=2,gyro_y=3,"
+        f"gyro_z=4{force}, with their units (--gyro-unit, --accel-unit, "
+        "--time-unit) where the numbers do not tell them"
         + ("; or state the format, as in kf-gins for increments" if seven else ""),
     )
 
@@ -131,7 +149,7 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
 
 def _unit_of(raw: RawLog, column: str) -> str | None:
     if column in raw.units:
-        return UNIT_OF.get(raw.units[column].strip("[]() ").lower())
+        return unit_of(raw.units[column])
     return read_name(column).unit
 
 

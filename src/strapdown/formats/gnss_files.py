@@ -13,8 +13,10 @@ from strapdown.formats import (
     gnss_columns,
     gnss_comma2k19,
     gnss_kf_gins,
+    gnss_logger,
     gnss_nmea,
     gnss_pos,
+    kitti,
     pyins,
 )
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions, table_of_fixes
@@ -38,6 +40,10 @@ GNSS_READERS: dict[str, GnssReader] = {
     ),
     "rtklib": GnssReader("solution of RTKLIB (.pos)", gnss_pos.detect, gnss_pos.read),
     "nmea": GnssReader("NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, gnss_nmea.read),
+    "gnss-logger": GnssReader(
+        "GnssLogger of Android: lines Fix", gnss_logger.detect_fixes, gnss_logger.read_fixes
+    ),
+    "kitti": GnssReader("KITTI raw, folder oxts", kitti.detect, kitti.read_fixes),
     "kf-gins": GnssReader(
         "KF-GINS fixes, 7 or 13 columns without a header", gnss_kf_gins.detect, gnss_kf_gins.read
     ),
@@ -59,7 +65,10 @@ def files_of_fixes(path: str | Path) -> tuple[Path, ...]:
     ----------
     path : str or Path
     """
-    return gnss_comma2k19.files_of(Path(path)) or (Path(path),)
+    given = Path(path)
+    if kitti.detect(given):
+        return kitti.files_of(given)
+    return gnss_comma2k19.files_of(given) or (given,)
 
 
 def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:
@@ -88,12 +97,6 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     path, asked = Path(path), options or GnssOptions()
     if not path.exists():
         raise ConfigError("there is no such file", file=str(path), remedy="check the path")
-    if path.is_dir() and not gnss_comma2k19.detect(path):
-        raise DataError(
-            "this is a folder, and fixes are read from one file",
-            file=path.resolve().name,
-            remedy="give one file of it",
-        )
     if path.is_file() and gnss_comma2k19.belongs(path):
         raise DataError(
             "fixes of a comma2k19 segment are two arrays, stamps and values",
@@ -116,6 +119,12 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     for reader in readers:
         if asked.format or reader.detect(path):
             return table_of_fixes(reader.read(path, asked), asked)
+    if path.is_dir():
+        raise DataError(
+            "this is a folder, and fixes are read from one file",
+            file=path.resolve().name,
+            remedy="give one file of it",
+        )
     kinds = "; ".join(r.title for r in GNSS_READERS.values())
     raise DataError(
         f"the ending '{path.suffix}' is of no known format of fixes",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -49,12 +50,16 @@ def read(path: Path) -> RawLog:
     return raw_log(path, arrays, units, meta)
 
 
-def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str], dict[str, Any]]:
+def read_arrays(
+    path: Path, only: Collection[str] | None = None
+) -> tuple[dict[str, NDArray[Any]], dict[str, str], dict[str, Any]]:
     """Read arrays, their ``unit`` attributes, and what the file says of itself.
 
     Parameters
     ----------
     path : Path
+    only : collection of str, optional
+        Names of the datasets that are read; all, if not given.
 
     Returns
     -------
@@ -76,6 +81,8 @@ def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, str], di
             meta: dict[str, Any] = dict(file.attrs.items())
 
             def visit(name: str, item: object) -> None:
+                if only is not None and name not in only:
+                    return
                 if isinstance(item, h5py.Dataset) and not name.startswith("#"):
                     values = _dataset(item, name, path.name)
                     if values.ndim == 0:

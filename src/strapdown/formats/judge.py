@@ -12,6 +12,12 @@ from strapdown.formats.summed import SUMS, sum_of
 
 Array = NDArray[np.float64]
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
+# Of numbers that may be raw counts; the sensor is that of most boards (InvenSense, MPU-6000 and
+# MPU-6050 Product Specification, revision 3.4, sections 6.1 and 6.2).
+_COUNTS = {
+    "gyro": "as in deg/s/131 (an MPU-6050 at ±250 deg/s; 65.5, 32.8, 16.4 at its wider ranges)",
+    "accel": "as in g/16384 (an MPU-6050 at ±2 g; 8192, 4096, 2048 at its wider ranges)",
+}
 # What is shown of the numbers of a unit that nothing tells.
 _CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g"), "mag": ("uT", "gauss")}
 
@@ -91,7 +97,12 @@ def _choices(triad: str, values: Array) -> str:
         f"{_in_plain_words(triad, largest * UNITS[triad][u])})"
         for u in _CHOICES[triad]
     )
-    return f"state it with {_flag(triad)}: {told}"
+    if triad not in _COUNTS or not bool((values == np.round(values)).all()):
+        return f"state it with {_flag(triad)}: {told}"
+    return (
+        f"state it with {_flag(triad)}: {told}; all are whole numbers: if they are raw counts, say "
+        f"how many are a unit, {_COUNTS[triad]}"
+    )
 
 
 def _in_plain_words(triad: str, value: float) -> str:

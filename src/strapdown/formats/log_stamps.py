@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats.clocks import RELATIVE, Clock, clock_of_name
-from strapdown.formats.columns import parse_unit
 from strapdown.formats.find_columns import Column
 from strapdown.formats.inference import Inference
 from strapdown.formats.recording import Origin, RawLog, ReadOptions
 from strapdown.formats.stamps import Stamps, read_stamps
+from strapdown.formats.unit_words import parse_unit
 from strapdown.results.inputs import Reading
 
 __all__ = ["clock_of_log", "stamps_of_log", "time_reading"]

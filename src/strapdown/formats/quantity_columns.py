@@ -11,7 +11,8 @@ import numpy as np
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import ConfigError, DataError, nearest
 from strapdown.formats.columns import CLOCKS
-from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
+from strapdown.formats.unit_words import UNIT_OF as UNITS_OF_LOGS
+from strapdown.formats.unit_words import unit_of
 
 __all__ = [
     "ANGLES",
@@ -197,7 +198,7 @@ def _factor(
     if unit is None:
         # A clock that is called millis says its unit.
         return known.units[CLOCKS[word]] if word in CLOCKS and CLOCKS[word] in known.units else 1.0
-    spelled = SPELLINGS.get(unit, unit)
+    spelled = SPELLINGS.get(unit) or unit_of(unit) or unit
     if spelled not in known.units:
         raise DataError(
             f"'{unit}' is no unit of it (column '{name}')",

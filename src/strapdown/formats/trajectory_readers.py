@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.exceptions import ConfigError, DataError
-from strapdown.formats import csv, parquet, pyins, trajectory_nav
+from strapdown.formats import csv, kitti, parquet, pyins, trajectory_nav
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers, ticks_of
@@ -45,6 +45,7 @@ TRAJECTORY_READERS: dict[str, TrajectoryReader] = {
     "python-ins": TrajectoryReader(
         "python-ins arrays: time, truth (.npz)", pyins.detect_truth, pyins.read_truth
     ),
+    "kitti": TrajectoryReader("KITTI raw, folder oxts", kitti.detect, kitti.read_trajectory),
 }
 
 _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
@@ -81,11 +82,14 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         that latitude and longitude are exchanged or in radians, or that the attitude is in
         radians.
     """
-    path = _there(path)
+    path = Path(path)
+    if not path.exists():
+        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
     if columns is None or not columns:
         for reader in TRAJECTORY_READERS.values():
             if reader.detect(path):
                 return reader.read(path)
+    _refuse_others(path)
     raw = parquet.read(path) if parquet.detect(path) else csv.read(path)
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
     values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
@@ -112,10 +116,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     return table
 
 
-def _there(path: str | Path) -> Path:
-    path = Path(path)
-    if not path.exists():
-        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+def _refuse_others(path: Path) -> None:
     known = (*csv.SUFFIXES, *parquet.SUFFIXES, ".nav", ".npz")
     if path.is_dir() or path.suffix.lower() not in known:
         raise DataError(
@@ -125,7 +126,6 @@ def _there(path: str | Path) -> Path:
             file=path.name,
             remedy=f"give a file with the ending {', '.join(known)}",
         )
-    return path
 
 
 def _values(raw: RawLog, quantity: str, column: Found) -> Array:

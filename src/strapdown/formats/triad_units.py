@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from strapdown.exceptions import DataError, Finding
 from strapdown.formats.body_axes import mirrored
-from strapdown.formats.columns import parse_axes, parse_unit, says_increment
+from strapdown.formats.columns import parse_axes, says_increment
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import UNITS, inferred_unit, report_contradictions
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.summed import OPEN, SUMS
 from strapdown.formats.triad_values import left_out
+from strapdown.formats.unit_words import parse_unit
 
 __all__ = ["told_by_numbers", "units_of_triads"]
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.config import AttitudeSpec, LogSpec
-from strapdown.constants import GYRO_UNITS
+from strapdown.constants import GYRO_SUMS, GYRO_UNITS
 from strapdown.evaluation.known import known_at
 from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats import read_log
-from strapdown.formats.columns import parse_unit
+from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.results.inputs import InputFiles
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.rest import find_rests
@@ -90,7 +90,7 @@ def find_gyro_bias(
         first = rests[0]
         return _bias_of(first, f"mean over the rest {first.start:.3f}–{first.end:.3f} s"), ()
     numbers, unit = _stated_bias(spec.gyro_bias)
-    bias = [v * GYRO_UNITS[unit] for v in numbers]
+    bias = [v * factor_of(unit, GYRO_UNITS) for v in numbers]
     return {"rad_per_s": bias, "from": f"stated: {spec.gyro_bias}"}, ()
 
 
@@ -140,7 +140,14 @@ def _stated_bias(text: str) -> tuple[list[float], str]:
             remedy="give none, rest, rests, three numbers and a unit about the body's forward, "
             "right and down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
         ) from None
-    return numbers, parse_unit((match.group(4) or "rad/s").strip(), "gyro")
+    unit = parse_unit((match.group(4) or "rad/s").strip(), "gyro")
+    if unit in GYRO_SUMS:
+        raise ConfigError(
+            f"'{unit}' is an increment, and a bias is a rate",
+            quantity="--gyro-bias",
+            remedy=f"state it in a unit of rates: {', '.join(GYRO_UNITS)}",
+        )
+    return numbers, unit
 
 
 def initial_attitude(

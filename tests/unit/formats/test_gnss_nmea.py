@@ -6,7 +6,6 @@ from functools import reduce
 from operator import xor
 
 import numpy as np
-import numpy as np
 import pytest
 
 from strapdown.exceptions import DataError

@@ -73,10 +73,10 @@ def _channels(
 
 def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
     # Spellings of other programs are those of the readers, loaded only where a case is read.
-    from strapdown.formats.columns import UNIT_OF
+    from strapdown.formats.unit_words import unit_of
 
     if triad.unit is not None:
-        unit = UNIT_OF.get(triad.unit.strip().lower(), triad.unit)
+        unit = unit_of(triad.unit) or triad.unit
         if unit in _UNITS[_OTHER[kind]]:
             raise written.refuse(
                 (*at, "unit"),
@@ -84,7 +84,7 @@ def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
                 f"use one of {', '.join(_UNITS[kind])}, or move the channels to where they belong",
             )
     if triad.time_unit is not None:
-        unit = UNIT_OF.get(triad.time_unit.strip().lower(), triad.time_unit)
+        unit = unit_of(triad.time_unit) or triad.time_unit
         if unit not in TIME_UNITS:
             raise written.refuse(
                 (*at, "time_unit"), "it is no unit of time", nearest(triad.time_unit, TIME_UNITS)

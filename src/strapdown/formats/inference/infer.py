@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
 from strapdown.exceptions import DataError
-from strapdown.formats.columns import parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns
 from strapdown.formats.inference.arm import LARGEST as LARGEST_ARM
 from strapdown.formats.inference.arm import Arm, fit_arm
@@ -27,6 +26,7 @@ from strapdown.formats.inference.magnetic import infer_mag_unit
 from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.numbers import numbers, ticks_of
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.unit_words import parse_unit
 
 Array = NDArray[np.float64]
 # Longer logs are looked at in parts: this many rows say all that there is to say.

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from strapdown.formats.columns import UNIT_OF, read_name
+from strapdown.formats.columns import read_name
+from strapdown.formats.unit_words import unit_of
 
 __all__ = ["Heading", "read_heading"]
 
@@ -185,7 +186,7 @@ def _unit(name: str) -> str:
     if not bracket:
         return ""
     text = bracket.group(1).lower().replace(" ", "")
-    return UNIT_OF.get(text, _UNITS.get(text, ""))
+    return unit_of(text) or _UNITS.get(text, "")
 
 
 def _quantity(words: list[str], joined: str) -> str:

@@ -1,0 +1,227 @@
+"""The layout of the ASL datasets: EuRoC MAV, TUM VI and what else is written like them.
+
+A folder a sensor, each with ``data.csv``: stamps in ns first, then what a pair of frames and the
+frame of its components are called. ``imu0`` holds ``w_RS_S_x [rad s^-1]`` … and ``a_RS_S_x
+[m s^-2]`` …, rates and specific force of the sensor S in its own axes; these point where the sensor
+was mounted (x up in EuRoC). ``state_groundtruth_estimate0`` or ``mocap0`` holds the place of S in
+the reference frame R, ``p_RS_R_x [m]`` …, and ``q_RS_w []`` …, which turns S into R (Burri and
+others, The EuRoC micro aerial vehicle datasets, Int. J. Robotics Research 35 (2016) 1157-1163;
+Schubert and others, The TUM VI benchmark, IROS 2018). z of R is up, and x points to no
+known direction.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.columns import read_name
+from strapdown.formats.find_columns import Column
+from strapdown.formats.members import file_member, first_line
+from strapdown.formats.numbers import numbers
+from strapdown.formats.recording import RawLog, TruthInSensorAxes
+
+Array = NDArray[np.float64]
+
+DATA = "data.csv"
+IMU = "imu0"
+TRUTHS = ("state_groundtruth_estimate0", "mocap0")
+TIME = "timestamp"
+RATES = {f"w_rs_s_{a}": f"gyro_{a}" for a in "xyz"}
+FORCES = {f"a_rs_s_{a}": f"accel_{a}" for a in "xyz"}
+TURN = {f"q_rs_{a}": f"q_{a}" for a in "wxyz"}
+# R, x forward, y left, z up, from north, east, down: half a turn about x.
+Q_NR = np.array([0.0, 1.0, 0.0, 0.0])
+# Poses farther apart than this are not interpolated between.
+LONGEST_STEP = 0.1  # s
+# Specific force turned into R, on average over a log, may lean by this: a flight that speeds up and
+# does not slow down within the log leans by a few degrees, a z that is not up by 90 or 180.
+MOST_TILT = 15.0  # deg
+
+
+def detect(path: Path) -> bool:
+    """Tell by the header of the table, or of the table of the inertial sensor in a folder."""
+    if path.is_dir():
+        return _imu_of(path) is not None
+    return path.suffix.lower() == ".csv" and (_is_imu(path) or _is_truth(path))
+
+
+def read(path: Path) -> RawLog:
+    """Read rates and specific force; of a folder, with the attitude that stands beside them.
+
+    Parameters
+    ----------
+    path : Path
+        ``data.csv`` of a sensor or of a ground truth; or the folder ``mav0``, ``imu0``, or that
+        which holds ``mav0``.
+
+    Returns
+    -------
+    RawLog
+        Of a ground truth alone, stamps and the attitude.
+
+    Raises
+    ------
+    DataError
+        A table is damaged.
+    """
+    if path.is_dir():
+        return _folder(path)
+    return _truth_table(path, path.name) if _is_truth(path) else _imu_table(path, path.name)
+
+
+def _imu_of(folder: Path) -> Path | None:
+    """The table of the inertial sensor, from any of the folders around it."""
+    tables = (folder / DATA, folder / IMU / DATA, folder / "mav0" / IMU / DATA)
+    return next((t for t in tables if t.is_file() and _is_imu(t)), None)
+
+
+def _names(path: Path) -> set[str]:
+    line = first_line(file_member(path)).lstrip("# ") if path.is_file() else ""
+    return {_plain(field) for field in line.split(",")}
+
+
+def _is_imu(path: Path) -> bool:
+    return {TIME, *RATES, *FORCES} <= _names(path)
+
+
+def _is_truth(path: Path) -> bool:
+    return {TIME, *TURN} <= _names(path)
+
+
+def _plain(name: str) -> str:
+    return name.partition("[")[0].strip().lower()
+
+
+def _imu_table(path: Path, name: str) -> RawLog:
+    return _stated(csv.parse(path.read_bytes(), name, (path,)), RATES | FORCES)
+
+
+def _stated(raw: RawLog, known: dict[str, str]) -> RawLog:
+    stated: dict[str, tuple[str, str | None]] = {}
+    for column in raw.columns:
+        quantity = "time" if _plain(column) == TIME else known.get(_plain(column))
+        if quantity is not None:
+            unit = read_name(column).unit
+            stated[column] = (quantity, unit or "ns" if quantity == "time" else unit)
+    return dataclasses.replace(raw, stated=stated)
+
+
+def _truth_table(path: Path, name: str) -> RawLog:
+    """Stamps of a ground truth and its attitude, z of R taken for up and x for north."""
+    raw = _stated(csv.parse(path.read_bytes(), name, (path,)), TURN)
+    by_quantity = {q: Column(c, None, "") for c, (q, _) in raw.stated.items()}
+    q = np.column_stack([numbers(raw, by_quantity[k], k) for k in TURN.values()]).astype(np.float64)
+    norm = np.linalg.norm(np.where(np.abs(q) < 2.0, q, np.nan), axis=1)
+    good = np.abs(norm - 1.0) < 0.01
+    q_ns = np.full(q.shape, np.nan)
+    q_ns[good] = rotation.compose(Q_NR, q[good] / norm[good, None])
+    finding = Finding(
+        "attitude to its own world, z up, which is taken to be level; its x is taken for north: "
+        "headings are of that world",
+        file=name,
+        quantity="attitude",
+    )
+    return dataclasses.replace(
+        raw,
+        stated={c: said for c, said in raw.stated.items() if said[0] == "time"},
+        truth=TruthInSensorAxes(q_ns, good),
+        findings=[*raw.findings, finding],
+    )
+
+
+def _folder(path: Path) -> RawLog:
+    table = _imu_of(path)
+    if table is None:
+        raise DataError(
+            f"there is no {IMU}/{DATA} in it",
+            file=path.resolve().name,
+            remedy="give the folder mav0 of a sequence, or a table data.csv",
+        )
+    whole = path.resolve().name
+    raw = dataclasses.replace(_imu_table(table, f"{table.parent.name}/{DATA}"), name=whole)
+    around = table.parent.parent
+    truth = next((t for n in TRUTHS if _is_truth(t := around / n / DATA)), None)
+    # A bundle names every file that was read by its place in the folder that was given.
+    if truth is None or table.parent == path:
+        return raw
+    known = _truth_table(truth, f"{truth.parent.name}/{DATA}")
+    q_ns = _at_samples(_seconds(raw, known), _seconds(known, known), known)
+    return _with(raw, q_ns, known)
+
+
+def _seconds(raw: RawLog, origin: RawLog) -> Array:
+    """Seconds since the first stamp of a ground truth; whole nanoseconds subtract exactly."""
+
+    def stamps(log: RawLog) -> NDArray[np.generic]:
+        column = next(c for c, (q, _) in log.stated.items() if q == "time")
+        return numbers(log, Column(column, None, ""), "time")
+
+    return np.asarray((stamps(raw) - stamps(origin)[0]).astype(np.float64) * 1e-9)
+
+
+def _at_samples(time: Array, known: Array, truth: RawLog) -> Array:
+    """Attitude at the samples, at a constant rate between poses; NaN where none is near."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    assert truth.truth is not None
+    q_ns = np.full((time.size, 4), np.nan)
+    order = np.flatnonzero(truth.truth.scored & np.isfinite(known))
+    order = order[np.diff(known[order], prepend=-np.inf) > 0]
+    if order.size < 2:
+        return q_ns
+    poses, stamps = truth.truth.q_ns[order], known[order]
+    inside = np.flatnonzero((time >= stamps[0]) & (time <= stamps[-1]))
+    after = np.clip(np.searchsorted(stamps, time[inside]), 1, stamps.size - 1)
+    inside = inside[stamps[after] - stamps[after - 1] <= LONGEST_STEP]
+    if inside.size:
+        turned = Slerp(stamps, Rotation.from_quat(poses, scalar_first=True))(time[inside])
+        q_ns[inside] = turned.as_quat(scalar_first=True)
+    return q_ns
+
+
+def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
+    """The log with the attitude at its samples, where gravity agrees that its z is up."""
+    findings = [*raw.findings, *known.findings]
+    at = np.asarray(np.isfinite(q_ns).all(axis=1))
+    force = np.column_stack(
+        [
+            numbers(raw, Column(c, None, ""), q).astype(np.float64)
+            for a in "xyz"
+            for c, (q, _) in raw.stated.items()
+            if q == f"accel_{a}"
+        ]
+    )
+    at = np.asarray(at & np.isfinite(force).all(axis=1))
+    tilt = np.nan
+    if at.any():
+        mean = rotation.rotate(q_ns[at], force[at]).mean(axis=0)
+        tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[1]), -mean[2])))
+    if not tilt <= MOST_TILT:
+        why = (
+            f"specific force, turned into its world, leans by {tilt:.3g}° from its z on average"
+            if at.any()
+            else "none of its poses is near a sample"
+        )
+        findings.append(Finding(f"left out: {why}", file=known.name, quantity="attitude"))
+        return dataclasses.replace(raw, findings=findings)
+    findings.append(
+        Finding(
+            f"interpolated to {int(at.sum())} of {at.size} samples; there specific force, on "
+            f"average, leans by {tilt:.2g}° from the z of its world",
+            file=known.name,
+            quantity="attitude",
+        )
+    )
+    return dataclasses.replace(
+        raw,
+        truth=TruthInSensorAxes(q_ns, at),
+        files=(*raw.files, *known.files),
+        findings=findings,
+    )

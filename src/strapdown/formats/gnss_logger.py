@@ -1,0 +1,336 @@
+"""GnssLogger of Android, and ``device_imu.csv`` of the Google Smartphone Decimeter Challenge.
+
+One line a sample, the kind first: ``UncalGyro,1663164669189,65972053803181,…``. What the fields are
+is in LOGGING_FORMAT.md of https://github.com/google/gps-measurement-tools: ``utcTimeMillis`` (that
+of the phone's clock), ``elapsedRealtimeNanos`` since the phone was started, three values in rad/s,
+m/s² or µT about the axes of the phone, and three biases that Android estimates and that are not
+taken off. ``device_imu.csv`` is the same table with a header (kaggle.com/competitions/
+smartphone-decimeter-2022/data). ``Fix`` is a place, height over the ellipsoid of WGS 84 (Android,
+Location.getAltitude).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.clocks import UNIX, Clock
+from strapdown.formats.csv_columns import parsed
+from strapdown.formats.find_columns import Column
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.join import join
+from strapdown.formats.numbers import numbers
+from strapdown.formats.phones import sensor_log
+from strapdown.formats.recording import RawLog
+
+Array = NDArray[np.float64]
+
+KINDS = {
+    "gyro": (("Gyro", "UncalGyro"), "rad/s"),
+    "accel": (("Accel", "UncalAccel"), "m/s2"),
+    "mag": (("Mag", "UncalMag"), "uT"),
+}
+SENSOR = ("kind", "utcTimeMillis", "elapsedRealtimeNanos", "x", "y", "z")
+HEADER = "MessageType,utcTimeMillis,elapsedRealtimeNanos,MeasurementX,MeasurementY,MeasurementZ"
+FIX = "Fix"
+FIX_FIELDS = {
+    "provider": ("Provider",),
+    "lat": ("LatitudeDegrees", "Latitude"),
+    "lon": ("LongitudeDegrees", "Longitude"),
+    "alt": ("AltitudeMeters", "Altitude"),
+    "radius": ("AccuracyMeters", "Accuracy"),
+    "utc": ("UnixTimeMillis", "(UTC)TimeInMs"),
+    "elapsed": ("elapsedRealtimeNanos",),
+    "vertical": ("VerticalAccuracyMeters",),
+    "speed": ("SpeedMps", "Speed"),
+    "speed_sd": ("SpeedAccuracyMps",),
+    "bearing": ("BearingDegrees",),
+    "bearing_sd": ("BearingAccuracyDegrees",),
+}
+# Of places: those of the receiver before those that are fused with the phone's other sensors.
+PROVIDERS = ("gps", "gt", "flp", "fused")
+# The radius that holds 68 % of a circular normal distribution, in standard deviations (Android,
+# Location.getAccuracy): 1 - exp(-r²/2) = 0.68.
+RADIUS = float(np.sqrt(-2.0 * np.log(0.32)))
+# Heights of receivers are known about half as well as places, where nothing says how well.
+UNSTATED_VERTICAL = 2.0
+# The two clocks of a phone may drift, and its clock of the day be set, by this within a log.
+MOST_DRIFT = 0.05  # s
+HEAD = 1 << 16  # bytes
+
+
+def detect(path: Path) -> bool:
+    """Tell by the header of the table, or by the comments that say the fields of each kind."""
+    return _has(path, lambda line: line.startswith(HEADER)) or _has(
+        path, lambda line: _is_description(line, ("UncalGyro", "Gyro"))
+    )
+
+
+def detect_fixes(path: Path) -> bool:
+    """Tell by the comment that says the fields of a fix, or by a header with the same names."""
+    return _has(path, lambda line: _is_description(line, (FIX,)) or _is_fix_header(line))
+
+
+def _has(path: Path, wanted: Any) -> bool:
+    if not csv.detect(path):
+        return False
+    with path.open("rb") as stream:
+        head = stream.read(HEAD).decode("utf-8-sig", "replace")
+    return any(wanted(line) for line in head.splitlines())
+
+
+def _is_description(line: str, kinds: tuple[str, ...]) -> bool:
+    fields = line.lstrip("# ").split(",")
+    times = {"utcTimeMillis", *FIX_FIELDS["utc"]}
+    return line.startswith("#") and fields[0].strip() in kinds and bool(times & set(fields))
+
+
+def _is_fix_header(line: str) -> bool:
+    return line.startswith("MessageType,Provider,LatitudeDegrees,")
+
+
+def read(path: Path) -> RawLog:
+    """Read gyro, accelerometer and magnetometer, and join them on the stamps of the gyro.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Stamps in ns since 1970: those since the start of the phone, which advance evenly, with
+        the median of what its clock of the day is ahead.
+
+    Raises
+    ------
+    DataError
+        A line is damaged, or there is no gyro.
+    """
+    findings: list[Finding] = []
+    lines = _lines(path)
+    ahead = _ahead(path, lines, findings)
+    logs = []
+    for triad, (kinds, unit) in KINDS.items():
+        kind = next((k for k in kinds if lines.get(k)), None)
+        if kind is None:
+            continue
+        if kind == "UncalGyro":
+            what = "UncalGyro is read, from which the phone has taken no bias"
+            findings.append(Finding(what, file=path.name, quantity=triad))
+        table, rows = _table(path, lines[kind], SENSOR)
+        table["time"] = _whole(table["elapsedRealtimeNanos"], path, rows) + ahead
+        log = sensor_log(
+            f"{path.name}/{kind}",
+            path,
+            {n: table[n] for n in ("time", "x", "y", "z")},
+            triad,
+            unit,
+            time=("time", "ns"),
+            rows=rows,
+        )
+        logs.append(log)
+    if not lines.get("UncalGyro") and not lines.get("Gyro"):
+        raise DataError(
+            f"no line of a gyroscope in it; it holds: {', '.join(lines) or 'nothing'}",
+            file=path.name,
+            quantity="gyro",
+            remedy="record with Sensors switched on in the settings of GnssLogger",
+        )
+    raw = join(logs, path.name, (path,))
+    return dataclasses.replace(raw, findings=[*findings, *raw.findings], clock=UNIX)
+
+
+def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+    """Read the fixes of the receiver.
+
+    Parameters
+    ----------
+    path : Path
+    options : GnssOptions
+        Not used here.
+
+    Returns
+    -------
+    Fixes
+        Stamps in s since 1970, on the clock of the sensors where the log has them.
+
+    Raises
+    ------
+    DataError
+        There is no fix, or a line is damaged.
+    """
+    findings: list[Finding] = []
+    lines = _lines(path)
+    names = _fix_names(path)
+    if not lines.get(FIX):
+        raise DataError(
+            f"no line of a fix in it; it holds: {', '.join(lines) or 'nothing'}",
+            file=path.name,
+            quantity="lat, lon",
+            remedy="record with Location switched on in the settings of GnssLogger",
+        )
+    table, rows = _table(path, lines[FIX], names)
+    at = {q: next((n for n in known if n in table), None) for q, known in FIX_FIELDS.items()}
+    missing = [FIX_FIELDS[q][0] for q in ("provider", "lat", "lon", "alt", "utc") if not at[q]]
+    if missing:
+        raise DataError(
+            f"fixes have no field {', '.join(missing)}",
+            file=path.name,
+            row=int(rows[0]),
+            remedy="export the log again",
+        )
+    keep = _of_one_provider(path, table[str(at["provider"])], findings)
+
+    def values(quantity: str) -> Array:
+        name = at[quantity]
+        if name is None:
+            return np.full(int(keep.sum()), np.nan)
+        raw = RawLog(path.name, (path,), {name: table[name]}, rows=rows)
+        return numbers(raw, Column(name, None, ""), quantity).astype(np.float64)[keep]
+
+    time = values("utc") * 1e-3
+    if at["elapsed"] and any(lines.get(k) for k in ("UncalGyro", "Gyro")):
+        elapsed = _whole(table[str(at["elapsed"])], path, rows)[keep]
+        time = np.asarray((elapsed + _ahead(path, lines, findings)) * 1e-9, dtype=np.float64)
+        what = "stamps of the fixes are those since the phone was started, as those of the sensors"
+        findings.append(Finding(what, file=path.name, quantity="time"))
+    horizontal = values("radius") / RADIUS
+    vertical = values("vertical")
+    if np.isnan(vertical).any() and np.isfinite(horizontal).any():
+        vertical = np.where(np.isnan(vertical), UNSTATED_VERTICAL * horizontal, vertical)
+        findings.append(
+            Finding(
+                "how well heights are known is not stated for all fixes: "
+                f"{UNSTATED_VERTICAL:g} times the standard deviation of north and east is taken",
+                file=path.name,
+                quantity="down_sd",
+            )
+        )
+    # Of a velocity whose speed or bearing is not stated, nothing is used; down nothing is known.
+    speed, speed_sd = values("speed"), values("speed_sd")
+    bearing, bearing_sd = np.radians(values("bearing")), np.radians(values("bearing_sd"))
+    down = np.full(speed.size, np.nan)
+    sd = np.hypot(speed_sd, speed * bearing_sd)
+    moves = np.isfinite(sd * np.cos(bearing)).any()
+    return Fixes(
+        name=path.name,
+        time=time,
+        velocity=np.column_stack([speed * np.cos(bearing), speed * np.sin(bearing), down])
+        if moves
+        else None,
+        velocity_sd=np.column_stack([np.where(sd > 0.0, sd, np.nan)] * 2 + [down]),
+        place=np.column_stack([values("lat"), values("lon"), values("alt")]),
+        rows=rows[keep],
+        clock=Clock(UNIX),
+        position_sd=np.column_stack([horizontal, horizontal, vertical])
+        if np.isfinite(horizontal).any()
+        else None,
+        findings=findings,
+    )
+
+
+def _lines(path: Path) -> dict[str, list[tuple[int, str]]]:
+    """Lines by their kind, each with its row; a last line that was cut is left out."""
+    text, _ = csv.decoded(path.read_bytes(), path.name)
+    found: dict[str, list[tuple[int, str]]] = {}
+    wanted = {k for kinds, _ in KINDS.values() for k in kinds} | {FIX}
+    for row, line in enumerate(text.splitlines(), 1):
+        kind = line.partition(",")[0]
+        if kind in wanted:
+            found.setdefault(kind, []).append((row, line))
+    if found and not text.endswith("\n"):
+        kind = max(found, key=lambda k: found[k][-1][0])
+        last, before = found[kind][-1], found[kind][0]
+        if last[1].count(",") < before[1].count(","):
+            found[kind].pop()
+    return found
+
+
+def _table(
+    path: Path, lines: list[tuple[int, str]], names: Iterable[str]
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.int64]]:
+    """Fields of lines of one kind by their names; what stands behind the named ones is not read."""
+    known = list(names)
+    width = lines[0][1].count(",") + 1
+    odd = next(((row, ln) for row, ln in lines if ln.count(",") + 1 != width), None)
+    if odd is not None or width < min(len(known), len(SENSOR)):
+        row, line = odd or lines[0]
+        raise DataError(
+            f"{line.count(',') + 1} fields, where {max(width, len(SENSOR))} were expected",
+            file=path.name,
+            row=row,
+            remedy="correct or delete that row",
+        )
+    columns = parsed("\n".join(line for _, line in lines).encode(), width, ",")
+    return dict(zip(known, columns, strict=False)), np.array([row for row, _ in lines])
+
+
+def _whole(stamps: NDArray[Any], path: Path, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    if stamps.dtype.kind in "iu":
+        return stamps.astype(np.int64)
+    bad = np.flatnonzero([not str(s).strip().isdecimal() for s in stamps])
+    raise DataError(
+        f"'{stamps[bad[0]]}' is no whole number of nanoseconds",
+        file=path.name,
+        row=int(rows[bad[0]]),
+        quantity="elapsedRealtimeNanos",
+        remedy="correct or delete that row",
+    )
+
+
+def _ahead(path: Path, lines: dict[str, list[tuple[int, str]]], findings: list[Finding]) -> int:
+    """How far the clock of the day is ahead of that since the start of the phone, in ns."""
+    kind = next((k for k in ("Gyro", "UncalGyro") if lines.get(k)), None)
+    if kind is None:
+        return 0
+    table, rows = _table(path, lines[kind], SENSOR)
+    utc = _whole(table["utcTimeMillis"], path, rows)
+    ahead = utc * 1_000_000 - _whole(table["elapsedRealtimeNanos"], path, rows)
+    middle = int(np.sort(ahead)[ahead.size // 2])
+    if (drift := float(np.ptp(ahead)) * 1e-9) > MOST_DRIFT:
+        findings.append(
+            Finding(
+                f"the phone's clock of the day moves by {drift:.3g} s against that since its "
+                "start, which is used",
+                file=path.name,
+                quantity="time",
+            )
+        )
+    return middle
+
+
+def _fix_names(path: Path) -> list[str]:
+    with path.open("rb") as stream:
+        head = stream.read(HEAD).decode("utf-8-sig", "replace")
+    line = next(
+        (n for n in head.splitlines() if _is_description(n, (FIX,)) or _is_fix_header(n)), ""
+    )
+    return [name.strip() for name in line.lstrip("# ").split(",")]
+
+
+def _of_one_provider(
+    path: Path, providers: NDArray[Any], findings: list[Finding]
+) -> NDArray[np.bool_]:
+    said = np.array([str(p).strip().lower() for p in providers])
+    chosen = next((p for p in PROVIDERS if (said == p).any()), None)
+    if chosen is None:
+        raise DataError(
+            f"no fix of a satellite receiver; fixes are of {', '.join(sorted(set(said)))}",
+            file=path.name,
+            quantity="Provider",
+            remedy="record with GPS switched on",
+        )
+    keep: NDArray[np.bool_] = np.asarray(said == chosen)
+    if not keep.all():
+        others = ", ".join(sorted(set(said[~keep])))
+        what = f"{int(keep.sum())} of {keep.size} fixes are used, of {chosen}; not of {others}"
+        findings.append(Finding(what, file=path.name, quantity="Provider"))
+    return keep

@@ -1,0 +1,231 @@
+"""Folders ``oxts`` of the raw recordings of KITTI: an OXTS RT 3003, and its own solution.
+
+``timestamps.txt`` holds a date a line, ``data/0000000000.txt`` and so on thirty numbers each
+(Geiger and others, Vision meets robotics: the KITTI dataset, Int. J. Robotics Research 32 (2013)
+1231-1237; dataformat.txt of its development kit): latitude and longitude in deg, height in m; roll,
+pitch and yaw in rad; velocity north, east, forward, left, up; acceleration with gravity about x, y,
+z and forward, left, up; rates likewise; accuracies of place and velocity in m and m/s; then states
+of the receiver. x points forward, y left, z up. Roll is positive with the left side up, pitch with
+the front down, and yaw counts from east to north: Rz(yaw) Ry(pitch) Rx(roll) turns x, y, z to east,
+north, up. Rows of the folder are counted from 1.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats.clocks import UNIX, Clock, with_clock
+from strapdown.formats.gnss_fixes import Fixes, GnssOptions
+from strapdown.formats.recording import RawLog, TruthInSensorAxes
+from strapdown.tables import trajectory_table
+
+Array = NDArray[np.float64]
+
+FIELDS = 30
+PLACE, EULER, NORTH_EAST, UP = slice(0, 3), slice(3, 6), slice(6, 8), 10
+FORCE, RATE, ACCURACY = slice(11, 14), slice(17, 20), slice(23, 25)
+AXES = "x,-y,-z"  # forward, left, up
+# From forward, right, down to forward, left, up: half a turn about x.
+Q_SB = np.array([0.0, 1.0, 0.0, 0.0])
+OWN = "the own solution of the OXTS unit, of these very sensors and its receivers: no independent"
+_NAME = re.compile(r"\d{10}\.txt")
+
+
+def detect(path: Path) -> bool:
+    """Tell by ``timestamps.txt`` and a first file of thirty numbers."""
+    folder = _oxts(path)
+    first = None if folder is None else folder / "data" / f"{0:010d}.txt"
+    if first is None or not first.is_file():
+        return False
+    return len(first.read_text(encoding="ascii", errors="replace").split()) == FIELDS
+
+
+def read(path: Path) -> RawLog:
+    """Read rates and specific force, and the attitude of the unit's own solution as truth.
+
+    Parameters
+    ----------
+    path : Path
+        The folder ``oxts``, or that of the drive, which holds it.
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        A file is missing or damaged.
+    """
+    time, values, files = _values(path)
+    columns = {"timestamp": time}
+    stated: dict[str, tuple[str, str | None]] = {"timestamp": ("time", "ns")}
+    for triad, part, unit, letter in (("gyro", RATE, "rad/s", "w"), ("accel", FORCE, "m/s2", "a")):
+        for k, axis in enumerate("xyz"):
+            columns[f"{letter}{axis}"] = np.ascontiguousarray(values[:, part][:, k])
+            stated[f"{letter}{axis}"] = (f"{triad}_{axis}", unit)
+    q_ns = rotation.compose(
+        rotation.quaternion_from_euler(_euler(values)), rotation.conjugate(Q_SB)
+    )
+    name = path.resolve().name
+    return RawLog(
+        name=name,
+        files=files,
+        columns=columns,
+        stated=stated,
+        axes=AXES,
+        truth=TruthInSensorAxes(q_ns, np.ones(len(values), dtype=bool)),
+        findings=[Finding(f"the truth is {OWN} truth", file=name, quantity="attitude")],
+        clock=UNIX,
+    )
+
+
+def read_fixes(path: Path, options: GnssOptions) -> Fixes:
+    """Read places and velocities of the unit's own solution as fixes.
+
+    Parameters
+    ----------
+    path : Path
+        As `read`.
+    options : GnssOptions
+        Not used here.
+
+    Returns
+    -------
+    Fixes
+        Every one with the accuracy that the unit states, north and east as down.
+
+    Raises
+    ------
+    DataError
+        As `read`.
+    """
+    time, values, _ = _values(path)
+    name = path.resolve().name
+    accuracy = values[:, ACCURACY]
+    what = f"places and velocities are {OWN} aid, and its errors are the same from fix to fix"
+    return Fixes(
+        name=name,
+        time=np.asarray(time * 1e-9, dtype=np.float64),
+        place=values[:, PLACE],
+        rows=np.arange(1, time.size + 1),
+        clock=Clock(UNIX),
+        velocity=_velocity(values),
+        position_sd=np.repeat(accuracy[:, :1], 3, axis=1),
+        velocity_sd=np.repeat(accuracy[:, 1:], 3, axis=1),
+        zero_is_unknown=True,
+        findings=[Finding(what, file=name, quantity="lat, lon")],
+    )
+
+
+def read_trajectory(path: Path) -> pd.DataFrame:
+    """Read the unit's own solution as a trajectory.
+
+    Parameters
+    ----------
+    path : Path
+        As `read`.
+
+    Returns
+    -------
+    DataFrame
+        A Trajectory table in seconds from 1970.
+
+    Raises
+    ------
+    DataError
+        As `read`.
+    """
+    time, values, _ = _values(path)
+    name = path.resolve().name
+    table = trajectory_table(
+        time * 1e-9, values[:, PLACE], _velocity(values), _euler(values), source=name
+    )
+    table.attrs["ellipsoid"] = "wgs84"
+    table.attrs["findings"] = (Finding(f"it is {OWN} truth", file=name, quantity="trajectory"),)
+    return with_clock(table, Clock(UNIX))
+
+
+def files_of(path: Path) -> tuple[Path, ...]:
+    """Files that fixes or a trajectory are read from.
+
+    Parameters
+    ----------
+    path : Path
+        As `read`.
+    """
+    return _values(path)[2]
+
+
+def _oxts(path: Path) -> Path | None:
+    if not path.is_dir():
+        return None
+    return next((f for f in (path, path / "oxts") if (f / "timestamps.txt").is_file()), None)
+
+
+def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
+    """Stamps in ns since 1970, the thirty numbers of each, and the files."""
+    folder = _oxts(path)
+    if folder is None:
+        raise DataError(
+            "there is no timestamps.txt in it",
+            file=path.resolve().name,
+            remedy="give the folder oxts of a raw recording, or that of its drive",
+        )
+    stamps = folder / "timestamps.txt"
+    lines = [n for n in stamps.read_text(encoding="ascii", errors="replace").splitlines() if n]
+    dates = pd.to_datetime(pd.Series(lines), format="ISO8601", errors="coerce")
+    if dates.isna().any():
+        row = int(np.argmax(dates.isna().to_numpy()))
+        raise DataError(
+            f"'{lines[row]}' is no date",
+            file=f"oxts/{stamps.name}",
+            row=row + 1,
+            quantity="time",
+            remedy="get the recording again from its source",
+        )
+    files = sorted(f for f in (folder / "data").iterdir() if _NAME.fullmatch(f.name))
+    # Of some recordings a few files are missing: each belongs to the stamp of its number.
+    numbers = np.array([int(f.stem) for f in files])
+    if not files or numbers[-1] >= len(lines):
+        raise DataError(
+            f"{len(files)} files of data, the last {files[-1].name if files else '-'}, and "
+            f"{len(lines)} stamps",
+            file="oxts/data",
+            remedy="copy the folder whole",
+        )
+    values = np.array([_numbers(f) for f in files])
+    time = dates.to_numpy().astype("datetime64[ns]").astype(np.int64)[numbers]
+    return time, values, (stamps, *files)
+
+
+def _numbers(file: Path) -> Array:
+    fields = file.read_text(encoding="ascii", errors="replace").split()
+    try:
+        values = np.array(fields, dtype=np.float64)
+    except ValueError:
+        values = np.empty(0)
+    if values.size != FIELDS or not np.isfinite(values).all():
+        raise DataError(
+            f"{len(fields)} fields, where {FIELDS} numbers were expected",
+            file=f"oxts/data/{file.name}",
+            remedy="get the recording again from its source",
+        )
+    return values
+
+
+def _euler(values: Array) -> Array:
+    """Roll, pitch and heading of forward, right, down to north, east, down, in deg."""
+    roll, pitch, yaw = np.degrees(values[:, EULER]).T
+    return np.column_stack([roll, -pitch, (90.0 - yaw + 180.0) % 360.0 - 180.0])
+
+
+def _velocity(values: Array) -> Array:
+    return np.column_stack([values[:, NORTH_EAST], -values[:, UP]])

@@ -1,0 +1,75 @@
+"""RoNIN: HDF5 files of a phone that was carried, beside another on the chest.
+
+``synced/time`` in s, ``synced/gyro`` in rad/s, ``synced/acce`` in m/s² and ``synced/magnet`` in µT
+are of the carried phone, at 200 Hz, in its own axes (Herath, Yan and Furukawa, RoNIN, ICRA 2020;
+source/preprocessing/compile_dataset_h5.py and gen_dataset_v2.py of
+https://github.com/Sachini/ronin). ``pose/tango_ori`` is the attitude of the phone on the chest and
+says nothing of this one; ``synced/game_rv`` is what the carried phone itself makes of its sensors.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import hdf5
+from strapdown.formats.arrays import raw_log
+from strapdown.formats.phones import AXES
+from strapdown.formats.recording import RawLog
+
+TIME, GYRO, FORCE, MAG = "synced/time", "synced/gyro", "synced/acce", "synced/magnet"
+TRIADS = {GYRO: ("gyro", "rad/s"), FORCE: ("accel", "m/s2"), MAG: ("mag", "uT")}
+CHEST = "pose/tango_ori"
+
+
+def detect(path: Path) -> bool:
+    """Tell by the names of its datasets."""
+    if not hdf5.detect(path):
+        return False
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            return all(name in file for name in (TIME, GYRO, FORCE))
+    except OSError:
+        return False
+
+
+def read(path: Path) -> RawLog:
+    """Read rates, specific force and, where it is there, the magnetic field.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+
+    Raises
+    ------
+    DataError
+        It is damaged, or an array has another shape.
+    """
+    import h5py
+
+    arrays, _, _ = hdf5.read_arrays(path, (TIME, *TRIADS))
+    samples = arrays[TIME].size
+    for name in TRIADS:
+        if name in arrays and arrays[name].shape != (samples, 3):
+            raise DataError(
+                f"'{name}' has the shape {arrays[name].shape}, and there are {samples} stamps",
+                file=path.name,
+                remedy="get the recording again from its source",
+            )
+    raw = raw_log(path, arrays, {}, {})
+    stated: dict[str, tuple[str, str | None]] = {TIME: ("time", "s")}
+    for name, (triad, unit) in TRIADS.items():
+        if name in arrays:
+            stated |= {f"{name}[{k}]": (f"{triad}_{a}", unit) for k, a in enumerate("xyz")}
+    with h5py.File(path, "r") as file:
+        if CHEST in file:
+            what = f"{CHEST} is not used: it is the attitude of another phone, on the chest"
+            raw.findings.append(Finding(what, file=path.name, quantity="attitude"))
+    raw.stated, raw.axes = stated, AXES
+    return raw

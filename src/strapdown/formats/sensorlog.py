@@ -1,0 +1,138 @@
+"""SensorLog of iPhones, iPads and Apple Watches: one wide table, iOS words with their units.
+
+Names are ``motionRotationRateX(rad/s)``, ``accelerometerAccelerationX(G)``,
+``motionUserAccelerationX(G)``, ``motionGravityX(G)``, ``gyroRotationX(rad/s)``, as the application
+writes them. Every row has the latest value of every sensor, and each sensor its own stamps
+(``motionTimestamp_sinceReboot(s)``, ``accelerometerTimestamp_sinceReboot(s)``), so that a value may
+stand in several rows. Core Motion reports acceleration and gravity with the sign opposite to
+specific force: lying on its back a phone has gravity -z (Apple, CMDeviceMotion and
+CMAccelerometerData).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.find_columns import Column
+from strapdown.formats.join import join
+from strapdown.formats.members import file_member, first_line
+from strapdown.formats.numbers import ticks_of
+from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.recording import RawLog
+
+MOTION, GYRO, FORCE = "motionRotationRate", "gyroRotation", "accelerometerAcceleration"
+USER, GRAVITY = "motionUserAcceleration", "motionGravity"
+RADIANS, GS = "(rad/s)", "(G)"
+STAMPS = {
+    MOTION: "motionTimestamp_sinceReboot(s)",
+    USER: "motionTimestamp_sinceReboot(s)",
+    GRAVITY: "motionTimestamp_sinceReboot(s)",
+    GYRO: "gyroTimestamp_sinceReboot(s)",
+    FORCE: "accelerometerTimestamp_sinceReboot(s)",
+}
+WALL_CLOCK = "loggingTime(txt)"
+
+
+def detect(path: Path) -> bool:
+    """Tell by the names of a gyro's columns, with their unit."""
+    if not csv.detect(path):
+        return False
+    line = first_line(file_member(path))
+    names = set(csv.fields_of(line, csv.separator_of(line)))
+    return any(set(_three(kind, RADIANS)) <= names for kind in (MOTION, GYRO))
+
+
+def read(path: Path) -> RawLog:
+    """Read rates and specific force, and join them on the stamps of the gyro.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Rates of the fused motion, from which the phone has taken its bias, or else of the gyro;
+        specific force is user acceleration and gravity, or else the accelerometer.
+
+    Raises
+    ------
+    DataError
+        The file is damaged, or its sensors have no stamps.
+    """
+    raw = csv.parse(path.read_bytes(), path.name, (path,))
+    have = set(raw.columns)
+    gyro = next(k for k in (MOTION, GYRO) if set(_three(k, RADIANS)) <= have)
+    findings: list[Finding] = []
+    logs = [_log(raw, gyro, "gyro", "rad/s", findings)]
+    if {*_three(USER, GS), *_three(GRAVITY, GS)} <= have:
+        parts = [_log(raw, kind, "accel", "-g", findings) for kind in (USER, GRAVITY)]
+        logs.append(force_of(*parts))
+    elif set(_three(FORCE, GS)) <= have:
+        logs.append(_log(raw, FORCE, "accel", "-g", findings))
+    if len(logs) > 1:
+        what = "acceleration is as iOS writes it: its sign is turned"
+        findings.append(Finding(what, file=path.name, quantity="accel"))
+    out = join(logs, path.name, (path,))
+    return dataclasses.replace(out, findings=[*raw.findings, *findings, *out.findings])
+
+
+def _three(kind: str, unit: str) -> tuple[str, str, str]:
+    return (f"{kind}X{unit}", f"{kind}Y{unit}", f"{kind}Z{unit}")
+
+
+def _log(raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding]) -> RawLog:
+    """The samples of one sensor, each once."""
+    names = _three(kind, RADIANS if triad == "gyro" else GS)
+    time = _clock(raw, kind)
+    stamps = raw.columns[time]
+    if time == WALL_CLOCK:
+        stamps, _ = ticks_of(raw, Column(time, None, ""))
+    own = _changes(stamps) if time != WALL_CLOCK else np.ones(stamps.size, dtype=bool)
+    if (repeated := int((~own).sum())) and triad == "gyro":
+        findings.append(
+            Finding(
+                f"{repeated} of {own.size} rows repeat the sample before, with its stamp; left out",
+                file=raw.name,
+                row=raw.row(int(np.argmin(own))),
+                quantity=triad,
+            )
+        )
+    rows = np.arange(1, stamps.size + 1) if raw.rows is None else raw.rows
+    return sensor_log(
+        f"{raw.name}/{kind}",
+        raw.files[0],
+        {time: stamps[own]} | {name: raw.columns[name][own] for name in names},
+        triad,
+        unit,
+        time=(time, "ns" if time == WALL_CLOCK else "s"),
+        xyz=names,
+        rows=rows[own],
+    )
+
+
+def _clock(raw: RawLog, kind: str) -> str:
+    """The stamps of a sensor; or else those of the motion, or the times of day of the rows."""
+    for name in (STAMPS[kind], STAMPS[MOTION], STAMPS[GYRO], WALL_CLOCK):
+        if name in raw.columns:
+            return name
+    raise DataError(
+        f"no column {STAMPS[kind]}; it has: {', '.join(raw.columns)}",
+        file=raw.name,
+        quantity="time",
+        remedy="record with the time stamps of the sensors switched on",
+    )
+
+
+def _changes(stamps: NDArray[Any]) -> NDArray[np.bool_]:
+    """Rows whose stamp is not that of the row before."""
+    own = np.ones(stamps.size, dtype=bool)
+    own[1:] = stamps[1:] != stamps[:-1]
+    return own

@@ -1,0 +1,169 @@
+"""Text exports of Xsens MT Manager: MTi, MTx, MTw Awinda; and of Xsens DOT.
+
+Lines of ``//`` at the top, among them ``// Update Rate: 100.0Hz``; then names as ``PacketCounter
+SampleTimeFine Acc_X … Gyr_X … Mag_X …``. Acceleration, gravity in it, is in m/s², rates in rad/s of
+an MTi or MTw and deg/s of a DOT, the magnetic field in units of that at the factory (MTw Awinda
+User Manual, table of exported data). ``SampleTimeFine`` counts 0.1 ms in an MTi (MTi User Manual,
+section "Time stamp (Sample Time Fine)") and 1 µs in a DOT (Xsens DOT User Manual, section 4.2.5);
+it has 32 bits, and ``PacketCounter`` 16 or 32.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.exceptions import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.find_columns import Column
+from strapdown.formats.numbers import numbers
+from strapdown.formats.recording import RawLog
+
+COUNTER, STAMP = "PacketCounter", "SampleTimeFine"
+TRIADS = {"Gyr": ("gyro", "rad/s"), "Acc": ("accel", "m/s2")}
+_RATE = re.compile(r"//\s*Update Rate:\s*([\d.]+)\s*Hz", re.I)
+# Ticks of the two clocks, in µs, and what is told of the rate may be off by this share.
+TICKS = (100, 1)
+LEAST_AGREEMENT = 0.2
+# Rates that a sensor of this maker is read at.
+RATES = (1.0, 2000.0)  # Hz
+HEAD = 4096  # bytes
+
+
+def detect(path: Path) -> bool:
+    """Tell by the comments at the top and the names under them."""
+    if not csv.detect(path):
+        return False
+    with path.open("rb") as stream:
+        lines = stream.read(HEAD).decode("utf-8-sig", "replace").splitlines()
+    names = next((line for line in lines if line.strip() and not csv.is_comment(line)), "")
+    fields = set(csv.fields_of(names, csv.separator_of(names)))
+    wanted = {f"{t}_{a}" for t in TRIADS for a in "XYZ"}
+    return bool({COUNTER, STAMP} & fields) and wanted <= fields
+
+
+def read(path: Path) -> RawLog:
+    """Read rates and specific force, and make stamps of the counters.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    RawLog
+        Stamps in µs of ``SampleTimeFine``; without it, of ``PacketCounter`` and the rate at the
+        top.
+
+    Raises
+    ------
+    DataError
+        The file is damaged, or nothing says what a tick of the clock is.
+    """
+    data = path.read_bytes()
+    raw = csv.parse(data, path.name, (path,))
+    match = _RATE.search(data[:HEAD].decode("utf-8-sig", "replace"))
+    rate = float(match[1]) if match else None
+    rate = rate if rate else None
+    stated: dict[str, tuple[str, str | None]] = {
+        f"{name}_{axis}": (f"{triad}_{axis.lower()}", unit)
+        for name, (triad, unit) in TRIADS.items()
+        for axis in "XYZ"
+    }
+    findings = list(raw.findings)
+    if "Mag_X" in raw.columns:
+        what = "Mag is not used: it counts in the magnetic field at the factory, in no unit"
+        findings.append(Finding(what, file=path.name, quantity="mag"))
+    columns = dict(raw.columns)
+    source, stamps = _stamps(raw, rate, findings)
+    if source is not None:
+        columns[source] = stamps
+        stated[source] = ("time", "us")
+    if source is None or (source == STAMP and np.array_equal(stamps, raw.columns[STAMP])):
+        # A DOT, which counts µs, writes deg/s; the numbers are asked.
+        stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", None) for axis in "XYZ"}
+    return dataclasses.replace(raw, columns=columns, stated=stated, rate=rate, findings=findings)
+
+
+def _stamps(
+    raw: RawLog, rate: float | None, findings: list[Finding]
+) -> tuple[str | None, NDArray[Any]]:
+    """Stamps in µs, and the column that they were made of."""
+    if STAMP in raw.columns:
+        ticks = _unwrapped(raw, STAMP, (32,), findings)
+        tick = _tick(raw, ticks, rate)
+        if tick != 1:
+            what = f"{STAMP} counts 0.1 ms, by its step and the rate; shown in µs"
+            findings.append(Finding(what, file=raw.name, quantity="time"))
+        return STAMP, ticks * tick
+    if rate is None:
+        return None, np.empty(0)
+    count = _unwrapped(raw, COUNTER, (16, 32), findings)
+    findings.append(
+        Finding(
+            f"stamps are {COUNTER} over the {rate:g} Hz at the top of the file",
+            file=raw.name,
+            quantity="time",
+        )
+    )
+    return COUNTER, np.asarray((count - count[0]) * (1e6 / rate))
+
+
+def _unwrapped(
+    raw: RawLog, name: str, widths: tuple[int, ...], findings: list[Finding]
+) -> NDArray[Any]:
+    """A counter without the falls by its whole range."""
+    count = numbers(raw, Column(name, None, ""), "time")
+    if count.dtype.kind not in "iu":
+        return count
+    count = count.astype(np.int64)
+    steps = np.diff(count)
+    for bits in widths:
+        if count.size and int(count.max()) < 2**bits:
+            falls = np.flatnonzero(steps < -(2 ** (bits - 1)))
+            if falls.size:
+                count[1:] += np.cumsum(steps < -(2 ** (bits - 1))) * 2**bits
+                findings.append(
+                    Finding(
+                        f"{name} wrapped at {bits} bits, {falls.size} in all; undone",
+                        file=raw.name,
+                        row=raw.row(int(falls[0]) + 1),
+                        quantity="time",
+                    )
+                )
+            break
+    return count
+
+
+def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
+    """What a tick is, in µs: that in which steps have the rate at the top, or a possible one.
+
+    Raises
+    ------
+    DataError
+        Both are possible, or none is.
+    """
+    step = float(np.median(np.diff(ticks))) if ticks.size > 1 else 0.0
+    if not step > 0.0:
+        return TICKS[0]
+    found = {tick: 1e6 / (step * tick) for tick in TICKS}
+    if rate is not None:
+        fits = [t for t, r in found.items() if abs(r / rate - 1.0) <= LEAST_AGREEMENT]
+    else:
+        fits = [t for t, r in found.items() if RATES[0] <= r <= RATES[1]]
+    if len(fits) == 1:
+        return fits[0]
+    told = " or ".join(f"{r:.4g} Hz in ticks of {t} µs" for t, r in found.items())
+    top = f"the rate at the top, {rate:g} Hz, is neither" if rate else "no rate stands at the top"
+    raise DataError(
+        f"a step of {step:g} is {told}; {top}",
+        file=raw.name,
+        quantity=STAMP,
+        remedy="write the rate that it was recorded at above the names, as in // Update Rate: "
+        "100.0Hz",
+    )

@@ -1,0 +1,128 @@
+"""Units as people write them, raw counts, and text tables as programs of many countries write."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
+from strapdown.exceptions import ConfigError, DataError
+from strapdown.formats import read_log
+from strapdown.formats.columns import read_name
+from strapdown.formats.recording import ReadOptions
+from strapdown.formats.unit_words import factor_of, parse_unit, unit_of
+from strapdown.tables import ACCEL, GYRO
+
+N = 50
+ROWS = np.column_stack([np.arange(N) * 0.01, *(0.5 + 0.01 * k * np.arange(N) for k in range(6))])
+NAMES = ["time_s", *(f"gyro_{a}_deg_s" for a in "xyz"), *(f"acc_{a}_m_s2" for a in "xyz")]
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("rad s^-1", "rad/s"),
+        ("[rad·s⁻¹]", "rad/s"),
+        ("RAD*S^-1", "rad/s"),
+        ("m s^-2", "m/s2"),
+        ("m·s⁻²", "m/s2"),
+        ("m s^-1", "m/s"),
+        ("deg s-1", "deg/s"),
+        ("m s^-3", None),
+    ],
+)
+def test_powers_of_a_second(text, unit):
+    assert unit_of(text) == unit
+    assert read_name(f"gyro_x [{text.strip('[]')}]").unit == unit
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "unit", "factor"),
+    [
+        ("deg/s/131", "gyro", "deg/s/131", GYRO_UNITS["deg/s"] / 131.0),
+        ("1/131 deg/s", "gyro", "deg/s/131", GYRO_UNITS["deg/s"] / 131.0),
+        ("dps/16.4", "gyro", "deg/s/16.4", GYRO_UNITS["deg/s"] / 16.4),
+        ("0.07 deg/s", "gyro", "0.07 deg/s", GYRO_UNITS["deg/s"] * 0.07),
+        ("g/16384", "accel", "g/16384", ACCEL_UNITS["g"] / 16384.0),
+        ("-g/16384", "accel", "-g/16384", ACCEL_UNITS["-g"] / 16384.0),
+        ("m/s2", "accel", "m/s2", 1.0),
+    ],
+)
+def test_raw_counts(text, kind, unit, factor):
+    assert parse_unit(text, kind) == unit
+    assert parse_unit(unit, kind) == unit
+    assert factor_of(unit, {**GYRO_UNITS, **ACCEL_UNITS}) == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize("text", ["counts", "deg/s/0", "g/131", "131", "/131", "deg/s/-131"])
+def test_what_is_no_unit_is_told_how_counts_are_stated(text):
+    with pytest.raises(ConfigError, match=r"deg/s/131"):
+        parse_unit(text, "gyro")
+
+
+def test_counts_of_a_log(tmp_path):
+    path = tmp_path / "mpu.csv"
+    counts = np.round(ROWS[:, 1:] * 1000).astype(int)
+    rows = [f"{10 * k}," + ",".join(map(str, row)) for k, row in enumerate(counts)]
+    path.write_text("millis,gx,gy,gz,ax,ay,az\n" + "\n".join(rows) + "\n")
+    with pytest.raises(DataError, match="raw counts, say how many are a unit, as in deg/s/131"):
+        read_log(path)
+    imu = read_log(path, ReadOptions(gyro_unit="deg/s/131", accel_unit="g/16384")).imu
+    np.testing.assert_allclose(imu[GYRO], np.radians(counts[:, :3] / 131.0), rtol=1e-12)
+    np.testing.assert_allclose(imu[ACCEL], counts[:, 3:] / 16384.0 * 9.80665, rtol=1e-12)
+
+
+def text_of(separator=",", decimal="."):
+    rows = [separator.join(f"{v:.4f}".replace(".", decimal) for v in row) for row in ROWS]
+    return separator.join(NAMES) + "\n" + "\n".join(rows) + "\n"
+
+
+POINTS, GERMAN = text_of(), text_of(";", ",")
+QUOTED = POINTS.split("\n", 1)[0] + "\n"
+QUOTED += "\n".join(",".join('"' + f"{v:.4f}".replace(".", ",") + '"' for v in row) for row in ROWS)
+TEXTS = {
+    "German Excel": GERMAN.encode(),
+    "German Excel, trailing delimiter": GERMAN.replace("\n", ";\n").encode(),
+    "UTF-16": GERMAN.encode("utf-16"),
+    "mark and CRLF": b"\xef\xbb\xbf" + GERMAN.replace("\n", "\r\n").encode(),
+    "comments": ("% a\n// b\n; c\n# d\n" + POINTS).encode(),
+    "separator of Excel": ("sep=;\n" + GERMAN).encode(),
+    "units below": ("t;gx;gy;gz;ax;ay;az\ns;°/s;°/s;°/s;m s^-2;m s^-2;m s^-2\n"
+                    + GERMAN.split("\n", 1)[1]).encode(),
+    "trailing delimiter": POINTS.replace("\n", ",\n").encode(),
+    "decimal commas in quotes": QUOTED.encode(),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", TEXTS)
+def test_texts_of_many_programs(tmp_path, kind):
+    path = tmp_path / "log.csv"
+    path.write_bytes(TEXTS[kind])
+    imu = read_log(path).imu
+    # Four decimals are written.
+    np.testing.assert_allclose(np.degrees(imu[GYRO]), ROWS[:, 1:4], atol=5.1e-5)
+    np.testing.assert_allclose(imu[ACCEL], ROWS[:, 4:], atol=5.1e-5)
+
+
+def test_comments_among_the_rows_are_told(tmp_path):
+    lines = POINTS.splitlines()
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([*lines[:20], "# pause", *lines[20:]]) + "\n")
+    recording = read_log(path)
+    assert len(recording.imu) == N
+    assert [f.row for f in recording.findings if "'# pause'" in f.what] == [21]
+
+
+def test_a_comma_that_is_both_signs_is_told(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(text_of(",", ","))
+    with pytest.raises(DataError, match="with semicolons or tabs"):
+        read_log(path)
+
+
+def test_columns_without_names_are_shown(tmp_path):
+    path = tmp_path / "ms25.csv"
+    path.write_text("\n".join(f"{k * 10},1.5,-2.25,3,4,5,6,7,8,9" for k in range(N)) + "\n")
+    with pytest.raises(DataError, match=r"1: 0, 2: 1.5, 3: -2.25, 4: 3") as caught:
+        read_log(path)
+    assert "--columns time=1,gyro_x=2" in caught.value.finding.remedy
