@@ -84,7 +84,9 @@ def draft_navigation(
         A file cannot be read; the message names file, row and remedy.
     """
     made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
-    made = on_foot(made) if foot else made
+    if foot:
+        made = on_foot(made)
+        log = log.model_copy(update={"from_s": made.table["log"].get("from_s", log.from_s)})
     page = Page()
     page.say(
         f"Navigation over {made.recording.name}: place, velocity and attitude, and how well each "
@@ -339,6 +341,9 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
             page.say(line)
     page.say(*_other(slot, OTHER_AIDS))
     if foot:
+        began = made.table["log"].get("from_s")
+        if began is not None and began > index_of(made.imu)[0]:
+            return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
         return [f"it stands for the first {made.rest:.3g} s"]
     if made.gnss is None:
         return []

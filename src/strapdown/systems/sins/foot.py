@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.estimation.resting_sensors import resting_sd
 from strapdown.estimation.stated_states import states_that_are_stated
-from strapdown.exceptions import DataError
+from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.proposal import Proposal
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["STANCE", "STANDING", "on_foot", "second_order", "standing_time"]
+__all__ = ["STANCE", "STANDING", "first_stand", "on_foot", "second_order"]
 
 #: Zero velocity at stances. Noise of a stance: a foot sways and the sole gives, far beyond the
 #: noise of a sensor: so much a sample. The threshold begins at ten of these, 10 deg/s and 1 m/s²,
@@ -59,6 +59,8 @@ STANDING: dict[str, Any] = {
 LEAVES, PUSHES = math.radians(30.0), 2.0
 #: Before the first such sample it begins to, s; and so long it must stand, s.
 BEFORE, LEAST = 0.2, 0.3
+#: Of a stance between two steps: how long it is at least, and how much of either end rolls, s.
+STEPPED, ROLLS = 0.2, 0.05
 #: Of the standing start the alignment takes half, so that gyros are told their bias by the other,
 #: and at most so much, s.
 LONGEST = 10.0
@@ -73,8 +75,8 @@ HERE, STILL = 0.01, 0.01
 FROM_START = 0.1
 
 
-def standing_time(imu: pd.DataFrame) -> float:
-    """Return how long a unit stands at the start of a record.
+def first_stand(imu: pd.DataFrame) -> tuple[float, float] | None:
+    """Return when a unit on a shoe first stands, and how long.
 
     Parameters
     ----------
@@ -83,15 +85,27 @@ def standing_time(imu: pd.DataFrame) -> float:
 
     Returns
     -------
-    float, s
-        Until it turns by 30 deg/s or feels 2 m/s² beyond gravity, less 0.2 s.
+    begin, length : float, s
+        The start of the record, until it turns by 30 deg/s or feels 2 m/s² beyond gravity, less
+        0.2 s; where that is less than 0.3 s, the first stance of 0.2 s or more, without 0.05 s at
+        either end. None where there is none.
     """
     time = index_of(imu)
     rate = np.linalg.norm(values_of(imu, GYRO), axis=1)
     force: NDArray[np.float64] = np.linalg.norm(values_of(imu, ACCEL), axis=1)
-    moves = np.flatnonzero((rate > LEAVES) | (np.abs(force - STANDARD_GRAVITY) > PUSHES))
-    end = float(time[moves[0]]) - BEFORE if moves.size else float(time[-1])
-    return max(end - float(time[0]), 0.0)
+    moves = (rate > LEAVES) | (np.abs(force - STANDARD_GRAVITY) > PUSHES)
+    if not moves.any():
+        return float(time[0]), float(time[-1] - time[0])
+    length = float(time[np.argmax(moves)]) - BEFORE - float(time[0])
+    if length >= LEAST:
+        return float(time[0]), length
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], moves, [1]])))
+    begin, end = time[edges[::2]], time[edges[1::2] - 1]
+    stances = np.flatnonzero(end - begin >= STEPPED)
+    if not stances.size:
+        return None
+    k = int(stances[0])
+    return float(begin[k]) + ROLLS, float(end[k] - begin[k]) - 2.0 * ROLLS
 
 
 def second_order(sensors: ImuUncertainty) -> float:
@@ -127,7 +141,7 @@ def on_foot(made: Proposal) -> Proposal:
     Raises
     ------
     DataError
-        The log has no accelerometers, or it does not begin with a stand.
+        The log has no accelerometers, or the unit stands nowhere in it.
     """
     if ACCEL[0] not in made.imu.columns:
         raise DataError(
@@ -136,17 +150,18 @@ def on_foot(made: Proposal) -> Proposal:
             quantity="accel",
             remedy="record gyros and accelerometers",
         )
-    rest = standing_time(made.imu)
-    if rest < LEAST:
+    stand = first_stand(made.imu)
+    if stand is None:
         raise DataError(
-            f"it does not stand where it begins: it moves after {rest:.2g} s, and roll and pitch "
-            "are found at a stand",
+            f"it stands nowhere for {STEPPED:g} s, and roll and pitch are found at a stand",
             file=source_of(made.imu),
             quantity="accel",
-            remedy="stand for five seconds before the first step; or begin where it stands: write "
-            "from_s under [log] of the file that init writes without --foot",
+            remedy="stand for five seconds before the first step; is the unit on a shoe?",
         )
-    length = math.floor(10.0 * min(max(0.5 * rest, LEAST), LONGEST)) / 10.0
+    begin, rest = stand
+    late = begin - float(index_of(made.imu)[0])
+    length = math.floor(10.0 * min(0.5 * rest, LONGEST)) / 10.0
+    length = max(length, LEAST) if not late else rest
     # Noise that shakes it is how a foot goes, and none of the sensor's. Whatever goes with rate and
     # force is at its largest on a foot: a g-sensitivity of 0.1 deg/s/g turns a run by degrees.
     named = made.table.get("sensors", {}).get("sensor")
@@ -160,15 +175,17 @@ def on_foot(made: Proposal) -> Proposal:
         if drift > max(known.accel_drift.triad) and "accel_drift" in names:
             rounded = float(f"{drift / STANDARD_GRAVITY * 1e6:.2g}")
             states["accel_drift"] = {"sd_ug": rounded, "correlation_time_s": BENT}
+    log = made.table["log"] | ({"from_s": round(begin, 6)} if late else {})
     table = {
         **made.table,
+        "log": log,
         "sensors": sensors,
         **({"states": states} if states else {}),
         "coarse": {
             "kind": "known_heading",
             "heading_deg": 0.0,
             "sd_deg": FROM_START,
-            "duration_s": max(length, LEAST),
+            "duration_s": round(length, 3),
         },
         "fine": {"kind": "none"},
         "filter": {"kind": "error_state", "step_s": STEP},
@@ -179,8 +196,25 @@ def on_foot(made: Proposal) -> Proposal:
             "standing": dict(STANDING),
         },
     }
+    where = "The heading is counted from where the unit then points: north of the answer is there"
     how = (
-        f"it stands for the first {rest:.3g} s: levelled by half of that. The heading is counted "
-        "from where the unit then points: north of the answer is there, unless you state another"
+        f"it stands for the first {rest:.3g} s: levelled by half of that. {where}, unless you "
+        "state another"
     )
-    return replace(made, table=table, rest=rest, drives=False, how=how)
+    findings = made.findings
+    if late:
+        how = (
+            f"it begins while it moves: all before its first stance, {late:.3g} s, is left out. It "
+            f"is levelled by {rest:.2g} s of that. {where}, unless you state another"
+        )
+        findings = (
+            *findings,
+            Finding(
+                f"it moves where it begins: the first {late:.3g} s are left out, and it is "
+                f"levelled by {rest:.2g} s of the first stance",
+                file=source_of(made.imu),
+                quantity="accel",
+                remedy="stand for five seconds before the first step, if you can record again",
+            ),
+        )
+    return replace(made, table=table, rest=rest, drives=False, how=how, findings=findings)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import tomllib
 from dataclasses import replace
 from functools import cache
 
@@ -10,7 +12,7 @@ import pytest
 
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
-from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.config.navigation_modules import sensors_of
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.estimation.stated_states import states_that_are_stated
@@ -23,9 +25,10 @@ from strapdown.simulation import GAITS, Origin, simulate_imu, walk
 from strapdown.systems.sins.build import make_chain
 from strapdown.systems.sins.draft import draft_navigation
 from strapdown.systems.sins.drive import run_batch, run_by_sample
-from strapdown.systems.sins.foot import BENT, STANCE, STANDING, STEP, second_order, standing_time
+from strapdown.systems.sins.foot import BENT, STANCE, STANDING, STEP, first_stand, second_order
 from strapdown.systems.sins.run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
+from strapdown.tables import GYRO
 
 RECORDING = "foot/SensorConnectData_32_LLIO.mat"
 HERE = {"lat_deg": 48.0, "lon_deg": 11.0, "alt_m": 500.0}
@@ -175,7 +178,7 @@ def test_what_is_claimed_of_a_heading_hangs_on_the_walk_and_not_on_the_unit():
 def test_a_walk_by_sample_is_the_walk_at_once():
     """To the last bit, with a threshold that finds itself."""
     spec, whole, _ = walked(strides=4)
-    chain = make_chain(spec, uncertainty_of(spec))
+    chain = make_chain(spec, sensors_of(spec))
     imu = whole.source.imu
     at_once = run_batch(chain, imu, {}, None)
     by_sample = run_by_sample(chain, imu, {}, None)
@@ -204,7 +207,7 @@ def log_of(path, stand=6.0):
 def test_the_file_that_is_written_asks_for_the_latitude_alone(tmp_path):
     imu = log_of(tmp_path / "walk.csv")
     # The first swing begins after 6 s; its first 5 ms are no 30 deg/s.
-    assert standing_time(imu) == pytest.approx(5.82, abs=0.03)
+    assert first_stand(imu) == pytest.approx((0.0, 5.82), abs=0.03)
     draft = draft_navigation(
         LogTable(path=str(tmp_path / "walk.csv")), folder=tmp_path, sensor="xsens-mti-1", foot=True
     )
@@ -256,10 +259,14 @@ def test_a_run_whose_turns_are_cut_off_is_refused():
     assert "gyro_y" in str(refused.value)
 
 
-def test_a_log_that_begins_on_the_move_is_refused(tmp_path):
-    log_of(tmp_path / "walk.csv", stand=0.3)
-    with pytest.raises(DataError, match="does not stand where it begins") as refused:
-        draft_navigation(LogTable(path=str(tmp_path / "walk.csv")), folder=tmp_path, foot=True)
+def test_a_log_without_a_stand_is_refused(tmp_path):
+    time = np.arange(1000) / 200.0
+    shaken = {"time_s": time}
+    shaken |= {f"gyro_{axis}_rad_per_s": np.full(1000, 2.0) for axis in "xyz"}
+    shaken |= {f"accel_{axis}_m_per_s2": 5.7 + 0.1 * np.sin(40.0 * time) for axis in "xyz"}
+    csv.write(tmp_path / "shaken.csv", shaken, {})
+    with pytest.raises(DataError, match="it stands nowhere") as refused:
+        draft_navigation(LogTable(path=str(tmp_path / "shaken.csv")), folder=tmp_path, foot=True)
     assert refused.value.finding.remedy
 
 
@@ -305,3 +312,19 @@ def test_the_other_order_of_north_and_east_does_not_fit(proposed):
     swapped.attrs = dict(points.attrs)
     assert score_control_points(result.record.trajectory, swapped).rms > 5.0
     assert replace(result.points, given=1).rms < 0.6
+
+
+def test_a_log_that_begins_in_a_swing_starts_at_its_first_stance(tmp_path):
+    whole = log_of(tmp_path / "walk.csv")
+    moving = np.linalg.norm(whole[GYRO].to_numpy(), axis=1) > math.radians(30.0)
+    begun = float(whole.index[np.argmax(moving)])
+    given = LogTable(path=str(tmp_path / "walk.csv"), from_s=begun)
+    draft = draft_navigation(given, folder=tmp_path, sensor="xsens-mti-1", foot=True)
+    assert "it moves where it begins" in "".join(one.what for one in draft.findings)
+    spec = tomllib.loads(draft.text)
+    start, length = spec["log"]["from_s"], spec["coarse"]["duration_s"]
+    # All of it is within the first stance after the swing, which the sole makes.
+    rate = np.linalg.norm(whole.loc[start : start + length, GYRO].to_numpy(), axis=1)
+    assert begun < start < begun + 1.5
+    assert length >= 0.1
+    assert (rate < math.radians(30.0)).all()
