@@ -6,6 +6,8 @@ are taken. The samples are raw; no bias is removed. ``pytest -s`` prints the err
 
 from __future__ import annotations
 
+from functools import cache
+
 import h5py
 import numpy as np
 import pytest
@@ -27,6 +29,7 @@ def need(name):
         pytest.skip(f"{name} is not installed")
 
 
+@cache
 def trial(path):
     """Samples from the first known attitude on, that attitude, and the truth that counts."""
     log = read_log(path)

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import pandas as pd
 import pytest
-from tests.cli.bad_navigate import write_drive
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "cli"))
+
+from bad_navigate import write_drive
 
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.exceptions import DataError, DivergenceError, Finding
