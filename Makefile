@@ -3,10 +3,9 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 PIP = $(BIN)/python -m pip --disable-pip-version-check install --quiet -c constraints.txt
-PYTEST = $(BIN)/python -m pytest
-# Kernels are kept by the digest of their sources, which does not say that indices were checked.
-unexport NUMBA_CACHE_DIR
-FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
+PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
+# Numba's cache does not see every change of a source; each run of the tests has its own.
+FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
 .PHONY: demo test test-slow test-bounds examples check format bench docs messages statements pictures clean
 .DEFAULT_GOAL := help
@@ -39,13 +38,13 @@ demo: $(VENV)/.run
 	$(BIN)/strapdown demo --out demo --force
 
 test: $(VENV)/.test
-	@$(PYTEST) -n 2
+	@$(FRESH) $(PYTEST) -n 2
 
 test-slow: $(VENV)/.test
-	@$(PYTEST) -m slow
+	@$(FRESH) $(PYTEST) -m slow
 
 examples: $(VENV)/.test
-	@$(PYTEST) -n 2 -m slow tests/cli/test_manual.py
+	@$(FRESH) $(PYTEST) -n 2 -m slow tests/cli/test_manual.py
 
 test-bounds: $(VENV)/.test
 	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
@@ -61,18 +60,18 @@ format: $(VENV)/.dev
 	$(BIN)/ruff format .
 
 bench: $(VENV)/.dev
-	@$(BIN)/python -m benchmarks
+	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m benchmarks
 
 messages: $(VENV)/.test
-	@STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) -m '' tests/cli/test_messages.py
+	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) -m '' tests/cli/test_messages.py
 
 statements: $(VENV)/.test
-	@STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' tests/cli/test_reproduce.py \
+	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' tests/cli/test_reproduce.py \
 		tests/unit/systems/test_reproduce_tadic.py \
 		tests/unit/systems/test_reproduce_chernodarov.py
 
 pictures: $(VENV)/.test
-	@STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py \
+	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py \
 		tests/unit/systems/test_reproduce_tadic.py \
 		tests/unit/systems/test_reproduce_chernodarov.py
 
