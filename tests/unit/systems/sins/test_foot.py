@@ -10,7 +10,7 @@ import pytest
 
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
-from strapdown.config.navigation_modules import uncertainty_of
+from strapdown.config.navigation_modules import sensors_of
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.estimation.stated_states import states_that_are_stated
@@ -175,7 +175,7 @@ def test_what_is_claimed_of_a_heading_hangs_on_the_walk_and_not_on_the_unit():
 def test_a_walk_by_sample_is_the_walk_at_once():
     """To the last bit, with a threshold that finds itself."""
     spec, whole, _ = walked(strides=4)
-    chain = make_chain(spec, uncertainty_of(spec))
+    chain = make_chain(spec, sensors_of(spec))
     imu = whole.source.imu
     at_once = run_batch(chain, imu, {}, None)
     by_sample = run_by_sample(chain, imu, {}, None)
