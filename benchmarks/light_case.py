@@ -12,8 +12,8 @@ from strapdown import rotation
 from strapdown.aiding.heading import Heading
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.slots import SLOTS
 from strapdown.navigation.navigator import with_states
 from strapdown.systems.progress import silent
