@@ -12,8 +12,8 @@ from strapdown import rotation
 from strapdown.aiding.heading import Heading
 from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
-from strapdown.config.navigation_checks import given_of, uncertainty_of
 from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.slots import SLOTS
 from strapdown.navigation.navigator import with_states
 from strapdown.systems.progress import silent
@@ -105,7 +105,7 @@ def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Light, error of the heading in deg, and bound of the run, second by second."""
     spec: NavigationSpec = navigation_spec(started(case))
     source: NavigationSource = read_navigation_source(spec)
-    sensors = uncertainty_of(spec)
+    sensors = sensors_of(spec)
     imu = case.imu(source.imu)
     imu.attrs = dict(source.imu.attrs)
     tables = case.tables(dict(source.tables))

@@ -24,6 +24,7 @@ from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_result import told_of
 from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
+from strapdown.report.verdict_picture import light_picture
 from strapdown.systems.sins.draft import draft_navigation
 from strapdown.systems.sins.run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
@@ -62,6 +63,12 @@ def drawn_of(spec):
 def navigated():
     """The report of the drive of the manual."""
     return drawn_of(read_navigation_spec(EXAMPLES / "navigate_car.toml"))
+
+
+@pytest.fixture(scope="module")
+def driven():
+    """The drive through a tunnel, of the README and of the page of the verdict."""
+    return run_navigation(read_navigation_spec(EXAMPLES / "navigate_drive.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -111,15 +118,22 @@ def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
-def test_the_drive_of_the_readme_is_what_is_drawn_now(tmp_path):
-    result = run_navigation(read_navigation_spec(EXAMPLES / "navigate_drive.toml"))
-    drawn = drawings(navigation_document(told_of(result), ""))
+def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
+    drawn = drawings(navigation_document(told_of(driven), ""))
     (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
     shown = IMAGES / "drive_plan.svg"
     if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
         draw(chart, shown)
     draw(chart, tmp_path / "now.svg")
     assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+
+
+def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
+    shown, now = IMAGES / "trust_light.svg", tmp_path / "now.svg"
+    now.write_text(light_picture(driven).svg, encoding="utf-8")
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        shutil.copyfile(now, shown)
+    assert same_picture(shown, now), "make pictures, and look at them"
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")

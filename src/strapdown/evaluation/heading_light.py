@@ -30,6 +30,7 @@ __all__ = [
     "WITNESSES",
     "HeadingLight",
     "LightSpan",
+    "doubted",
     "heading_light",
     "recent_scatter",
     "seconds_of",
@@ -195,12 +196,7 @@ def heading_light(
         )
     seconds = seconds_of(record)
     count = len(seconds)
-    marks = record.sd.index.to_numpy(dtype=np.float64)
-    sd = record.sd["heading"].to_numpy(dtype=np.float64)
-    # A bound grows to the next mark: the larger one of those beside a second.
-    after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
-    before = np.clip(after - 1, 0, None)
-    own = np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))
+    own = _own_sd(record, seconds)
     difference, witness, since, who = _best(seconds, evidence)
     witnessed = np.abs(difference) + SURE * witness
     spread = np.ones(count) if scatter is None else scatter
@@ -289,6 +285,38 @@ def recent_scatter(record: NavigationRecord) -> Array:
         mean = (total[upto] - total[since]) / np.maximum(many, 1)
         worst = np.where(many >= FEWEST, np.maximum(worst, np.sqrt(mean)), worst)
     return worst
+
+
+def doubted(record: NavigationRecord, evidence: Sequence[Heard], upto: float, green: float) -> bool:
+    """Whether a run was contradicted, or scattered more than it should, until an instant.
+
+    Parameters
+    ----------
+    record : NavigationRecord
+    evidence : sequence of Heard
+        What witnesses said.
+    upto : float, s
+    green : float, deg
+        As of `heading_light`.
+
+    Returns
+    -------
+    bool
+    """
+    seconds = seconds_of(record)
+    before = seconds <= upto
+    apart = _contradicted(seconds, evidence, _own_sd(record, seconds), green)
+    return bool((apart | (recent_scatter(record) > FAR_OFF))[before].any())
+
+
+def _own_sd(record: NavigationRecord, seconds: Array) -> Array:
+    """Standard deviation of the heading of a run at each second, deg."""
+    marks = record.sd.index.to_numpy(dtype=np.float64)
+    sd = record.sd["heading"].to_numpy(dtype=np.float64)
+    # A bound grows to the next mark: the larger one of those beside a second.
+    after = np.clip(np.searchsorted(marks, seconds - 1e-6), 0, len(marks) - 1)
+    before = np.clip(after - 1, 0, None)
+    return np.where(marks[after] <= seconds + 1e-6, sd[after], np.maximum(sd[before], sd[after]))
 
 
 def _best(

@@ -12,6 +12,7 @@ from strapdown.evaluation.heading_light import (
     CARRIED,
     GROWS,
     SURE,
+    doubted,
     heading_light,
     recent_scatter,
 )
@@ -137,3 +138,22 @@ def test_spans_cover_the_run():
 def test_limits_must_be_in_order():
     with pytest.raises(ConfigError, match="no limits of a heading"):
         heading_light(record_of(0.1), [], green=5.0, red=3.0)
+
+
+def test_a_run_is_doubted_from_when_a_witness_contradicts_it():
+    one, late = record_of(0.1), heard(2.0, 0.1, begin=99)
+    assert not doubted(one, [late], 99.0, 3.0)
+    assert doubted(one, [late], 100.0, 3.0)
+    # By less than half of the limit nothing is contradicted.
+    assert not doubted(one, [heard(1.4, 0.1)], 150.0, 3.0)
+
+
+def test_a_run_is_doubted_from_when_its_observations_scatter():
+    u = np.where(np.arange(SECONDS + 1.0) < 100.0, 1.0, 3.9)
+    one = record_of(0.1, innovations(u))
+    assert not doubted(one, [], 100.0, 3.0)
+    # Half a minute later they are all that is looked at.
+    assert doubted(one, [], 130.0, 3.0)
+    # What was doubted once stays so.
+    u = np.where((np.arange(SECONDS + 1.0) < 100.0) | (np.arange(SECONDS + 1.0) > 130.0), 1.0, 3.9)
+    assert doubted(record_of(0.1, innovations(u)), [], 190.0, 3.0)

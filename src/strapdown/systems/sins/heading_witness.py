@@ -21,6 +21,7 @@ from strapdown.constants import MAD_TO_SD
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.filter_state import FilterState
+from strapdown.evaluation.heading_light import doubted
 from strapdown.evaluation.trajectory_at import trajectory_at
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.nav_state import NavState
@@ -44,6 +45,9 @@ LEAST_HEADING = 0.03
 LOOSER = 2.0
 #: Known no better than this at its start: m, m/s, deg of roll and pitch.
 LEAST_PLACE, LEAST_VELOCITY, LEAST_TILT = 0.1, 0.05, 0.2
+#: The same of roll and pitch of a run that was doubted, deg: what a change of velocity by 0.2 g
+#: leaves in them where the heading is off by 10 deg.
+DOUBTED_TILT = 2.0
 #: A new witness begins so often, s, and so often where one knows enough; the record is gone over in
 #: parts of the last.
 TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
@@ -91,12 +95,17 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
     A new one begins each minute, and each three minutes while one knows as much as is enough. The
     older of two is heard on until the younger knows that by itself, or knows it better.
 
+    What was wrong with a run stays in what it believes of its sensors and of its tilt, long after
+    its observations agree again. So once it was doubted, a new witness takes the sensors for what
+    they were at its start.
+
     Parameters
     ----------
     made : Witnesses
     record : NavigationRecord
     enough : float, deg
-        Standard deviation of a heading from which on older evidence is not needed.
+        Standard deviation of a heading from which on older evidence is not needed: a third of the
+        limit.
 
     Returns
     -------
@@ -113,6 +122,8 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
     run = trajectory_at(record.trajectory, wanted, _ellipsoid(made.navigator))
     done: list[_Witness] = []
     heard: list[_Witness] = []
+    told: list[_Witness] = []
+    doubt = False
     for at, first, last in zip(begun.tolist(), firsts, [*firsts[1:], len(made.time)], strict=True):
         if len(heard) > 1 and heard[-1].sd <= enough:
             heard = heard[-1:]
@@ -120,9 +131,13 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
         if youngest >= (RENEWED if heard and heard[-1].sd <= enough else TURN) - HEARD / 2.0:
             if len(heard) > 1:
                 heard = [min(heard, key=lambda one: one.sd)]
-            fresh = _Witness(made, record, run, at)
+            if not doubt:
+                said = [one.evidence() for one in told if one.marks]
+                doubt = doubted(record, said, at, 3.0 * enough)
+            fresh = _Witness(made, record, run, at, doubt)
             done.append(fresh)
             heard.append(fresh)
+            told = list(heard)
         for one in heard:
             one.over(made.time[first:last], made.rows[first:last])
         heard = [one for one in heard if not one.lost]
@@ -133,7 +148,12 @@ class _Witness:
     """One witness on its way."""
 
     def __init__(
-        self, made: Witnesses, record: NavigationRecord, run: pd.DataFrame, since: float
+        self,
+        made: Witnesses,
+        record: NavigationRecord,
+        run: pd.DataFrame,
+        since: float,
+        doubt: bool,
     ) -> None:
         self.navigator, self.run, self.since = made.navigator, run, since
         self.marks: list[Mark] = []
@@ -141,7 +161,7 @@ class _Witness:
         self.history: list[Array] = []
         self.seen: list[tuple[float, Array]] = []
         self.lost = False
-        state = self.navigator.begin_from(_begin(self.navigator.filter, record, run, since))
+        state = self.navigator.begin_from(_begin(self.navigator.filter, record, run, since, doubt))
         for aid in self.navigator.aids:
             assert isinstance(aid, Gnss)
             table = made.tables[aid.name]
@@ -223,7 +243,7 @@ def _scatter(u: Array) -> Array:
 
 
 def _begin(
-    filter_: ErrorFilter, record: NavigationRecord, run: pd.DataFrame, at: float
+    filter_: ErrorFilter, record: NavigationRecord, run: pd.DataFrame, at: float, doubt: bool
 ) -> FilterState:
     """State at an instant of a run, with a heading that is as good as unknown."""
     model = filter_.model
@@ -247,13 +267,15 @@ def _begin(
     P = LOOSER**2 * record.covariance[k]
     P[8, :8] = P[:8, 8] = 0.0
     P[8, 8] = max(math.radians(UNKNOWN) ** 2, float(P[8, 8]))
+    tilt = DOUBTED_TILT if doubt else LEAST_TILT
     P = P + np.diag(
         np.square(
-            np.repeat([LEAST_PLACE, LEAST_VELOCITY, math.radians(LEAST_TILT)], 3)
+            np.repeat([LEAST_PLACE, LEAST_VELOCITY, math.radians(tilt)], 3)
             * np.array([1.0] * 8 + [0.0])
         )
     )
     names = list(model.layout.labels())[9:]
+    k = 0 if doubt else k
     sd = LOOSER * record.sensors_sd[names].iloc[k].to_numpy(dtype=np.float64)
     whole = np.diag(np.concatenate([np.zeros(9), np.square(sd)]))
     whole[:9, :9] = P

@@ -9,13 +9,20 @@ import pandas as pd
 import pytest
 
 from strapdown.config.navigation_file import navigation_spec
+from strapdown.config.navigation_modules import make_filter, sensors_of
+from strapdown.evaluation.heading_light import SURE
 from strapdown.report.navigation import write_navigation
+from strapdown.systems.sins.build import make_chain
+from strapdown.systems.sins.heading_witness import hear_witnesses
 from strapdown.systems.sins.run import run_navigation
+from strapdown.systems.sins.witness_source import witnesses_of
 
 LIMIT = 3.0
 
 
-def drive(*, error=0.0, sd=1.0, manoeuvres=True, outliers=0.0, trust=None, aids=True):
+def drive(
+    *, error=0.0, sd=1.0, manoeuvres=True, outliers=0.0, trust=None, aids=True, compass=None, laps=1
+):
     """A car at 12 m/s with a heading at the start that is off by so many degrees."""
     straight = [{"do": "straight", "duration_s": 90.0}]
     bends = [
@@ -37,7 +44,7 @@ def drive(*, error=0.0, sd=1.0, manoeuvres=True, outliers=0.0, trust=None, aids=
                 "alt_m": 500.0,
                 "heading_deg": 20.0,
                 "speed_m_per_s": 12.0,
-                "manoeuvres": bends if manoeuvres else straight,
+                "manoeuvres": bends * laps if manoeuvres else straight,
             },
             "gnss": {"rtk": {**receiver, "outlier_share": outliers}} if aids else {},
         },
@@ -57,6 +64,8 @@ def drive(*, error=0.0, sd=1.0, manoeuvres=True, outliers=0.0, trust=None, aids=
         "trust": trust or {},
         "output": {"figures": False},
     }
+    if compass is not None:
+        table["aiding"]["compass"] = {"kind": "heading", "path": str(compass)}
     table["start"]["v_ned_m_per_s"] = [float(v) for v in table["start"]["v_ned_m_per_s"]]
     return navigation_spec(table)
 
@@ -105,6 +114,35 @@ def test_a_wrong_start_is_never_green_while_it_is_wrong():
     wrong = np.abs(error) > LIMIT
     assert wrong.sum() > 10
     assert not (wrong & (light == 0)).any()
+
+
+def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
+    """A compass off by 8° makes tilts and biases wrong that the second witness would begin with."""
+    truth = run_navigation(drive(laps=3, trust={"repeat": False})).source.truth.iloc[::50]
+    compass = tmp_path / "compass.csv"
+    told = pd.DataFrame({"heading_deg": (truth["heading"] + 8.0) % 360.0, "heading_sd_deg": 0.5})
+    told.rename_axis("time_s").to_csv(compass)
+    spec = drive(laps=3, error=8.0, compass=compass, trust={"repeat": False})
+    result = run_navigation(spec)
+    source, record, sensors = result.source, result.record, sensors_of(spec)
+    made = witnesses_of(
+        make_filter(spec, sensors),
+        make_chain(spec, sensors),
+        source.imu,
+        source.tables,
+        record,
+        result.trust.consistency,
+    )
+    known = result.differences
+    off = [
+        (np.interp(one.time, known.index, known["heading"]) - one.difference) / one.sd
+        for one in hear_witnesses(made, record, LIMIT / 3.0)
+        if one.since > 30.0
+    ]
+    off = np.abs(np.concatenate(off))
+    assert len(off) > 30
+    # What a witness bounds with 99 % may be beyond that now and then: one error lasts for seconds.
+    assert np.mean(off < SURE) > 0.9
 
 
 def test_gross_errors_are_left_out_of_the_repeated_run():
