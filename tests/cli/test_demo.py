@@ -38,11 +38,17 @@ def test_three_systems_on_one_page_each_with_its_bound_and_the_truth(shown):
     assert page.count("The truth beside it") == len(BUILT_IN)
     assert "its largest error is 0.729°" in page
     crash = re.search(r"Delta-V ([\d.]+) ± ([\d.]+) km/h", page)
-    truth = re.search(r"the change of velocity is ([\d.]+) km/h", page)
-    assert crash is not None and truth is not None
-    # Of 7.1 m/s the pole gives back a tenth and takes all the rest, and a little turn with it.
-    assert float(truth[1]) == pytest.approx(25.93, abs=0.005)
+    truth = re.search(r"velocity is ([\d.]+) km/h, the force comes from ([−\d.]+)°", page)
+    force = re.search(r"direction of force [−\d.]+° \(([−\d.]+)° to ([−\d.]+)° with 95 %", page)
+    assert crash is not None and truth is not None and force is not None
+    # Of 7.1 m/s the pole gives back a tenth and takes all the rest. It pushes from the front as the
+    # car first stood; in the axes of the car, which turns right under it, from further left, and
+    # what was forward and aside then adds up to a little more.
+    assert float(truth[1]) == pytest.approx(25.99, abs=0.005)
     assert abs(float(crash[1]) - float(truth[1])) < float(crash[2])
+    come, low, high = (float(text.replace("−", "-")) for text in (truth[2], *force.groups()))
+    assert come == pytest.approx(-1.0, abs=0.05)
+    assert low < come < high
     assert re.search(r"You can trust the place to [\d.]+ m at the end", page)
     assert re.search(r"After 30 s along its own trajectory, 95 % are within [\d.]+ m", page)
     for line in ("Delta-V", "You can trust the place", "After 30 s"):

@@ -18,6 +18,7 @@ from strapdown.bundle import (
     write_bundle,
     writing,
 )
+from strapdown.exceptions import DataError
 from strapdown.results import InputFiles
 
 NAMES = {"write_bundle", "make_manifest", "_keep", "_place", "_move", "files_of", "with_paths"}
@@ -172,3 +173,11 @@ def test_a_full_disk_leaves_nothing(tmp_path, given, monkeypatch):
     with pytest.raises(OSError, match="No space left"):
         write(tmp_path / "deep" / "out", given, "new")
     assert [p.name for p in tmp_path.iterdir()] == ["given.csv"]
+
+
+def test_a_folder_that_is_not_there_is_not_called_empty(tmp_path):
+    with pytest.raises(DataError, match="there is no such folder"):
+        read_manifest(tmp_path / "nowhere")
+    (tmp_path / "here").mkdir()
+    with pytest.raises(DataError, match=r"no manifest\.json in it"):
+        read_manifest(tmp_path / "here")

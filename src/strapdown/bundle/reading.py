@@ -32,6 +32,8 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
         There is none, or it is damaged.
     """
     path = bundle / MANIFEST
+    if not bundle.exists():
+        raise DataError("there is no such folder", file=str(bundle), remedy="check the path")
     if not path.is_file():
         raise DataError(
             "no manifest.json in it: this is no bundle of strapdown",

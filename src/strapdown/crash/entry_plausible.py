@@ -16,8 +16,6 @@ __all__ = ["check_standing", "entry_findings"]
 
 # Beyond so many standard deviations two numbers contradict each other.
 SIGMAS = 4.0
-# The wake window of 49 CFR 563 is 20 ms: time zero is as well known as half of it.
-LATE = 0.010  # s
 # A vehicle that is steeper than this when it is struck is on a slope: no braking pitches it so far.
 SLOPE_DEG = 4.0
 
@@ -63,7 +61,9 @@ def entry_findings(
     if entry is None:
         return []
     found = _slope(at_point, entry, path)
-    if events.events and events.events[0].time_zero + LATE < entry.time:
+    # Time zero is the begin of a window in which a little changes: a vehicle that strikes a wall
+    # does that at its end, and is first touched up to so much after time zero.
+    if events.events and events.events[0].time_zero + events.rule.wake_window < entry.time:
         first = events.events[0].time_zero
         found.append(
             Finding(
@@ -71,8 +71,8 @@ def entry_findings(
                 f"{1e3 * (entry.time - first):.4g} ms before, at {first:.4g} s",
                 file=at_point.name,
                 quantity="entry",
-                remedy=f"if it is the speed before the crash, give it with time={first:.3f}; if "
-                "the trigger is late, correct it",
+                remedy=f"if it is the speed before the crash, give it with time={first:.3f}, and a "
+                "rest that ends before that; if the trigger is late, correct it",
             )
         )
         # Its speed need not be that at the beginning.

@@ -119,6 +119,17 @@ def judge(
     return tuple(sorted(found, key=lambda v: (v.kind in ("gross", "few"), v.p)))
 
 
+def _named(one: Component) -> str:
+    """Of 'north, m' the north."""
+    return one.label.partition(", ")[0]
+
+
+def _unit(one: Component) -> str:
+    """Of 'north, m' a blank and the m; nothing where it has none."""
+    unit = one.label.partition(", ")[2]
+    return f" {unit}" if unit else ""
+
+
 def _changes(
     time: Array, u: Array, k: int, one: Component, alarms: Sequence[Alarm], level: float
 ) -> list[Verdict]:
@@ -144,7 +155,7 @@ def _changes(
             "change",
             one.label,
             since,
-            f"{one.label} {how} from {since:.9g} s on (mean {after.mean():+.2f}, root mean "
+            f"{_named(one)} {how} from {since:.9g} s on (mean {after.mean():+.2f}, root mean "
             f"square {scale:.2f} of what was stated; before, {before.mean():+.2f} and "
             f"{math.sqrt(float(np.mean(before**2))):.2f}); no doubt of it at {alarm.known:.9g} s",
             "something happened then: a jump of a sensor's bias, reflections or another mode of "
@@ -200,7 +211,7 @@ def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
                 "understated" if larger else "overstated",
                 one.label,
                 first,
-                f"{one.label} scatters {scale:.2f} times as much as was expected",
+                f"{_named(one)} scatters {scale:.2f} times as much as was expected",
                 (
                     "the stated noise of the observation, or what the model adds between two of "
                     f"them, is understated by up to a factor of {scale:.2g}: a larger standard "
@@ -219,8 +230,8 @@ def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
                 "bias",
                 one.label,
                 first,
-                f"{one.label} is {one.bias:+.2f} standard deviations from zero on average "
-                f"({one.bias_in_unit:+.3g})",
+                f"{_named(one)} is {one.bias:+.2f} standard deviations from zero on average "
+                f"({one.bias_in_unit:+.3g}{_unit(one)})",
                 "a constant that no state takes up: a lever arm, a mounting, a datum of heights, "
                 "a time offset at a steady speed, or the bias of another aid of the same quantity",
                 bias_p,
@@ -232,7 +243,7 @@ def _throughout(one: Component, first: float, level: float) -> list[Verdict]:
                 "correlated",
                 one.label,
                 first,
-                f"{one.label} follows itself: {rho:+.2f} from one epoch to the next",
+                f"{_named(one)} follows itself: {rho:+.2f} from one epoch to the next",
                 (
                     "the errors of the observation are coloured (a receiver that filters, "
                     "atmosphere, reflections), or the model lags behind: too little noise of the "
@@ -255,8 +266,8 @@ def _gross(one: Component, at: Array) -> Verdict:
         "gross",
         one.label,
         float(at[0]),
-        f"{one.label} has {one.gross} gross errors in {one.count} epochs ({share:.1%}), the first "
-        f"at {at[0]:.9g} s",
+        f"{_named(one)} has {one.gross} gross errors in {one.count} epochs "
+        f"({100.0 * share:.1f} %), the first at {at[0]:.9g} s",
         "observations that are no part of the model; a robust rule keeps them from doing harm",
         0.0,
     )
@@ -267,7 +278,7 @@ def _few(one: Component, first: float, fewest: int) -> Verdict:
         "few",
         one.label,
         first,
-        f"{one.label} has {one.count - one.gross} epochs",
+        f"{_named(one)} has {one.count - one.gross} epochs",
         f"fewer than {fewest} tell of nothing",
         1.0,
     )

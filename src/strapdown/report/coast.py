@@ -14,7 +14,7 @@ from strapdown.config.coast import coast_spec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
 from strapdown.config.toml_file import read_toml
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.exceptions import ConfigError, DataError, nearest
 from strapdown.report.coast_document import coast_document
 from strapdown.report.coast_json import coast_json, write_coast_tables
 from strapdown.report.document_data import draw_stills
@@ -111,6 +111,13 @@ def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path |
             quantity="SENSOR|BUNDLE",
             remedy="navigate first (strapdown navigate), and give the folder that it wrote; or "
             "write the file of a run (strapdown init navigate), and give that",
+        )
+    elif path.suffix.lower() != ".toml":
+        raise ConfigError(
+            f"'{source}' is no sensor of the catalogue, and no folder is there by this name",
+            quantity="SENSOR|BUNDLE",
+            remedy=f"{nearest(str(source).lower(), SENSORS)} Or name the folder that strapdown "
+            "navigate wrote, or a .toml file of your own",
         )
     return None, None
 

@@ -51,7 +51,8 @@ _WORDS = {
     "g_sensitivity": "gyro g-sensitivity",
 }
 _REMEDIES = {
-    "position": "the drift is hardly more than what the fixes left open: better fixes would help",
+    "position": "the drift is hardly more than what is not known of the place where it "
+    "begins: a better place there would help",
     "velocity": "velocities by Doppler, or more fixes, before the outage would help; so would an "
     "odometer that stays",
     "tilt": "a drive with turns and changes of speed, or a standstill, shortly before the outage "

@@ -161,10 +161,11 @@ def _degrees(value: float) -> str:
 
 def _crash_truth(scenario: dict[str, Any]) -> str:
     (impact,) = scenario["impacts"]
-    change = math.hypot(*impact["delta_v_m_per_s"]) * _MS_TO_KMH
+    # The report tells both along the axes of the vehicle, which turns meanwhile.
+    change = math.hypot(*impact["delta_v_along_turning_axes_m_per_s"]) * _MS_TO_KMH
     return (
         f"Simulated: the change of velocity is {plain(change, 2)} km/h, the force comes from "
-        f"{plain(impact['pdof_deg'], 1)}°."
+        f"{plain(impact['pdof_along_turning_axes_deg'], 1)}°."
     )
 
 

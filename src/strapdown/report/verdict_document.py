@@ -140,7 +140,7 @@ def _keys(result: NavigationResult) -> tuple[KeyFigure, ...]:
         KeyFigure(
             "What was observed",
             _agrees(result),
-            f"{len(trust.consistency)} observations looked at"
+            _looked_at(len(trust.consistency))
             if first is None
             else f"{first.name} {kind_words(first)}",
             "" if first is None else f"since {instant(first.since)}",
@@ -279,7 +279,7 @@ def _innovations(result: NavigationResult) -> tuple[Block, ...]:
     ]
     if small:
         blocks += [
-            Paragraph("No chance, but too little to matter, or on the safe side:"),
+            Paragraph("More than chance, but too little to matter, or on the safe side:"),
             Items(tuple((name, f"{what}.") for name, what in small[:_MOST])),
         ]
     return tuple(blocks)
@@ -298,7 +298,8 @@ def _first(result: NavigationResult) -> tuple[Block, ...]:
                 ("since", "observation", "component", "what"),
                 rows,
                 (0, 1, 2, 3),
-                "All doubts, in the order of time",
+                "All doubts in the order in which they count: what holds throughout has no begin, "
+                "and comes after gross errors of its aid, which may be its cause",
             )
         )
     said = repeated_words(result)
@@ -322,6 +323,10 @@ def _limits() -> Block:
         "a run without fixes, is seen by nothing before the next one.",
         "note",
     )
+
+
+def _looked_at(number: int) -> str:
+    return "one observation looked at" if number == 1 else f"{number} observations looked at"
 
 
 def _capital(text: str) -> str:

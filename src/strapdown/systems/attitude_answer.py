@@ -249,8 +249,8 @@ def _limited_by_sensor(
             "much less time between reference points."
         )
     helps += [
-        "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading (--peers shows "
-        "what such filters reach on this log).",
+        "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading (--peers all "
+        "shows what such filters reach on this log).",
     ]
     return Answer("sensor", sentence, tolerance, algorithm, meaning, rate, tuple(why), tuple(helps))
 

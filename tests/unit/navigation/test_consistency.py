@@ -62,6 +62,10 @@ def test_a_bias_of_one_standard_deviation_is_of_its_component_alone():
         found = verdicts(rng.normal((1.0, 0.0, 0.0), 1.0, (120, 3)))
         assert found[0].kind == "bias"
         assert found[0].component == LABELS[0]
+        # The label is 'north, m': the unit stands with the number, and the name alone.
+        name, unit = LABELS[0].split(", ")
+        assert found[0].what.startswith(f"{name} is ")
+        assert found[0].what.endswith(f" {unit})")
         assert not [one for one in found if one.component != LABELS[0]]
         # The bias is no scatter.
         assert {one.kind for one in found} == {"bias"}
@@ -117,7 +121,10 @@ def test_gross_errors_are_counted_and_are_not_held_against_the_filter():
     out = consistency_of("x", innovation_table(u))
     assert out.consistent
     assert [one.kind for one in out.verdicts] == ["gross"] * 3
-    assert all(one.since == 30.0 and "9 gross errors in 300" in one.what for one in out.verdicts)
+    assert all(
+        one.since == 30.0 and "9 gross errors in 300 epochs (3.0 %)" in one.what
+        for one in out.verdicts
+    )
     assert all(one.gross == 9 and one.count == 300 for one in out.components)
     assert out.nis["nis"].max() == pytest.approx(7500.0)
 

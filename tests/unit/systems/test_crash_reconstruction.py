@@ -92,6 +92,17 @@ class TestEntry:
         findings = reconstruct_crash([late], ENTRY, window=(-0.2, 0.5)).findings
         assert any(f.quantity == "entry" and "50.46 ms before" in f.what for f in findings)
 
+    @pytest.mark.parametrize(("late", "told"), [(0.018, False), (0.022, True)])
+    def test_time_zero_may_be_a_window_before_the_touch(self, unit, late, told):
+        # Time zero of this record is 0.5 ms before its trigger, and the window has 20 ms: an
+        # entry at the touch, 18.5 ms after, is in order; one 22.5 ms after is not.
+        late = replace(unit, trigger=unit.trigger + late)
+        findings = reconstruct_crash([late], ENTRY, window=(-0.2, 0.5)).findings
+        said = [f for f in findings if f.quantity == "entry" and "ms before" in f.what]
+        assert bool(said) == told
+        if said:
+            assert "a rest that ends before that" in said[0].remedy
+
     def test_a_quiet_drive_is_no_rest_to_begin_at(self, unit):
         def late(triad):
             table = triad.table.loc[unit.trigger - 0.3 :]

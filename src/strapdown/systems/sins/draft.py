@@ -293,7 +293,8 @@ ON_FOOT = (
 )
 
 _WANTED = {
-    "heading_deg": "heading of the body at the start, clockwise from north",
+    "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
+    "find north at a rest of a minute need none: name their sensor with --sensor)",
     "sd_deg": "how well it is known",
 }
 

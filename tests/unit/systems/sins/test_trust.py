@@ -185,5 +185,6 @@ def test_the_files_say_what_was_judged(sound, tmp_path):
     assert (table["light"] == "green").mean() == light.share("green")
     page = (tmp_path / "out" / "verdict.html").read_text(encoding="utf-8")
     assert 'href="report.html"' in page
+    assert f"{len(sound.trust.consistency)} observations looked at" in page
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert 'href="verdict.html"' in report
