@@ -203,8 +203,19 @@ def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, un
     assert one["alignment"]["coarse"]["method"] == "gnss_course"
     again = run_cli("init", "navigate", log, *options)
     assert again.code == 4 and "--force" in again.err
-    beside = run_cli("navigate", path, "--smooth", "--out", tmp_path / "c")
-    assert beside.code == 4 and 'kind = "rts" under [smoother]' in beside.err
+    beside = run_cli("navigate", path, "--lat", "48", "--out", tmp_path / "c")
+    assert beside.code == 4 and "lat_deg" in beside.err
+    # Smoothing is no other run: the flag goes with a file, too, and is sealed with it.
+    flagged = run_cli("navigate", path, "--smooth", "--out", tmp_path / "c", "-q")
+    assert flagged.code == 0, flagged.err
+    own = tmp_path / "smoothed.toml"
+    own.write_text(
+        path.read_text().replace('[smoother]\nkind = "none"', '[smoother]\nkind = "rts"')
+    )
+    assert run_cli("navigate", own, "--out", tmp_path / "d", "-q").code == 0
+    tables = [(tmp_path / name / "trajectory.csv").read_bytes() for name in "cd"]
+    assert tables[0] == tables[1] != (tmp_path / "b" / "trajectory.csv").read_bytes()
+    assert run_cli("verify", tmp_path / "c").code == 0
 
 
 def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run_cli, tmp_path):

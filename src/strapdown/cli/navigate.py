@@ -149,7 +149,7 @@ def navigate(
     from strapdown.cli.align_options import flag_of, flag_words
     from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency
-    from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
+    from strapdown.cli.navigate_options import FLAGS, navigation_of_flags, smoothed_too
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.navigation_file import read_navigation_spec
@@ -174,8 +174,10 @@ def navigate(
     }
     own = source.suffix.lower() == ".toml"
     if own and live is None:
-        flag_words(source, given, "the file of a run", FLAGS)
+        flag_words(source, {**given, "smooth": None}, "the file of a run", FLAGS)
     asked = read_navigation_spec(source) if own else None
+    if asked is not None and smooth:
+        asked = smoothed_too(asked)
     folder = out or default_folder(
         source, "navigate", None if asked is None else source_name(asked)
     )

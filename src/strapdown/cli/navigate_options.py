@@ -125,6 +125,23 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
         raise as_flag(error, _flag) from None
 
 
+def smoothed_too(spec: NavigationSpec) -> NavigationSpec:
+    """Return a run that is smoothed when it has ended, whatever its file says of that.
+
+    Parameters
+    ----------
+    spec : NavigationSpec
+
+    Returns
+    -------
+    NavigationSpec
+    """
+    if spec.smoother.kind != "none":
+        return spec
+    whole = spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
+    return navigation_spec({**whole, "smoother": {"kind": "rts"}})
+
+
 def _flag(place: str) -> str:
     return FLAGS.get(place, place)
 

@@ -18,7 +18,7 @@ from strapdown.report.navigation_values import (
     share_words,
 )
 from strapdown.systems.sins.result import NavigationResult
-from strapdown.systems.sins.trust import Advice, Trust
+from strapdown.systems.sins.trust import NO_NORTH, Advice, Trust
 
 __all__ = [
     "advice_words",
@@ -145,6 +145,8 @@ def advice_words(advice: Advice, trust: Trust) -> str:
 def _without_fixes(trust: Trust) -> str:
     """What would bear a heading out where there are no fixes."""
     north = f"these gyros find north to ±{GAP}{degrees_words(trust.north_sd)} (one sd)"
+    if trust.north_sd >= NO_NORTH:
+        north = "these gyros find no north"
     if SURE * trust.north_sd <= trust.light.green:
         return (
             f"{north}: a fine alignment, or a stop of some minutes that an aid sees (kind = "

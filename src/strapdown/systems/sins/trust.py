@@ -49,6 +49,8 @@ Array = NDArray[np.float64]
 
 #: Spans that advice is given for, and how long one must be for it, s.
 MOST_ADVISED, LEAST_ADVISED = 4, 5.0
+#: A heading that is known no better is not known, deg.
+NO_NORTH = 45.0
 #: Between states from which a witness can begin, s.
 LONGEST_STEP = 0.25
 
@@ -208,6 +210,8 @@ def _carried(
     ellipsoid = find_ellipsoid(spec.ellipsoid)
     north = _north_sd(spec, sensors, record)
     if not SURE * north <= spec.trust.heading_limit_deg:
+        if north >= NO_NORTH:
+            return [], "its gyros find no north"
         return [], f"its gyros find north to ± {north:.2g}° only"
     try:
         found, doubts, why = compasses_of(chain, sensors, imu, record, aligned, ellipsoid)
