@@ -29,8 +29,9 @@ _MORE = (PURPLE, ORANGE)
 _ROW, _PAD = 0.115, 0.05  # of a panel
 _LETTER = 0.0085  # of the axis
 _MOST_ROWS, _MOST_MARKS = 7, 200
-# Epochs farther apart than so many usual ones are no longer one stretch.
-_PAUSE = 5.0
+# Epochs farther apart than so many usual ones are no longer one stretch; of fewer than so many
+# nothing is usual. An epoch alone is as wide as this part of the whole.
+_PAUSE, _FEW, _ALONE = 5.0, 4, 1.0 / 300.0
 
 
 def mode_colour(name: str, names: tuple[str, ...]) -> str:
@@ -69,7 +70,11 @@ def strip(record: NavigationRecord) -> Panel | None:
         at = float(len(rows))
         rows.append(aid)
         out = record.outages.get(aid, ())
-        used = _between(out, going) if aid in record.outages else _stretches(_epochs(record, aid))
+        used = (
+            _between(out, going)
+            if aid in record.outages
+            else _stretches(_epochs(record, aid), going)
+        )
         fills.append(_bar("used", used, at, 0.3, GREEN))
         if out:
             fills.append(_bar("outage", out, at, 0.13, VERMILLION))
@@ -118,17 +123,22 @@ def _rejected(record: NavigationRecord, aid: str, whole: Span) -> Array:
     return times[first]
 
 
-def _stretches(time: Array) -> tuple[Span, ...]:
-    """Stretches in which epochs follow each other as they usually do."""
+def _stretches(time: Array, whole: Span) -> tuple[Span, ...]:
+    """Stretches in which epochs follow each other as they usually do, wide enough to be seen."""
     if not time.size:
         return ()
     steps = np.diff(time)
-    usual = float(np.median(steps)) if steps.size else 0.0
+    usual = float(np.median(steps)) if time.size >= _FEW else 0.0
     ends = np.flatnonzero(steps > _PAUSE * usual)
-    begins = np.concatenate([[0], ends + 1])
-    ends = np.append(ends, time.size - 1)
+    begins = time[np.concatenate([[0], ends + 1])]
+    lasts = time[np.append(ends, time.size - 1)]
+    least = _ALONE * (whole.end - whole.begin)
+    more = np.maximum(0.5 * (least - (lasts - begins)), 0.0)
     return tuple(
-        Span("used", float(time[a]), float(time[b])) for a, b in zip(begins, ends, strict=True)
+        Span("used", float(a), float(b))
+        for a, b in zip(
+            np.maximum(begins - more, whole.begin), np.minimum(lasts + more, whole.end), strict=True
+        )
     )
 
 

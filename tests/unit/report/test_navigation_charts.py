@@ -228,6 +228,12 @@ def test_the_strip_of_an_aid_that_comes_and_goes():
     panel = strip(made)
     assert panel.categories == ("stand",)
     assert panel.fills[0].x[[0, 1, 3, 4]].tolist() == [10.0, 19.0, 60.0, 64.0]
+    # Two epochs are no stretch: each is there where it was, and is seen.
+    made.innovations["stand.velocity"] = table.iloc[[0, -1]]
+    (used,) = strip(made).fills
+    begins, ends = used.x[::3], used.x[1::3]
+    assert 0.5 * (begins + ends) == pytest.approx([10.0, 64.0])
+    assert ends - begins == pytest.approx(119.9 / 300.0)
     # From end to end of the run all the same.
     assert figure(charts.height_chart(told(made)))["layout"]["xaxis"]["range"] == [0.1, 120.0]
 
