@@ -10,7 +10,7 @@ from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.site import Site
 from strapdown.config.alignment_file import alignment_spec
-from strapdown.exceptions import DataError
+from strapdown.exceptions import ConfigError
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -89,7 +89,7 @@ def test_a_part_of_a_log_is_used(tmp_path):
     read = read_alignment_source(spec_of(path, log=log, axes=axes)).imu
     assert (read.index[0], read.index[-1], len(read)) == (10.0, 40.0, 601)
     log |= {"from_s": 100.0, "to_s": 140.0}
-    with pytest.raises(DataError, match="from 100 s on to 140 s"):
+    with pytest.raises(ConfigError, match="between 100 and 140 s; the log runs from 0 to 60 s"):
         read_alignment_source(spec_of(path, log=log, axes=axes))
 
 
