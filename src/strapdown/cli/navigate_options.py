@@ -138,8 +138,7 @@ def smoothed_too(spec: NavigationSpec) -> NavigationSpec:
     """
     if spec.smoother.kind != "none":
         return spec
-    whole = spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
-    return navigation_spec({**whole, "smoother": {"kind": "rts"}})
+    return navigation_spec({**spec.plain(), "smoother": {"kind": "rts"}})
 
 
 def _flag(place: str) -> str:

@@ -18,6 +18,10 @@ class Spec(BaseModel):
     # A command uses a few of the specifications: each is built when it is first used.
     model_config = ConfigDict(frozen=True, extra="forbid", defer_build=True)
 
+    def plain(self) -> dict[str, Any]:
+        """Return it as plain data, as it is sealed: what is not stated is left out."""
+        return self.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
+
 
 class TableSpec(Spec):
     """A table that a person writes: a key that is not known is answered with the nearest."""

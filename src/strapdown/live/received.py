@@ -19,7 +19,7 @@ SAMPLES = "received.csv"
 
 
 def _plain(spec: NavigationSpec) -> dict[str, Any]:
-    whole = spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
+    whole = spec.plain()
     for name in aids_of(spec):
         aid = whole["aiding"][name]
         for key in ("path", "columns", "repair"):

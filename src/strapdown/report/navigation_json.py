@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
+from strapdown.config.navigation_checks import STAGES
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
@@ -26,17 +27,7 @@ from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 
 __all__ = ["navigation_json"]
 
-MODULES = (
-    "prefilter",
-    "coarse",
-    "fine",
-    "mechanization",
-    "filter",
-    "damping",
-    "smoother",
-    "recorder",
-    "aiding",
-)
+MODULES = (*STAGES, "aiding")
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from strapdown.bundle.seal import Seal
 from strapdown.bundle.writing import write_bundle
@@ -76,8 +76,8 @@ def report_bundle(
     file = next((str(i.path) for i in result.inputs if i.role == role), None)
     configuration = {
         "name": name,
-        key: _plain(result.spec),
-        **{name: _plain(spec) for name, spec in (beside or {}).items()},
+        key: result.spec.plain(),
+        **{name: spec.plain() for name, spec in (beside or {}).items()},
         **({} if file is None else {path_key: file}),
     }
     with write_bundle(
@@ -89,7 +89,3 @@ def report_bundle(
         seals=seals,
     ) as folder:
         yield folder
-
-
-def _plain(spec: Spec) -> dict[str, Any]:
-    return spec.model_dump(mode="json", exclude_none=True, serialize_as_any=True)
