@@ -161,7 +161,7 @@ def files_of(path: Path) -> tuple[Path, ...]:
     path : Path
         As `read`.
     """
-    return _values(path)[2]
+    return _files(path)
 
 
 def _oxts(path: Path) -> Path | None:
@@ -170,8 +170,8 @@ def _oxts(path: Path) -> Path | None:
     return next((f for f in (path, path / "oxts") if (f / "timestamps.txt").is_file()), None)
 
 
-def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
-    """Stamps in ns since 1970, the thirty numbers of each, and the files."""
+def _files(path: Path) -> tuple[Path, ...]:
+    """The stamps, and what belongs to them in order."""
     folder = _oxts(path)
     if folder is None:
         raise DataError(
@@ -179,7 +179,13 @@ def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
             file=path.resolve().name,
             remedy="give the folder oxts of a raw recording, or that of its drive",
         )
-    stamps = folder / "timestamps.txt"
+    data = sorted(f for f in (folder / "data").glob("*") if _NAME.fullmatch(f.name))
+    return (folder / "timestamps.txt", *data)
+
+
+def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
+    """Stamps in ns since 1970, the thirty numbers of each, and the files."""
+    stamps, *files = _files(path)
     lines = [n for n in stamps.read_text(encoding="ascii", errors="replace").splitlines() if n]
     dates = pd.to_datetime(pd.Series(lines), format="ISO8601", errors="coerce")
     if dates.isna().any():
@@ -191,7 +197,6 @@ def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
             quantity="time",
             remedy="get the recording again from its source",
         )
-    files = sorted(f for f in (folder / "data").iterdir() if _NAME.fullmatch(f.name))
     # Of some recordings a few files are missing: each belongs to the stamp of its number.
     numbers = np.array([int(f.stem) for f in files])
     if not files or numbers[-1] >= len(lines):

@@ -25,7 +25,7 @@ from strapdown.tables import trajectory_table
 
 Array = NDArray[np.float64]
 
-__all__ = ["TRAJECTORY_READERS", "TrajectoryReader", "read_trajectory"]
+__all__ = ["TRAJECTORY_READERS", "TrajectoryReader", "files_of_trajectory", "read_trajectory"]
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,17 @@ TRAJECTORY_READERS: dict[str, TrajectoryReader] = {
 }
 
 _ELLIPSOID = re.compile(r"[#%]\s*ellipsoid\s*:\s*(\S+)\s*$", re.M)
+
+
+def files_of_trajectory(path: str | Path) -> tuple[Path, ...]:
+    """The files that a trajectory is read from: one, or several of a folder.
+
+    Parameters
+    ----------
+    path : str or Path
+    """
+    given = Path(path)
+    return kitti.files_of(given) if kitti.detect(given) else (given,)
 
 
 def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) -> pd.DataFrame:

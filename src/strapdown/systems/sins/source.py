@@ -13,12 +13,11 @@ import pandas as pd
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.exceptions import ConfigError, Finding
-from strapdown.formats import kitti
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.control_points import read_control_points
 from strapdown.formats.gnss_files import files_of_fixes
 from strapdown.formats.recording import StatedStart
-from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.formats.trajectory_readers import files_of_trajectory, read_trajectory
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_draws import child
@@ -101,7 +100,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     if spec.truth is not None:
         truth = read_trajectory(spec.truth.path)
         findings += truth.attrs["findings"]
-        inputs.append(input_files("truth", spec.truth.path, _files_of(spec.truth.path)))
+        inputs.append(input_files("truth", spec.truth.path, files_of_trajectory(spec.truth.path)))
     points = None
     if spec.control_points is not None:
         given = spec.control_points
@@ -140,12 +139,6 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         inputs=(input_files("log", spec.log.path, recording.files), *inputs),
         findings=(*of_log, *findings),
     )
-
-
-def _files_of(path: str) -> tuple[Path, ...]:
-    """The files that fixes or a trajectory were read from; of folders those of KITTI alone are."""
-    given = Path(path)
-    return kitti.files_of(given) if kitti.detect(given) else (given,)
 
 
 def _simulated(
