@@ -7,7 +7,15 @@ from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import RUN_PANEL, OutFlags, folder_to_make, spread
+from strapdown.cli.shared_options import (
+    RUN_PANEL,
+    OutFlags,
+    folder_to_make,
+    part_from,
+    part_long,
+    part_to,
+    spread,
+)
 
 EPILOG = (
     "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
@@ -129,30 +137,9 @@ def coast(
         int | None,
         typer.Option(metavar="N", help="So many outages, evenly (10).", rich_help_panel=_WHERE),
     ] = None,
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from",
-            metavar="S",
-            help="Begin at this stamp; where the filter has settled, if not given.",
-            rich_help_panel=_WHERE,
-        ),
-    ] = None,
-    to_s: Annotated[
-        float | None,
-        typer.Option(
-            "--to",
-            metavar="S",
-            help="End at this stamp; the last, if not given.",
-            rich_help_panel=_WHERE,
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=_WHERE
-        ),
-    ] = None,
+    from_s: Annotated[float | None, part_from("where the filter has settled", _WHERE)] = None,
+    to_s: Annotated[float | None, part_to(_WHERE)] = None,
+    duration: Annotated[float | None, part_long(_WHERE)] = None,
     *,
     out: Annotated[Path | None, folder_to_make("SENSOR-coast, or DRIVE-coast")] = None,
     write: OutFlags,

@@ -26,6 +26,9 @@ __all__ = [
     "WriteFlags",
     "folder_to_make",
     "log_keys",
+    "part_from",
+    "part_long",
+    "part_to",
     "spread",
 ]
 
@@ -35,34 +38,40 @@ WITH_PANEL = "Where, and with what"
 OUT_PANEL = "What to write"
 
 
+def part_from(else_from: str, panel: str) -> Any:
+    """The option ``--from``, with where a part begins that does not say it."""
+    return typer.Option(
+        "--from",
+        metavar="S",
+        help=f"Begin at this stamp; {else_from}, if not given.",
+        rich_help_panel=panel,
+    )
+
+
+def part_to(panel: str) -> Any:
+    """The option ``--to``."""
+    return typer.Option(
+        "--to",
+        metavar="S",
+        help="End at this stamp; the last, if not given.",
+        rich_help_panel=panel,
+    )
+
+
+def part_long(panel: str) -> Any:
+    """The option ``--duration``."""
+    return typer.Option(
+        metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=panel
+    )
+
+
 @dataclass(frozen=True)
 class LogFlags:
     """Which part of a log is used, and how it is read."""
 
-    from_s: Annotated[
-        float | None,
-        typer.Option(
-            "--from",
-            metavar="S",
-            help="Begin at this stamp; the first, if not given.",
-            rich_help_panel=LOG_PANEL,
-        ),
-    ] = None
-    to_s: Annotated[
-        float | None,
-        typer.Option(
-            "--to",
-            metavar="S",
-            help="End at this stamp; the last, if not given.",
-            rich_help_panel=LOG_PANEL,
-        ),
-    ] = None
-    duration: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", help="Use so much of it, in place of --to.", rich_help_panel=LOG_PANEL
-        ),
-    ] = None
+    from_s: Annotated[float | None, part_from("the first", LOG_PANEL)] = None
+    to_s: Annotated[float | None, part_to(LOG_PANEL)] = None
+    duration: Annotated[float | None, part_long(LOG_PANEL)] = None
     rate: Annotated[
         float | None,
         typer.Option(
