@@ -29,11 +29,10 @@ RATE = 50.0
 
 
 @dataclass(frozen=True)
-class TurnedMotion(EarthMotion):
-    """A motion as seen from axes that are turned in its body, at the same point."""
+class CarriedMotion(EarthMotion):
+    """A body that goes where another motion goes, and stands otherwise."""
 
     motion: PathMotion
-    angles_deg: tuple[float, float, float]
 
     @property
     def duration(self):
@@ -50,6 +49,13 @@ class TurnedMotion(EarthMotion):
     @property
     def breaks(self):
         return self.motion.breaks
+
+
+@dataclass(frozen=True)
+class TurnedMotion(CarriedMotion):
+    """A motion as seen from axes that are turned in its body, at the same point."""
+
+    angles_deg: tuple[float, float, float]
 
     def kinematics(self, time):
         k = self.motion.kinematics(time)

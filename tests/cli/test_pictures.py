@@ -93,47 +93,44 @@ def test_the_picture_of_a_smoothed_run_is_what_is_drawn_now(smoothed, tmp_path):
 
 def compare(drawings_of_run, name, folder):
     (chart,) = [d.chart for d in drawings_of_run if d.chart.slug == name]
-    shown = IMAGES / f"navigate_{name}.svg"
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        draw(chart, shown)
+    compare_chart(chart, f"navigate_{name}.svg", folder)
+
+
+def compare_chart(chart, name, folder):
+    """Draw a chart, and hold the picture of that name to it."""
     draw(chart, folder / "now.svg")
-    assert same_picture(shown, folder / "now.svg"), "make pictures, and look at them"
+    compare_picture(folder / "now.svg", name)
+
+
+def compare_picture(now, name):
+    """Hold the picture of that name to what was drawn now; write it where that is asked for."""
+    shown = IMAGES / name
+    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
+        shutil.copyfile(now, shown)
+    assert same_picture(shown, now), "make pictures, and look at them"
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_rates_of_the_readme_are_what_is_drawn_now(tmp_path):
     (chart,) = [c for c in charts(bench_attitude("alexiev-fig6", rate=200)) if c.slug == "sweep"]
-    shown = IMAGES / "attitude_rates.svg"
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        draw(chart, shown)
-    draw(chart, tmp_path / "now.svg")
-    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+    compare_chart(chart, "attitude_rates.svg", tmp_path)
 
 
 def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
-    shown, now = IMAGES / "crash_path.svg", sealed_crash.folder / "figures" / "path.svg"
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        shutil.copyfile(now, shown)
-    assert same_picture(shown, now), "make pictures, and look at them"
+    compare_picture(sealed_crash.folder / "figures" / "path.svg", "crash_path.svg")
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
 def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
     drawn = drawings(navigation_document(told_of(driven), ""))
     (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
-    shown = IMAGES / "drive_plan.svg"
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        draw(chart, shown)
-    draw(chart, tmp_path / "now.svg")
-    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+    compare_chart(chart, "drive_plan.svg", tmp_path)
 
 
 def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
-    shown, now = IMAGES / "trust_light.svg", tmp_path / "now.svg"
+    now = tmp_path / "now.svg"
     now.write_text(light_picture(driven).svg, encoding="utf-8")
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        shutil.copyfile(now, shown)
-    assert same_picture(shown, now), "make pictures, and look at them"
+    compare_picture(now, "trust_light.svg")
 
 
 @pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
@@ -145,11 +142,7 @@ def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):
     (tmp_path / "foot.toml").write_text(f"{text}\n[control_points]\npath = '{path}'\n")
     drawn = drawn_of(read_navigation_spec(tmp_path / "foot.toml"))
     (chart,) = [d.chart for d in drawn if d.chart.slug == "plan"]
-    shown = IMAGES / "walking_plan.svg"
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        draw(chart, shown)
-    draw(chart, tmp_path / "now.svg")
-    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
+    compare_chart(chart, "walking_plan.svg", tmp_path)
 
 
 def test_the_picture_in_a_bundle_is_that_of_the_manual(tmp_path):

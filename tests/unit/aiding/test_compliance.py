@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from tests.aided_drives import CarriedMotion, drive, estimate, gnss_of, navigator_of, run
 
-sys.path.insert(0, str(Path(__file__).parents[2]))
-
-from aided_drives import drive, estimate, gnss_of, navigator_of, run
 from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.no_slip import NoSlip
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.exceptions import ConfigError
-from strapdown.simulation import PathMotion
-from strapdown.simulation.earth_motion import EarthMotion
 
 #: Pitch of the body by the force along it, deg/g: nose up as it gains speed.
 DIVE = 3.0
@@ -28,26 +22,8 @@ HALF = 1e-3
 
 
 @dataclass(frozen=True)
-class DivingMotion(EarthMotion):
+class DivingMotion(CarriedMotion):
     """A course whose body pitches on its springs by the force along it."""
-
-    motion: PathMotion
-
-    @property
-    def duration(self):
-        return self.motion.duration
-
-    @property
-    def origin(self):
-        return self.motion.origin
-
-    @property
-    def ellipsoid(self):
-        return self.motion.ellipsoid
-
-    @property
-    def breaks(self):
-        return self.motion.breaks
 
     def pitch(self, time):
         """Of the body in its path, rad: by the force in its own axes, which pitch with it."""
