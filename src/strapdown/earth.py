@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import earth as kernel
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = [
     "centrifugal",
@@ -219,11 +219,7 @@ def transport_rate(
     """
     velocity = np.asarray(v_n, dtype=np.float64)
     if velocity.ndim == 0 or velocity.shape[-1] != 3:
-        raise DataError(
-            f"its shape is {velocity.shape}",
-            quantity="v_n",
-            remedy="give velocity as (..., 3): north, east, down in m/s",
-        )
+        raise DataError("geodesy.shape", quantity="v_n", shape=velocity.shape)
     north, east, down = np.moveaxis(velocity, -1, 0)
     (lat, height, north, east, _), leading = rows(
         lat_deg=lat_deg, alt=alt, v_n_north=north, v_n_east=east, v_n_down=down
@@ -266,16 +262,14 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
         try:
             arrays[name] = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
-            raise DataError(
-                "these are no numbers", quantity=name, remedy="pass a number or an array of them"
-            ) from None
+            raise DataError("geodesy.these-no-numbers", quantity=name) from None
     try:
         leading = np.broadcast_shapes(*(array.shape for array in arrays.values()))
     except ValueError:
         raise DataError(
-            f"shapes {', '.join(str(array.shape) for array in arrays.values())} do not go together",
+            "geodesy.shapes-do-not-go-together",
             quantity=", ".join(arrays),
-            remedy="pass as many of the one as of the other, or one of either",
+            values=[str(array.shape) for array in arrays.values()],
         ) from None
     columns = []
     for name, array in arrays.items():
@@ -328,10 +322,11 @@ def refuse(bad: NDArray[np.bool_], values: Array, name: str, what: str, remedy: 
     where = np.flatnonzero(bad)
     if where.size:
         raise DataError(
-            f"{what}: {values[where[0]].tolist()}",
+            "geodesy.message",
             row=int(where[0]) + 1,
             quantity=name,
-            remedy=remedy,
+            message=f"{what}: {values[where[0]].tolist()}",
+            remedy_text=remedy,
         )
 
 

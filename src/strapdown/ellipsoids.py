@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["ELLIPSOIDS", "WGS84", "Ellipsoid", "find_ellipsoid"]
 
@@ -172,9 +172,9 @@ def find_ellipsoid(name: str) -> Ellipsoid:
     except (AttributeError, KeyError):
         given = name.name if isinstance(name, Ellipsoid) else str(name)
         raise ConfigError(
-            f"there is no ellipsoid '{name}'",
+            "geodesy.no-ellipsoid" if not isinstance(name, str) else "geodesy.no-ellipsoid-2",
             quantity="ellipsoid",
-            remedy=f"Give a name. {nearest(given, ELLIPSOIDS)}"
-            if not isinstance(name, str)
-            else nearest(given, ELLIPSOIDS),
+            name=name,
+            word=given,
+            known=ELLIPSOIDS,
         ) from None

@@ -19,7 +19,7 @@ from strapdown import rotation
 from strapdown._kernels import geodetic as kernel
 from strapdown.earth import refuse, rows
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = [
     "C_ne",
@@ -247,9 +247,10 @@ def place_difference(
         leading = np.broadcast_shapes(to.shape, start.shape)
     except ValueError:
         raise DataError(
-            f"shapes {to.shape} and {start.shape} do not go together",
+            "geodesy.shapes-do-not-go-together-2",
             quantity="place, reference",
-            remedy="pass as many of the one as of the other, or one of either",
+            shape=to.shape,
+            shape_2=start.shape,
         ) from None
     line = np.broadcast_to(to - start, leading)
     halfway = geodetic_from_ecef(0.5 * (to + start), ellipsoid=ellipsoid)
@@ -307,23 +308,14 @@ def _columns(
 ) -> tuple[list[Array], tuple[int, ...]]:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim == 0 or array.shape[-1] != 3:
-        raise DataError(
-            f"shape {array.shape} does not end in (3,)",
-            quantity=name,
-            remedy=f"pass {', '.join(names)} as an array of shape (..., 3)",
-        )
+        raise DataError("geodesy.shape-does-not-end", quantity=name, shape=array.shape, names=names)
     return rows(**dict(zip(names, np.moveaxis(array, -1, 0), strict=True)))
 
 
 def _origin(origin: ArrayLike) -> list[float]:
     columns, leading = _columns(origin, ("lat_deg", "lon_deg", "alt"), "origin")
     if leading:
-        raise DataError(
-            f"shape {(*leading, 3)} is more than one place",
-            quantity="origin",
-            remedy="pass latitude and longitude in deg and height in m; for pairs of places use "
-            "place_difference",
-        )
+        raise DataError("geodesy.shape-more-than-place", quantity="origin", leading=(*leading, 3))
     return [float(column[0]) for column in columns]
 
 

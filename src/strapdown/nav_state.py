@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables import EULER, check_trajectory, places_of, trajectory_table
 from strapdown.tables.checks import is_number
 
@@ -54,46 +54,31 @@ class NavState:
         for name in ("time", "lat", "lon", "alt"):
             if not is_number(getattr(self, name)):
                 raise DataError(
-                    f"not a number ({getattr(self, name)!r})",
-                    quantity=name,
-                    remedy="a navigation state needs a number for each of its parts",
+                    "mechanization.not-number", quantity=name, value=getattr(self, name)
                 )
         v_n = _numbers(self.v_n, "v_n")
         if v_n.shape != (3,):
-            raise DataError(
-                f"its shape is {v_n.shape}",
-                quantity="v_n",
-                remedy="give velocity as north, east, down in m/s",
-            )
+            raise DataError("mechanization.shape", quantity="v_n", shape=v_n.shape)
         numbers = {"time": self.time, "lat": self.lat, "lon": self.lon, "alt": self.alt}
         numbers |= dict(zip(("v_n north", "v_n east", "v_n down"), v_n.tolist(), strict=True))
         for name, value in numbers.items():
             if not math.isfinite(value):
-                raise DataError(
-                    f"not a finite number ({value})",
-                    quantity=name,
-                    remedy="a navigation state needs a number for each of its parts",
-                )
+                raise DataError("mechanization.not-finite-number", quantity=name, value=value)
         if abs(self.lat) > 0.5 * math.pi:
             raise DataError(
-                f"a latitude of {self.lat:.9g} rad is beyond the pole",
+                "mechanization.message",
                 quantity="lat",
-                remedy=_beyond_in_radians(self.lat, self.lon),
+                message=f"a latitude of {self.lat:.9g} rad is beyond the pole",
+                remedy_text=_beyond_in_radians(self.lat, self.lon),
             )
         if abs(self.lon) > 2.0 * math.pi:
             raise DataError(
-                f"a longitude of {self.lon:.9g} rad is more than a full turn",
-                quantity="lon",
-                remedy="this looks like degrees: use NavState.from_degrees",
+                "mechanization.longitude-rad-more-than-full", quantity="lon", lon=self.lon
             )
         v_n.flags.writeable = False
         q_nb = _numbers(self.q_nb, "q_nb")
         if q_nb.shape != (4,):
-            raise DataError(
-                f"its shape is {q_nb.shape}",
-                quantity="q_nb",
-                remedy="give one quaternion, scalar first, or angles to NavState.from_degrees",
-            )
+            raise DataError("mechanization.shape-2", quantity="q_nb", shape=q_nb.shape)
         q_nb = rotation.normalise(q_nb)
         q_nb.flags.writeable = False
         object.__setattr__(self, "v_n", v_n)
@@ -137,22 +122,18 @@ class NavState:
         angles = (lat_deg, lon_deg, roll_deg, pitch_deg, heading_deg)
         for name, value in zip(("lat_deg", "lon_deg", *EULER), angles, strict=True):
             if not is_number(value) or not math.isfinite(value):
-                raise DataError(
-                    f"not a finite number ({value!r})", quantity=name, remedy="give it in degrees"
-                )
+                raise DataError("mechanization.not-finite-number-2", quantity=name, value=value)
         if abs(lat_deg) > 90.0:
             raise DataError(
-                f"a latitude of {lat_deg:.9g} deg is beyond the pole",
-                quantity="lat_deg",
-                remedy="latitude and longitude seem to be swapped: latitude comes first"
+                "mechanization.latitude-beyond-pole"
                 if abs(lon_deg) <= 90.0
-                else "give geodetic latitude within -90 to 90 deg, north positive",
+                else "mechanization.latitude-beyond-pole-2",
+                quantity="lat_deg",
+                lat_deg=lat_deg,
             )
         if abs(lon_deg) > 360.0:
             raise DataError(
-                f"a longitude of {lon_deg:.9g} deg is more than a full turn",
-                quantity="lon_deg",
-                remedy="give longitude within -180 to 360 deg, east positive",
+                "mechanization.longitude-more-than-full-turn", quantity="lon_deg", lon_deg=lon_deg
             )
         return cls(
             time=time,
@@ -186,10 +167,11 @@ class NavState:
         rows = len(trajectory)
         if not -rows <= row < rows:
             raise DataError(
-                f"there is no row {row} among {rows}",
+                "mechanization.no-row-among",
                 file=trajectory.attrs.get("source"),
                 quantity="row",
-                remedy="count from 0, or from the end with -1",
+                at_row=row,
+                rows=rows,
             )
         at = trajectory.iloc[row]
         lat, lon, alt = places_of(trajectory.iloc[[row]])[0].tolist()
@@ -222,9 +204,11 @@ def _numbers(values: ArrayLike, name: str) -> Array:
         return np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
         raise DataError(
-            f"these are no numbers ({values!r})",
+            "mechanization.these-no-numbers-2"
+            if name == "v_n"
+            else "mechanization.these-no-numbers-3",
             quantity=name,
-            remedy="give north, east, down in m/s" if name == "v_n" else "give four numbers",
+            values=values,
         ) from None
 
 

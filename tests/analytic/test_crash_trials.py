@@ -10,7 +10,7 @@ import pytest
 
 from strapdown.crash.entry import Entry
 from strapdown.crash.monte_carlo import sample_paths
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import CRASHES, Ringing, find_crash, point_kinematics
 from strapdown.simulation.crash_recording import record_crash
 from strapdown.systems.crash_reconstruction import reconstruct_crash

@@ -17,7 +17,7 @@ from exact_increments import errors, exact_increments, rounding, start_of
 from strapdown import earth, rotation
 from strapdown._kernels import ned_simplified
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
-from strapdown.exceptions import DivergenceError
+from strapdown.errors import DivergenceError
 from strapdown.increments import motion_accuracy, motion_increments
 from strapdown.mechanization import NorthEastDown, Tadic, run_mechanization
 from strapdown.nav_state import NavState

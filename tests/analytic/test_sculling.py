@@ -8,7 +8,7 @@ import pytest
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.increments import motion_increments
 from strapdown.simulation import ImuErrors, Sculling, simulate_imu
 from strapdown.tables import ACCEL, DR, DV, GYRO, PHI, QUATERNION, imu_table

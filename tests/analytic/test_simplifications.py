@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from strapdown import earth, rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.mechanization import NorthEastDown, Tadic
 from strapdown.systems.simplifications import (
     ERRORS,

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "config"))
 
 from good_case import TEXT, read
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["CASE_FILES", "TEXT", "CaseFile"]
 

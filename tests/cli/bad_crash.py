@@ -16,7 +16,7 @@ from strapdown.crash.reference_path import compare_with_reference
 from strapdown.crash.severity import find_severity_model
 from strapdown.crash.severity_model import injury_risk
 from strapdown.dsp.channel_class import cfc_filter
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.synchronise import synchronise
 from strapdown.simulation.crash_recording import record_crash

@@ -13,7 +13,7 @@ import pytest
 
 import strapdown.report.verify as module
 from strapdown.bundle import sha256
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.report.verify import verify
 
 

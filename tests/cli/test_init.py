@@ -40,7 +40,7 @@ def test_it_writes_a_case_and_says_what_is_missing(run_cli, record, tmp_path):
 
 def test_an_open_case_is_refused_with_the_same_lines(run_cli, record, tmp_path):
     from strapdown.config.crash_case_file import read_case_spec
-    from strapdown.exceptions import ConfigError
+    from strapdown.errors import ConfigError
 
     out = tmp_path / "case.toml"
     done = run_cli("init", "crash", record, "--out", out)

@@ -25,7 +25,7 @@ from bad_inputs import CASES
 from bad_navigate import navigate_section
 from bad_navigation import CALLS
 
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 
 PAGE = Path(__file__).parents[2] / "docs" / "messages.md"
 HEAD = """# What is said about bad input

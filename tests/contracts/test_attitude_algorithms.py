@@ -7,7 +7,7 @@ import pytest
 
 from strapdown import rotation
 from strapdown.attitude import ALGORITHMS, AttitudeTracker, make_algorithm, run_attitude
-from strapdown.exceptions import ConfigError, DataError, DivergenceError
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.increments import increments_from_imu
 from strapdown.tables import QUATERNION, imu_table, increments_table
 

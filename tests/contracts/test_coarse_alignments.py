@@ -11,7 +11,7 @@ from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.site import Site
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, simulate_imu

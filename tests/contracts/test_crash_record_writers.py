@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_csv_writer import write_crash_csv
 from strapdown.formats.crash_json import write_crash_json
 from strapdown.formats.crash_record import CrashChannel, CrashRecord

@@ -7,7 +7,7 @@ from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.event_detector import EventDetector
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.events import detect_events
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 RULES = {
     "part 563": PART_563,

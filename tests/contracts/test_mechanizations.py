@@ -14,7 +14,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from exact_increments import exact_increments, start_of
-from strapdown.exceptions import ConfigError, DataError, DivergenceError
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import (
     HEIGHTS,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.prefilter import PREFILTERS, Grid, NoPrefilter, RobustWd
 from strapdown.tables import ACCEL, GYRO, check_imu, check_motion_increments, imu_table
 

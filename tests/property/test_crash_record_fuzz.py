@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 from strapdown.formats.crash_csv_writer import write_crash_csv
 from strapdown.formats.crash_json import write_crash_json
 from strapdown.formats.crash_record import CrashChannel, CrashRecord

@@ -18,7 +18,7 @@ from strapdown.crash.combine_units import combine_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.entry import Entry
 from strapdown.crash.unit_reconstruction import reconstruct_unit
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.sensors.assumed import Assumed
 from strapdown.sensors.catalogue import load_sensor

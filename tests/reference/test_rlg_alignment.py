@@ -17,7 +17,7 @@ from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.alignment.known_heading import KnownHeading
 from strapdown.alignment.site import Site
 from strapdown.alignment.two_vector import TwoVector
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import read_log
 from strapdown.increments import motion_increments
 from strapdown.prefilter import PREFILTERS

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables import (
     barometer_from_pressure,
     barometer_table,

@@ -10,7 +10,7 @@ import pytest
 from strapdown import bench_attitude, simulate, verify, write_attitude
 from strapdown.bundle import sha256, write_bundle
 from strapdown.bundle.seal import MANIFEST
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.results import InputFiles
 
 pytestmark = pytest.mark.usefixtures("sketched_module")

@@ -18,7 +18,7 @@ from strapdown.bundle import (
     write_bundle,
     writing,
 )
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results import InputFiles
 
 NAMES = {"write_bundle", "make_manifest", "_keep", "_place", "_move", "files_of", "with_paths"}

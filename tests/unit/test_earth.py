@@ -15,7 +15,7 @@ from mpmath import mp
 
 from strapdown import earth, frames, rotation
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -12,7 +12,7 @@ from mpmath import mp
 from strapdown import earth
 from strapdown._kernels import earth as kernel
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84, find_ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from strapdown import earth, frames, rotation
 from strapdown._kernels import geodetic as kernel
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 sys.path.insert(0, str(Path(__file__).parent))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import tables
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.simulation import Origin, car
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.manoeuvres import Straight, Turn

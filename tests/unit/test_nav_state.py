@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.nav_state import NavState
 
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from strapdown import rotation
 from strapdown._kernels.attitude import euler_rates
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 U = 2.0**-53
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import tables
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 TIME = np.array([0.0, 0.1, 0.2, 0.3])
 RATE = np.zeros((4, 3))

@@ -6,7 +6,7 @@ import math
 
 from strapdown.aiding.aid import Aid
 from strapdown.aiding.view import View
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.tables.checks import is_number
 
 __all__ = ["check_block", "check_number", "check_numbers", "check_other_name"]
@@ -35,10 +35,11 @@ def check_number(
     good = is_number(value) and math.isfinite(value) and low <= value <= high
     if not good or (above and value == low):
         raise ConfigError(
-            f"{value!r} is out of range" if is_number(value) else f"{value!r} is no number",
+            "navigation.out-range" if is_number(value) else "navigation.no-number",
             file=aid.name or None,
             quantity=name,
-            remedy=f"give a number {_range(low, high, above)}",
+            value=value,
+            range=_range(low, high, above),
         )
 
 
@@ -66,10 +67,12 @@ def check_numbers(aid: Aid, name: str, count: int, *, low: float = -math.inf) ->
         is_number(x) and math.isfinite(x) and x >= low for x in given
     ):
         raise ConfigError(
-            f"{value!r} are no {count} numbers{'' if low == -math.inf else f' of {low:g} or more'}",
+            "navigation.no-numbers",
             file=aid.name or None,
             quantity=name,
-            remedy=f"give {count} numbers in brackets",
+            value=value,
+            count=count,
+            value_2="" if low == -math.inf else f" of {low:g} or more",
         )
     object.__setattr__(aid, name, tuple(float(x) for x in given))
 
@@ -107,10 +110,7 @@ def check_other_name(aid: Aid, name: str) -> None:
     value = getattr(aid, name)
     if not isinstance(value, str) or (value and value == aid.name):
         raise ConfigError(
-            f"{value!r} is no name of another aid",
-            file=aid.name or None,
-            quantity=name,
-            remedy="name the aid that has the states, or leave it out",
+            "navigation.no-name-another-aid", file=aid.name or None, quantity=name, value=value
         )
 
 

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from strapdown.aiding.aid import Epochs, TableAid
 from strapdown.aiding.antenna import Moving, arm_of, moving
 from strapdown.aiding.view import View
+from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.observation import Observation
 from strapdown.estimation.sensor_blocks import lever_arm, random_walk, time_offset
 from strapdown.estimation.sensor_states import SensorStates
-from strapdown.exceptions import ConfigError, DataError
 from strapdown.mechanization.state_error import displacement_between
 from strapdown.nav_state import NavState
 from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, check_gnss
@@ -110,11 +110,7 @@ class Gnss(TableAid):
     def __post_init__(self) -> None:
         arm = self.lever_arm
         if len(arm) != 3 or not all(is_number(x) and math.isfinite(x) for x in arm):
-            raise ConfigError(
-                f"{arm!r} is no lever arm",
-                quantity="lever_arm",
-                remedy="give three numbers in m: forward, right, down from the inertial sensors",
-            )
+            raise ConfigError("navigation.no-lever-arm", quantity="lever_arm", arm=arm)
         for name, least, most in (
             ("time_offset", -math.inf, math.inf),
             ("time_offset_sd", 0.0, LARGEST_OFFSET),
@@ -128,29 +124,25 @@ class Gnss(TableAid):
             value = getattr(self, name)
             if not (is_number(value) and math.isfinite(value) and least <= value <= most):
                 raise ConfigError(
-                    f"{value!r} is out of range",
+                    "navigation.message",
                     quantity=name,
-                    remedy="give a finite number"
+                    message=f"{value!r} is out of range",
+                    remedy_text="give a finite number"
                     + (f" from {least:g}" if math.isfinite(least) else "")
                     + (f" to {most:g}" if math.isfinite(most) else ""),
                 )
         if not (self.use_position or self.use_velocity):
             raise ConfigError(
-                "neither places nor velocities are used",
+                "navigation.neither-places-nor-velocities-used",
                 quantity="use_position, use_velocity",
-                remedy="use one of them, or leave this aid out",
             )
         if not set(self.qualities) <= set(QUALITIES) - {0}:
             raise ConfigError(
-                f"{self.qualities!r} are no qualities of fixes",
-                quantity="qualities",
-                remedy="choose from 1 to 8: indicators of NMEA 0183 GGA",
+                "navigation.no-qualities-fixes", quantity="qualities", qualities=self.qualities
             )
         if self.time_offset_drift and not self.time_offset_sd:
             raise ConfigError(
-                "a time offset walks that is not estimated",
-                quantity="time_offset_drift",
-                remedy="give time_offset_sd, too",
+                "navigation.time-offset-walks-not-estimated", quantity="time_offset_drift"
             )
         lever_arm(self.lever_arm_sd)
 
@@ -280,10 +272,10 @@ def _refuse_certain(
         row, column = certain[0].tolist()
         what = "least_position_sd_m" if code == POSITION_CODE else "least_velocity_sd_m_per_s"
         raise DataError(
-            f"a standard deviation of zero, as of {len(np.unique(certain[:, 0]))} rows: a "
-            "filter would hold such a fix to be true",
+            "navigation.standard-deviation-zero-rows-filter",
             file=source_of(table),
             row=row + 1,
             quantity=columns[column],
-            remedy=f"give {what} of the aid, or inf where nothing was measured",
+            count=len(np.unique(certain[:, 0])),
+            what=what,
         )

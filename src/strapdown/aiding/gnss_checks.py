@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import (
     GEODETIC,
@@ -61,32 +61,20 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     placed = good & np.isfinite(values_of(table, POSITION_SD)).all(axis=1)
     fast = good & np.isfinite(values_of(table, VELOCITY_SD)).all(axis=1)
     if not len(time):
-        raise DataError(
-            "there is no fix at all",
-            file=source,
-            quantity="time",
-            remedy="give fixes of the time of the record; of a receiver that is simulated, leave "
-            "time between its outages",
-        )
+        raise DataError("navigation.no-fix-all", file=source, quantity="time")
     if not (placed | fast).any():
         raise DataError(
-            f"none of {len(time)} rows is a fix: the quality is 0, or no standard deviation is "
-            "finite",
-            file=source,
-            quantity="quality",
-            remedy="give fixes with their standard deviations in m and m/s",
+            "navigation.none-rows-fix-quality-or", file=source, quantity="quality", count=len(time)
         )
     _refuse_units(table, time, placed, source)
     found = [*_certain(table, good, source), *_gaps(time, placed | fast, source)]
     if not placed.any():
         found.append(
             Finding(
-                f"no place is used: in none of {len(time)} rows all of its standard deviations "
-                "are stated",
+                "navigation.no-place-used-none-rows",
                 file=source,
                 quantity=", ".join(POSITION_SD),
-                remedy="state position_sd of this aid, or leave it so if its velocity is to be "
-                "used alone",
+                count=len(time),
             )
         )
     found += _jumps(table, time, placed, fast, source)
@@ -106,13 +94,13 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
     if beyond.size > 0.5 * len(speed):
         k = int(beyond[0])
         raise DataError(
-            f"places move at {speed[k]:.4g} m/s from fix to fix, and so for {beyond.size} of "
-            f"{len(speed)} steps",
+            "navigation.places-move-fix-fix-steps",
             file=source,
             row=int(rows[k + 1]) + 1,
             quantity="lat, lon",
-            remedy="give latitude and longitude in decimal degrees and time in s; are they "
-            "swapped, or degrees and minutes (ddmm.mmmm)?",
+            speed=speed[k],
+            size=beyond.size,
+            count=len(speed),
         )
     told = np.asarray(np.linalg.norm(0.5 * (velocity[1:] + velocity[:-1])[:, :2], axis=1))
     finite = np.isfinite(values_of(table, VELOCITY_SD)[rows]).min(axis=1)
@@ -129,12 +117,13 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
     ):
         if fits:
             raise DataError(
-                f"the places move {ratio:.3g} times as fast as the velocity tells: they seem to be "
-                f"in {what}",
+                "navigation.places-move-times-fast-velocity",
                 file=source,
                 row=row,
                 quantity="lat, lon",
-                remedy=f"give decimal degrees: {remedy}",
+                ratio=ratio,
+                what=what,
+                remedy=remedy,
             )
 
 
@@ -148,11 +137,12 @@ def _certain(table: pd.DataFrame, good: Flags, source: str | None) -> list[Findi
         if zero.any():
             out.append(
                 Finding(
-                    f"a standard deviation of zero in {_rows(zero)}: no fix is exact",
+                    "navigation.standard-deviation-zero-no-fix",
                     file=source,
                     row=int(np.argmax(zero)) + 1,
                     quantity=", ".join(columns),
-                    remedy=f"set {option}, or inf where nothing was measured",
+                    rows=_rows(zero),
+                    option=option,
                 )
             )
     return out
@@ -168,13 +158,16 @@ def _gaps(time: Array, told: Flags, source: str | None) -> list[Finding]:
     more = f" and {len(gaps) - NAMED} more" if len(gaps) > NAMED else ""
     return [
         Finding(
-            f"{len(gaps)} outage{'s' if len(gaps) > 1 else ''} of fixes, the longest "
-            f"{longest.length:.3g} s where {longest.usual:.3g} s are usual: {listed}{more}",
+            "navigation.outage-fixes-longest-usual",
             file=source,
             row=int(rows[longest.sample]) + 1,
             quantity="time",
-            remedy="the navigator goes on by its sensors alone: look at its standard deviations "
-            "then, and use a rule that takes fixes again afterwards (update_rule = 'adaptive')",
+            count=len(gaps),
+            value="s" if len(gaps) > 1 else "",
+            length=longest.length,
+            usual=longest.usual,
+            listed=listed,
+            more=more,
         )
     ]
 
@@ -207,13 +200,13 @@ def _jumps(
     at[rows[1:][struck]] = True
     return [
         Finding(
-            f"the place jumps in {_rows(at)}, most by {off[k]:.4g} m beyond what the velocity "
-            f"tells, where its standard deviation is {sd[k + 1]:.3g} m",
+            "navigation.place-jumps-most-beyond-velocity",
             file=source,
             row=int(rows[k + 1]) + 1,
             quantity="lat, lon, alt",
-            remedy="use a robust rule for this aid (update_rule = 'adaptive' with influence = "
-            "'tukey'), or greater standard deviations (position_sd_factor)",
+            rows=_rows(at),
+            off=off[k],
+            sd=sd[k + 1],
         )
     ]
 
@@ -236,11 +229,12 @@ def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None
     first = int(runs[0][0])
     return [
         Finding(
-            f"the receiver repeats itself in {_rows(frozen)}, at {speed[first]:.3g} m/s",
+            "navigation.receiver-repeats-itself",
             file=source,
             row=first + 1,
             quantity="lat, lon, alt, VN, VE, VD",
-            remedy="leave these rows out: they are the fix before with other stamps",
+            rows=_rows(frozen),
+            speed=speed[first],
         )
     ]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -85,11 +85,11 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     if not within.any():
         why, remedy = _difference(time, stamps)
         raise DataError(
-            f"fixes go from {time[0]:.9g} to {time[-1]:.9g} s and the inertial record from "
-            f"{stamps[0]:.9g} to {stamps[-1]:.9g} s: none is within it{why}",
+            "navigation.message",
             file=source,
             quantity="time",
-            remedy=remedy,
+            message=f"fixes go from {time[0]:.9g} to {time[-1]:.9g} s and the inertial record from {stamps[0]:.9g} to {stamps[-1]:.9g} s: none is within it{why}",
+            remedy_text=remedy,
         )
     found = []
     inside = np.flatnonzero(within)
@@ -103,12 +103,13 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
             begins = where == "first"
             found.append(
                 Finding(
-                    f"the {where} fix within the record is {late:.3g} s "
-                    + ("after its start" if begins else "before its end"),
+                    "navigation.message",
                     file=source,
                     row=row + 1,
                     quantity="time",
-                    remedy="begin with the first fix, or give place and velocity of the start"
+                    message=f"the {where} fix within the record is {late:.3g} s "
+                    + ("after its start" if begins else "before its end"),
+                    remedy_text="begin with the first fix, or give place and velocity of the start"
                     if begins
                     else "the rest is navigated without fixes: look at its standard deviations",
                 )
@@ -117,10 +118,11 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     if outside > 0.2 * len(time):
         found.append(
             Finding(
-                f"{outside} of {len(time)} fixes are outside the inertial record",
+                "navigation.fixes-outside-inertial-record",
                 file=source,
                 quantity="time",
-                remedy="give the whole inertial record, or check that the clocks are the same",
+                outside=outside,
+                count=len(time),
             )
         )
     return found
@@ -215,14 +217,12 @@ def find_time_offset(
     leap = abs(abs(found.offset - assumed) - LEAP) < 0.5
     return [
         Finding(
-            f"stamps of the receiver are {found.offset:+.3f} s (standard deviation {found.sd:.3f}) "
-            f"off the time of the inertial sensors{known}: so the changes of its {found.by} are "
-            f"explained to {100.0 * found.share:.0f} %"
-            + (", and 18 s are the leap seconds between GPS time and UTC" if leap else ""),
+            "navigation.message",
             file=source_of(gnss),
             quantity="time",
-            remedy=f"set time_offset_s = {found.offset:.3g} and time_offset_sd_s = "
-            f"{max(0.05, 2.0 * found.sd):.2g}, so that the filter finds the rest",
+            message=f"stamps of the receiver are {found.offset:+.3f} s (standard deviation {found.sd:.3f}) off the time of the inertial sensors{known}: so the changes of its {found.by} are explained to {100.0 * found.share:.0f} %"
+            + (", and 18 s are the leap seconds between GPS time and UTC" if leap else ""),
+            remedy_text=f"set time_offset_s = {found.offset:.3g} and time_offset_sd_s = {max(0.05, 2.0 * found.sd):.2g}, so that the filter finds the rest",
         )
     ]
 

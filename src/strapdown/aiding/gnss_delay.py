@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.frames import place_difference
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -156,4 +156,12 @@ def find_velocity_delay(table: pd.DataFrame, assumed: float = 0.0) -> list[Findi
         else "use two aids with this table, one with use_velocity = false and time_offset_s "
         f"greater by {-found.delay:.3g} than that of the other, which has use_position = false"
     )
-    return [Finding(what, file=source_of(table), quantity="VN, VE, VD", remedy=remedy)]
+    return [
+        Finding(
+            "navigation.message",
+            file=source_of(table),
+            quantity="VN, VE, VD",
+            message=what,
+            remedy_text=remedy,
+        )
+    ]

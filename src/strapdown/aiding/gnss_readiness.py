@@ -8,7 +8,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_checks import check_fixes
 from strapdown.aiding.gnss_clock import check_overlap, find_time_offset
 from strapdown.aiding.gnss_delay import find_velocity_delay, velocity_delay
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 __all__ = ["gnss_readiness"]
 

@@ -14,7 +14,7 @@ from strapdown.aiding.checks import check_number
 from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
 from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
 from strapdown.aiding.view import VELOCITY, View
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["StandstillAid", "Window"]
 
@@ -106,10 +106,13 @@ class StandstillAid(WatchingAid):
             value = getattr(self, name)
             if value not in table:
                 raise ConfigError(
-                    f"there is no {what} '{value}'",
+                    "navigation.no",
                     file=self.name or None,
                     quantity=name,
-                    remedy=nearest(str(value), table),
+                    what=what,
+                    value=value,
+                    word=str(value),
+                    known=table,
                 )
         for name in ("window", "threshold", "threshold_time"):
             check_number(self, name, low=0.0, above=True)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.rotation.euler_angles import euler_sd
 
 Array = NDArray[np.float64]

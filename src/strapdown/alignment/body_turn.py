@@ -11,7 +11,7 @@ from strapdown.alignment.mean_errors import mean_of_drift
 from strapdown.alignment.north import CONTRADICTION
 from strapdown.alignment.site import Site
 from strapdown.constants import DEG_PER_HOUR
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]
@@ -87,14 +87,14 @@ def turn_findings(
     )
     return (
         Finding(
-            f"the body turns about the vertical by {rate * DEG_PER_HOUR:+.4g} deg/h (standard "
-            f"deviation {sd * DEG_PER_HOUR:.2g}) against the local level at latitude "
-            f"{site.lat_deg:.6g}{elsewhere}",
+            "alignment.body-turns-about-vertical-h"
+            if mirrored
+            else "alignment.body-turns-about-vertical-h-2",
             file=source,
             quantity="gyro",
-            remedy="the latitude seems to have the wrong sign: give north as positive"
-            if mirrored
-            else "nothing, if the vehicle turned; if it stood, check the latitude and its sign, "
-            "and the bias, units and axes of the gyros",
+            rate=rate * DEG_PER_HOUR,
+            sd=sd * DEG_PER_HOUR,
+            lat_deg=site.lat_deg,
+            elsewhere=elsewhere,
         ),
     )

@@ -14,7 +14,7 @@ from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.site import Site
 from strapdown.attitude import Quaternion, run_attitude
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import GYRO, QUATERNION, attitude_table, check_imu
@@ -141,10 +141,11 @@ def _sample(stamps: Array, time: float, imu: pd.DataFrame) -> int:
     slack = 0.5 * float(np.median(np.diff(stamps))) * (1.0 + 1e-6)
     if not stamps[0] - slack <= time <= stamps[-1] + slack:
         raise DataError(
-            f"{time:.9g} s is not within the record, which lasts from {stamps[0]:.9g} to "
-            f"{stamps[-1]:.9g} s: the gyros cannot carry the attitude there",
+            "alignment.not-within-record-lasts-gyros",
             file=source_of(imu),
             quantity="time",
-            remedy="give the record that holds both instants, on one clock",
+            time=time,
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
         )
     return int(np.argmin(np.abs(stamps - time)))

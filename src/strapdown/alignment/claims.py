@@ -9,7 +9,7 @@ import numpy as np
 from strapdown import rotation
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["heading_floor_deg", "refuse_false_claims"]
 
@@ -66,13 +66,11 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
     moved = float(heading[-1] - heading[0])
     if result.heading_given and abs(moved) > BEYOND * result.prior_heading_sd_deg:
         raise DataError(
-            f"the filter turned the heading by {moved:.3g} deg from what it was before, known to "
-            f"± {result.prior_heading_sd_deg:.2g} deg (one standard deviation): the gyros "
-            "contradict it",
+            "alignment.filter-turned-heading-before-known",
             file=result.source,
             quantity="heading",
-            remedy="check the heading that was stated, or have it found (inertial_frame); check "
-            "the axes of the gyros",
+            moved=moved,
+            prior_heading_sd_deg=result.prior_heading_sd_deg,
         )
     if float(np.ptp(heading[len(heading) // 10 :])) > TURNED_DEG:
         return
@@ -82,11 +80,10 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
         return
     gyro = DEG_PER_HOUR * float(np.max(result.filter.model.sensors[0].sd[:3]))
     raise DataError(
-        f"the filter claims the heading to ± {sd:.2g} deg, and with gyros whose bias is known to "
-        f"{gyro:.3g} deg/h no rest tells more than ± {floor:.2g} deg (one standard deviation): "
-        "errors as large as those of these sensors are beyond a linear filter",
+        "alignment.filter-claims-heading-gyros-whose",
         file=result.source,
         quantity="heading",
-        remedy='leave the fine alignment out (--coarse-only; kind = "none" in [fine]), or '
-        "calibrate the gyros and state what is left of their bias",
+        sd=sd,
+        gyro=gyro,
+        floor=floor,
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables import VELOCITY, VELOCITY_SD, check_gnss
 from strapdown.tables.checks import source_of
 
@@ -106,10 +106,7 @@ def course_fixes(
     """
     if gnss is None:
         raise DataError(
-            "there are no fixes, and a course comes from nothing else",
-            file=source_of(imu),
-            quantity="gnss",
-            remedy="give the Gnss table of the drive, or align at rest",
+            "alignment.no-fixes-course-comes-nothing", file=source_of(imu), quantity="gnss"
         )
     check_gnss(gnss)
     source = source_of(gnss)
@@ -122,13 +119,13 @@ def course_fixes(
     good &= np.isfinite(sd[:, :2]).all(axis=1)
     if good.sum() < 2:
         raise DataError(
-            f"fixes between {first:.6g} and {last:.6g} s of the inertial "
-            f"record: {timely}, and with a velocity that has a standard deviation: "
-            f"{int(good.sum())}; two are needed",
+            "alignment.fixes-between-inertial-record-velocity",
             file=source,
             quantity="VN, VE",
-            remedy="check that both clocks are the same, align over a stretch with fixes, and "
-            "use a receiver that measures velocity",
+            first=first,
+            last=last,
+            timely=timely,
+            good=int(good.sum()),
         )
     rows = np.flatnonzero(good)
     time, velocity, sd = time[rows], velocity[rows], np.maximum(sd[rows], LEAST_SD)
@@ -138,13 +135,15 @@ def course_fixes(
     if not fast[-2:].all():
         k = len(fast) - 2 + int(np.flatnonzero(~fast[-2:])[-1])
         raise DataError(
-            f"the vehicle moves at {speed[k]:.3g} m/s at {time[k]:.6g} s (standard deviation "
-            f"{sd[k, :2].max():.2g}): its course is known to "
-            f"{np.degrees(min(course_sd[k], np.pi)):.3g} deg; at least {least_speed:g} m/s and "
-            f"{np.degrees(largest_sd):.3g} deg are needed",
+            "alignment.vehicle-moves-standard-deviation-course",
             file=source,
             row=int(rows[k]) + 1,
             quantity="VN, VE",
-            remedy="align over a stretch that ends while it drives, or at rest by another method",
+            speed=speed[k],
+            time=time[k],
+            sd=sd[k, :2].max(),
+            course_sd_deg=np.degrees(min(course_sd[k], np.pi)),
+            least_speed=least_speed,
+            largest_sd_deg=np.degrees(largest_sd),
         )
     return CourseFixes(time, velocity, sd, fast, rows + 1, source)

@@ -18,10 +18,10 @@ from strapdown.alignment.drive_sums import drive_sums
 from strapdown.alignment.forward_sign import check_forward
 from strapdown.alignment.site import Site
 from strapdown.constants import MAD_TO_SD
+from strapdown.errors import DataError, Finding
 from strapdown.estimation.influence import Influence
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.influence_igg3 import Igg3
-from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 
@@ -108,12 +108,11 @@ class CourseSearch:
         found = _converged(fit, found, Igg3())
         if found.onward < MOST:
             raise DataError(
-                f"of {len(fixes.time)} fixes, {1.0 - found.onward:.0%} of those that count have "
-                "a course that is not where the inertial sensors say that the vehicle goes",
+                "alignment.fixes-those-count-course-not",
                 file=fixes.source,
                 quantity="VN, VE",
-                remedy="state mounting_yaw_deg, or reverse where it drives backward; or align "
-                "over a stretch that it drives forward",
+                count=len(fixes.time),
+                onward=1.0 - found.onward,
             )
         return found
 
@@ -168,13 +167,13 @@ def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
     times = "it is" if len(out) == 1 else "they are"
     return (
         Finding(
-            f"{len(out)} of {len(fixes.time)} velocities of fixes do not count: {times} off by "
-            "more than chance allows, beside the others and the inertial sensors",
+            "alignment.velocities-fixes-do-not-count",
             file=fixes.source,
             row=int(fixes.row[out[0]]),
             quantity="VN, VE, VD",
-            remedy="look at the receiver there; if many are left out, state larger standard "
-            "deviations",
+            count=len(out),
+            count_2=len(fixes.time),
+            times=times,
         ),
     )
 

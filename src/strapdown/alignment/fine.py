@@ -21,7 +21,7 @@ from strapdown.alignment.fine_epochs import (
     settled,
 )
 from strapdown.alignment.fine_findings import fine_findings
-from strapdown.alignment.fine_record import WITHOUT, telling_record
+from strapdown.alignment.fine_record import telling_record
 from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
 from strapdown.alignment.north import unit_remedy
 from strapdown.alignment.site import Site
@@ -34,6 +34,7 @@ from strapdown.alignment.stationary import (
     without_steady_turn,
 )
 from strapdown.constants import DEG_PER_HOUR
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
@@ -42,7 +43,6 @@ from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.resting_sensors import resting_states
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError, DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.mechanization.mechanization import Mechanization
@@ -107,23 +107,18 @@ class FineAlignment:
     def __post_init__(self) -> None:
         if not is_number(self.interval) or not 0.0 < self.interval <= 60.0:
             raise ConfigError(
-                f"{self.interval!r} s is no interval of observations",
-                quantity="interval",
-                remedy="give 1 s, or another time up to 60 s",
+                "alignment.no-interval-observations", quantity="interval", interval=self.interval
             )
         unknown = [name for name in self.observe if name not in OBSERVATIONS]
         if unknown or "velocity" not in self.observe:
             raise ConfigError(
-                f"{', '.join(self.observe) or 'nothing'} is not what a rest tells",
+                "alignment.not-rest-tells",
                 quantity="observe",
-                remedy=f"give velocity and any of {', '.join(OBSERVATIONS)}",
+                observe=", ".join(self.observe) or "nothing",
+                observations=OBSERVATIONS,
             )
         if self.mechanization.height == "damped":
-            raise ConfigError(
-                "the height is damped, and a filter has no states for its loop",
-                quantity="height",
-                remedy="use height='free' or 'held'",
-            )
+            raise ConfigError("alignment.height-damped-filter-no-states", quantity="height")
 
     def align(
         self,
@@ -197,12 +192,13 @@ class FineAlignment:
         ends = epoch_ends(begin, time, self.interval)
         if ends.size < LEAST_EPOCHS:
             raise DataError(
-                f"a record of {time[-1] - begin:.6g} s has {ends.size} epochs of "
-                f"{self.interval:g} s",
+                "alignment.record-epochs",
                 file=source_of(imu),
                 quantity="time",
-                remedy=f"align for at least {LEAST_EPOCHS * self.interval:g} s; 100 to 600 s are "
-                "usual",
+                time=time[-1] - begin,
+                size=ends.size,
+                interval=self.interval,
+                least_epochs=LEAST_EPOCHS * self.interval,
             )
         state = filter_.begin(start, np.zeros((filter_.model.physical_size,) * 2))
         earth = rotation.rotate(rotation.conjugate(start.q_nb), site.earth_rate)
@@ -251,11 +247,12 @@ class FineAlignment:
             back = self._backward(replace(home, time=end), increments)
             return replace(home, time=begin, q_nb=back.q_nb)
         raise DataError(
-            f"the coarse alignment holds at {coarse.time:.9g} s, and the record goes from "
-            f"{begin:.9g} to {end:.9g} s",
+            "alignment.coarse-alignment-holds-record-goes",
             file=source_of(increments),
             quantity="time",
-            remedy="give the attitude at its first or at its last sample",
+            time=coarse.time,
+            begin=begin,
+            end=end,
         )
 
     def _carried_back(
@@ -292,16 +289,13 @@ def _free_run(
         away = np.abs(rate - np.median(rate, axis=0))
         row, axis = (int(k) for k in np.unravel_index(int(away.argmax()), away.shape))
         raise DataError(
-            "the record is not one of a body at rest: reckoned without observations it leaves the "
-            f"ground; the largest turn is {np.degrees(rate[row, axis]):.4g} deg/s at "
-            f"{time[row]:.9g} s",
+            "alignment.record-not-body-rest-reckoned",
             file=source,
             row=row + 1,
             quantity=GYRO[axis],
-            remedy="cut the record to where the body stands; filter a burst of outliers first "
-            "(prefilter robust_fir or summed); check the units; where the gyros read "
-            f"{DEG_PER_HOUR * float(np.linalg.norm(rate.mean(axis=0))):.3g} deg/h in the mean by "
-            f"their bias, {WITHOUT}",
+            rate_deg=np.degrees(rate[row, axis]),
+            time=time[row],
+            deg_per_hour=DEG_PER_HOUR * float(np.linalg.norm(rate.mean(axis=0))),
         ) from error
 
 
@@ -309,11 +303,11 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
     sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
     if not sd <= math.degrees(MOST_HEADING):
         raise DataError(
-            f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard "
-            f"deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
+            "alignment.message",
             file=source_of(imu),
             quantity="heading",
-            remedy=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
+            message=f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
+            remedy_text=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
             or "state the heading, or align longer, or use gyros of a better grade",
         )
 
@@ -327,9 +321,10 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     part.attrs = dict(imu.attrs)
     if part.empty:
         raise DataError(
-            f"the increments do not cover the record, {first:.9g} to {last:.9g} s",
+            "alignment.increments-do-not-cover-record",
             file=source_of(imu),
             quantity="increments",
-            remedy="give those of the same record, or leave them out",
+            first=first,
+            last=last,
         )
     return part

@@ -10,7 +10,7 @@ from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import velocity_of_noise
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 #: Quantity of the finding of a body that rocks: no fault, where a coarse alignment lets it.
 ROCKS = "rocking"
@@ -54,13 +54,12 @@ def _north(result: FineResult, site: Site) -> Iterator[Finding]:
     if sd > min(NO_NORTH, UNCHANGED * result.prior_heading_sd_deg) and not result.heading_given:
         east = float(np.linalg.norm(site.earth_rate[:2])) * DEG_PER_HOUR
         yield Finding(
-            f"heading is known to ± {sd:.3g} deg only (one standard deviation): the horizontal "
-            f"rate of the Earth at {site.lat_deg:.4g} deg of latitude is {east:.3g} deg/h, and the "
-            "gyros' biases are not much smaller, or unknown",
+            "alignment.heading-known-only-standard-deviation",
             file=result.source,
             quantity="heading",
-            remedy="state the heading, turn the body by 180 deg about the vertical and align "
-            "again, or use gyros of a better grade",
+            sd=sd,
+            lat_deg=site.lat_deg,
+            east=east,
         )
 
 
@@ -74,21 +73,19 @@ def _stands(result: FineResult) -> Iterator[Finding]:
     moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
     if not moves and turn > MOST_TURN:
         yield Finding(
-            f"the body rocks: from epoch to epoch it turns by {turn:.3g} deg, and stays at its "
-            f"place within {velocity:.2g} m/s (one standard deviation): this is in the stated "
-            "uncertainty",
+            "alignment.body-rocks-epoch-epoch-turns",
             file=result.source,
             quantity=ROCKS,
-            remedy="nothing, where it is known to rock; a body that stands is aligned sooner",
+            turn=turn,
+            velocity=velocity,
         )
     elif moves:
         yield Finding(
-            f"the body does not stand: from epoch to epoch it moves by {velocity:.3g} m/s and "
-            f"turns by {turn:.3g} deg (one standard deviation)",
+            "alignment.body-does-not-stand-epoch",
             file=result.source,
             quantity="time",
-            remedy="cut the record to where the body stands; if it was parked, its estimates are "
-            "weaker by this motion, and their standard deviations say by how much",
+            velocity=velocity,
+            turn=turn,
         )
 
 
@@ -104,12 +101,12 @@ def _fits(result: FineResult) -> Iterator[Finding]:
         if mean > INCONSISTENT:
             at = float(late.index[int(share[:, worst].argmax())])
             yield Finding(
-                f"observation '{name}' is {mean:.3g} times as far from what was expected, squared, "
-                f"as its uncertainty allows, most of all at {at:.6g} s",
+                "alignment.observation-times-far-expected-squared",
                 file=result.source,
                 quantity=str(table.columns[worst]).removeprefix("nu "),
-                remedy="look at the record there: a push, a step, a burst of outliers; or at the "
-                "sensors, if they are better or worse than was stated",
+                name=name,
+                mean=mean,
+                at=at,
             )
 
 
@@ -124,10 +121,12 @@ def _biases(result: FineResult) -> Iterator[Finding]:
             if abs(value) > BEYOND * sd:
                 sensor = block.block.name.split("_")[0]
                 yield Finding(
-                    f"{sensor} {axis} reads {value * scale:.3g} {unit} too much, and its data "
-                    f"sheet gives ± {sd * scale:.3g} {unit} (one standard deviation)",
+                    "alignment.reads-too-much-data-sheet",
                     file=result.source,
                     quantity=f"{sensor}_{axis}",
-                    remedy="a channel that is dead, stuck or exchanged shows like this, and so do "
-                    "a wrong unit or another sensor than was stated",
+                    sensor=sensor,
+                    axis=axis,
+                    scale=value * scale,
+                    unit=unit,
+                    sd=sd * scale,
                 )

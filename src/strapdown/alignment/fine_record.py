@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import numpy as np
 import pandas as pd
 
-from strapdown.exceptions import DataError, DivergenceError
+from strapdown.errors import DataError, DivergenceError
 from strapdown.tables import GYRO
 from strapdown.tables.checks import values_of
 
@@ -35,21 +35,21 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
         if f.remedy is None or "longest_step" not in f.remedy:
             raise
         raise DataError(
-            f.what,
+            "alignment.message",
             file=f.file,
             row=f.row,
             quantity="time",
-            remedy="align a stretch before or after it (--from, --duration; from_s and to_s in "
-            f"[log]), or {WITHOUT}",
+            message=f.what,
+            remedy_text=f"align a stretch before or after it (--from, --duration; from_s and to_s in [log]), or {WITHOUT}",
         ) from None
     except DivergenceError as error:
         f = error.finding
         rate = float(np.linalg.norm(values_of(imu, GYRO).mean(axis=0)))
         raise DivergenceError(
-            f"{f.what}; the gyros read {math.degrees(3600.0 * rate):.3g} deg/h in the mean, where "
-            "the Earth turns at 15 deg/h",
+            "alignment.gyros-read-h-mean-earth",
             file=imu.attrs.get("source"),
             row=f.row,
             quantity=f.quantity,
-            remedy=f"where that is their bias, take it off first, or {WITHOUT}; else {f.remedy}",
+            reason=f,
+            rate_deg=math.degrees(3600.0 * rate),
         ) from None

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.course_fixes import CourseFixes
 from strapdown.alignment.drive_sums import DriveSums
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
@@ -59,11 +59,10 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     if not (slope < 0.0 and abs(slope) > CLEAR * sd):
         return
     raise DataError(
-        f"the force along the forward axis falls by {-slope:.2g} m/s² per m/s² by which the "
-        f"vehicle gains speed (standard deviation {sd:.1g}): it drives the other way round "
-        "than taken",
+        "alignment.force-along-forward-axis-falls",
         file=source_of(imu),
         quantity="heading",
-        remedy=f"state reverse = {'false' if reverse else 'true'}, or mend the mounting: the "
-        "heading would be wrong by 180 deg",
+        slope=-slope,
+        sd=sd,
+        value="false" if reverse else "true",
     )

@@ -19,7 +19,7 @@ from strapdown.alignment.course_rests import rest_rates
 from strapdown.alignment.course_search import CourseSearch, left_out
 from strapdown.alignment.record_checks import check_record
 from strapdown.alignment.site import Site
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables.checks import is_number
 
@@ -84,9 +84,10 @@ class GnssCourse(CoarseAlignment):
             value = getattr(self, name)
             if not (is_number(value) and math.isfinite(value) and value >= least):
                 raise ConfigError(
-                    f"{value!r} is out of range",
+                    "alignment.message",
                     quantity=name,
-                    remedy="give a finite number" + ("" if least else ", zero or more"),
+                    message=f"{value!r} is out of range",
+                    remedy_text="give a finite number" + ("" if least else ", zero or more"),
                 )
 
     def align(
@@ -125,11 +126,11 @@ class GnssCourse(CoarseAlignment):
         sd = np.sqrt(np.linalg.eigvalsh(found.covariance[3:5, 3:5])[-1])
         if not sd < LARGEST_TILT_SD:
             raise DataError(
-                f"the fixes of {fixes.time[-1] - fixes.time[0]:.3g} s leave the level known to no "
-                f"better than {np.degrees(sd):.2g} deg",
+                "alignment.fixes-leave-level-known-no",
                 file=fixes.source,
                 quantity="VN, VE",
-                remedy="give more fixes, a receiver that measures velocity, or better gyros",
+                time=fixes.time[-1] - fixes.time[0],
+                sd_deg=np.degrees(sd),
             )
         findings += left_out(fixes, found)
         joint = found.covariance

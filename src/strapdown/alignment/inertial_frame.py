@@ -26,7 +26,7 @@ from strapdown.alignment.record_checks import check_gravity, check_record, gravi
 from strapdown.alignment.residual_noise import ResidualNoise, residual_noise
 from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
-from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import GYRO
 from strapdown.tables.checks import source_of
@@ -65,7 +65,7 @@ class InertialFrame(CoarseAlignment):
     def __post_init__(self) -> None:
         if self.at not in EPOCHS:
             raise ConfigError(
-                f"'{self.at}' is no epoch", quantity="at", remedy=nearest(str(self.at), EPOCHS)
+                "alignment.no-epoch", quantity="at", at=self.at, word=str(self.at), known=EPOCHS
             )
 
     def align(
@@ -154,35 +154,30 @@ def _refuse_travel(
     known = [f for f in findings if f.row is not None]
     if known:
         raise DataError(
-            f"{known[0].what}; the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
+            "alignment.message",
             file=known[0].file,
             row=known[0].row,
             quantity=known[0].quantity,
-            remedy=known[0].remedy,
+            message=f"{known[0].what}; the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
+            remedy_text=known[0].remedy,
         )
     raise DataError(
-        f"the body did not stay at its place, or the gyros do not tell its turns: within "
-        f"{length:.4g} s the second integral of the specific force departs from gravity's by "
-        f"{noise.sway:.3g} m (root mean square), {noise.ratio:.3g} times what the noise of the "
-        f"sensors explains, and the heading is not known to better than "
-        f"{np.degrees(sd[2]):.3g} deg",
+        "alignment.message",
         file=source_of(imu),
         quantity="accel",
-        remedy=unit_remedy(rate, site)
-        or "align while the vehicle stands (it may rock), or with gnss_course while it drives; "
-        "check units and axes of the gyros",
+        message=f"the body did not stay at its place, or the gyros do not tell its turns: within {length:.4g} s the second integral of the specific force departs from gravity's by {noise.sway:.3g} m (root mean square), {noise.ratio:.3g} times what the noise of the sensors explains, and the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
+        remedy_text=unit_remedy(rate, site)
+        or "align while the vehicle stands (it may rock), or with gnss_course while it drives; check units and axes of the gyros",
     )
 
 
 def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | None) -> Finding:
     return Finding(
-        f"slow motion, or noise, that the sensors do not explain: {noise.ratio:.3g} times their "
-        f"noise; over {length:.4g} s the second integral of the specific force departs from "
-        f"gravity's by {noise.sway:.2g} m (root mean square). The body moved, or turned with "
-        "biased accelerometers; it is in the stated uncertainty of the heading, "
-        f"{np.degrees(sd):.2g} deg",
+        "alignment.slow-motion-or-noise-sensors",
         file=source,
         quantity="accel",
-        remedy="align for longer, while the vehicle does not drive; where it stood, state noisier "
-        "sensors",
+        ratio=noise.ratio,
+        length=length,
+        sway=noise.sway,
+        sd_deg=np.degrees(sd),
     )

@@ -13,7 +13,7 @@ from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.levelling_alone import UNKNOWN_HEADING
 from strapdown.alignment.rest_level import level_at_rest
 from strapdown.alignment.site import Site
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables.checks import is_number
 
@@ -47,15 +47,11 @@ class KnownHeading(CoarseAlignment):
     def __post_init__(self) -> None:
         if not (is_number(self.heading_deg) and math.isfinite(self.heading_deg)):
             raise ConfigError(
-                f"{self.heading_deg!r} is no heading",
-                quantity="heading_deg",
-                remedy="give degrees from true north, clockwise",
+                "alignment.no-heading", quantity="heading_deg", heading_deg=self.heading_deg
             )
         if not (is_number(self.sd_deg) and 0.0 < self.sd_deg < math.degrees(UNKNOWN_HEADING)):
             raise ConfigError(
-                f"{self.sd_deg!r} is no standard deviation of a heading",
-                quantity="sd_deg",
-                remedy="give degrees above zero; where the heading is not known, use levelling",
+                "alignment.no-standard-deviation-heading", quantity="sd_deg", sd_deg=self.sd_deg
             )
 
     def align(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["level"]
 
@@ -39,12 +39,7 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
     f = np.asarray(accel_mean, dtype=np.float64)
     size = float(np.sqrt(f @ f))
     if not 0.8 * 9.81 <= size <= 1.2 * 9.81:
-        raise DataError(
-            f"the mean specific force is {size:.3g} m/s² long, and at rest it is 9.8",
-            quantity="accel",
-            remedy="state the unit with --accel-unit, use a log whose acceleration still has "
-            "gravity in it, or give the initial attitude",
-        )
+        raise DataError("alignment.mean-specific-force-long-rest", quantity="accel", size=size)
     roll = float(np.degrees(np.arctan2(0.0 - f[1], -f[2])))
     pitch = float(np.degrees(np.arctan2(f[0], np.hypot(f[1], f[2]))))
     return roll, pitch

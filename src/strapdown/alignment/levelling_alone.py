@@ -12,7 +12,7 @@ from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.rest_level import level_at_rest
 from strapdown.alignment.site import Site
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables.checks import source_of
 
@@ -46,11 +46,9 @@ class Levelling(CoarseAlignment):
         """
         found = level_at_rest(self.name, imu, site, sensors, 0.0, UNKNOWN_HEADING)
         unknown = Finding(
-            "the heading is not known: 0 deg stands for any, with the standard deviation of a "
-            f"uniform one, {math.degrees(UNKNOWN_HEADING):.1f} deg",
+            "alignment.heading-not-known-stands-any",
             file=source_of(imu),
             quantity="heading",
-            remedy="state it (known_heading), find it by the gyros (two_vector, inertial_frame), "
-            "or by GNSS while moving (gnss_course)",
+            unknown_heading_deg=math.degrees(UNKNOWN_HEADING),
         )
         return replace(found, findings=(*found.findings, unknown))

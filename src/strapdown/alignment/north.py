@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.site import Site
 from strapdown.constants import DEG_PER_HOUR
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]
@@ -61,30 +61,28 @@ def north_findings(
     if not sd <= LARGEST_SD:
         told = f"{np.degrees(sd):.3g} deg" if sd < 1e3 else "without bound"
         raise DataError(
-            f"the gyros cannot find north: the standard deviation of the heading is {told} (at "
-            f"most {np.degrees(LARGEST_SD):.0f} deg); at latitude {site.lat_deg:.6g} deg the Earth "
-            f"turns at {_rounded(across * DEG_PER_HOUR)} deg/h about north, and the bias of the "
-            f"gyros is known to {bias * DEG_PER_HOUR:.3g} deg/h",
+            "alignment.gyros-cannot-find-north-standard"
+            if across < 0.02 * size
+            else "alignment.gyros-cannot-find-north-standard-2",
             file=source,
             quantity="heading",
-            remedy=(
-                "north is not defined at a pole and not found near it: state the heading "
-                "(known_heading), and navigate in a wander frame"
-                if across < 0.02 * size
-                else "state the heading (known_heading), take it from GNSS while moving "
-                "(gnss_course), align for longer if the record is short, or calibrate the gyros"
-            ),
+            told=told,
+            largest_sd_deg=np.degrees(LARGEST_SD),
+            lat_deg=site.lat_deg,
+            rounded=_rounded(across * DEG_PER_HOUR),
+            bias=bias * DEG_PER_HOUR,
         )
     if abs(site.lat_deg) <= HIGH_LATITUDE:
         return ()
     return (
         Finding(
-            f"at latitude {site.lat_deg:.6g} deg only {100.0 * across / size:.3g} % of the "
-            f"Earth's rate is horizontal: the heading is known to {np.degrees(sd):.3g} deg, "
-            f"{size / across:.3g} times worse than at the equator",
+            "alignment.latitude-only-earth-rate-horizontal",
             file=source,
             quantity="heading",
-            remedy="use better gyros, or state the heading (known_heading)",
+            lat_deg=site.lat_deg,
+            across=100.0 * across / size,
+            sd_deg=np.degrees(sd),
+            size=size / across,
         ),
     )
 
@@ -136,21 +134,21 @@ def latitude_findings(
         told = "the Earth's rate, as the gyros read it, and gravity lie as at no latitude"
         return (
             Finding(
-                f"{told}: the site says {site.lat_deg:.6g} deg",
+                "alignment.site-says",
                 file=source,
                 quantity="latitude",
-                remedy="check units, axes and signs of the gyros and of the accelerometers, the "
-                "stated bias of the gyros, and that the body stood where it was aligned",
+                told=told,
+                lat_deg=site.lat_deg,
             ),
         )
     return (
         Finding(
-            f"the sensors tell {measured_deg:.4g} deg (standard deviation {sd_deg:.2g}) from the "
-            f"Earth's rate against gravity, and the site says {site.lat_deg:.6g}: "
-            f"{abs(off) / sd_deg:.1f} standard deviations apart",
+            "alignment.sensors-tell-standard-deviation-earth",
             file=source,
             quantity="latitude",
-            remedy="check the latitude and its sign, the axes and units of the gyros, the stated "
-            "bias of the gyros, and that the body stood where it was aligned",
+            measured_deg=measured_deg,
+            sd_deg=sd_deg,
+            lat_deg=site.lat_deg,
+            off=abs(off) / sd_deg,
         ),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 
@@ -44,15 +44,14 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
     row = int(np.argmax(steps[:, channel])) + 1
     return (
         Finding(
-            f"{_steps(len(large))} more than {FACTOR:g} times as large as 99 of 100 are, the "
-            f"largest, {ratio[channel]:.3g} times, to {values[row, channel]:.4g}: outliers or "
-            "shocks",
+            "alignment.more-than-times-large-largest",
             file=source,
             row=row + 1,
             quantity=columns[channel],
-            remedy="take a pre-filter that replaces outliers (kind = "
-            '"robust_fir" under [prefilter]; of align --prefilter robust_fir, too), or align over '
-            "a stretch without them",
+            steps=_steps(len(large)),
+            factor=FACTOR,
+            ratio=ratio[channel],
+            values=values[row, channel],
         ),
     )
 

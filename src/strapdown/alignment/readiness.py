@@ -13,7 +13,7 @@ from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.site import Site
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import EULER, QUATERNION, check_attitude
 from strapdown.tables.checks import source_of
@@ -86,16 +86,16 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
         The record is shorter than 10 s.
     """
     if count < 2:
-        raise ConfigError(
-            f"{count} durations make no curve", quantity="count", remedy="use 2 or more"
-        )
+        raise ConfigError("alignment.durations-make-no-curve", quantity="count", count=count)
     length = float(imu.index[-1] - imu.index[0])
     if not length >= 2.0 * SHORTEST:
         raise DataError(
-            f"the record lasts {length:.3g} s, and readiness is asked from {SHORTEST:g} s on",
+            "alignment.record-lasts-readiness-asked",
             file=source_of(imu),
             quantity="time",
-            remedy=f"use a record of {2.0 * SHORTEST:g} s or more",
+            length=length,
+            shortest=SHORTEST,
+            shortest_2=2.0 * SHORTEST,
         )
     return np.asarray(np.geomspace(max(SHORTEST, length / 100.0), length, count))
 
@@ -140,9 +140,10 @@ def readiness(
     rising = times.ndim == 1 and times.size > 0 and bool((np.diff(times, prepend=0.0) > 0.0).all())
     if not rising or not times[-1] <= length * (1.0 + 1e-9):
         raise ConfigError(
-            f"durations of {times.tolist()} s do not rise within the {length:.6g} s of the record",
+            "alignment.durations-do-not-rise-within",
             quantity="durations",
-            remedy="give rising seconds, the last no longer than the record",
+            times=times.tolist(),
+            length=length,
         )
     if reference is not None:
         check_attitude(reference)

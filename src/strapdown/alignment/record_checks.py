@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from strapdown.alignment.north import CONTRADICTION
 from strapdown.alignment.outliers import outlier_findings
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.tables import ACCEL, GYRO, check_imu, find_gaps
 from strapdown.tables.checks import source_of
 
@@ -48,18 +48,16 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     source = source_of(imu)
     if ACCEL[0] not in imu.columns:
         raise DataError(
-            "there is no accelerometer, and an alignment needs the direction of gravity",
-            file=source,
-            quantity="accel",
-            remedy="name its columns when the log is read, or give the initial attitude",
+            "alignment.no-accelerometer-alignment-needs-direction", file=source, quantity="accel"
         )
     if len(imu) < LEAST_SAMPLES:
         raise DataError(
-            f"{len(imu)} samples over {imu.index[-1] - imu.index[0]:.3g} s tell no mean and no "
-            "scatter",
+            "alignment.samples-over-tell-no-mean",
             file=source,
             quantity="time",
-            remedy=f"align over at least {LEAST_SAMPLES} samples; minutes, to find north",
+            count=len(imu),
+            index=imu.index[-1] - imu.index[0],
+            least_samples=LEAST_SAMPLES,
         )
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
     _check_alive(values, source)
@@ -100,21 +98,20 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
                 "gravity in it, and align while the vehicle does not accelerate"
             )
         raise DataError(
-            f"the mean specific force is {size:.4g} m/s² long, and gravity is 9.8",
+            "alignment.message",
             file=source,
             quantity="accel",
-            remedy=remedy,
+            message=f"the mean specific force is {size:.4g} m/s² long, and gravity is 9.8",
+            remedy_text=remedy,
         )
     if not force[2] > 0.5 * size:
         return ()
     return (
         Finding(
-            f"the mean specific force on the down axis is {force[2]:+.4g} m/s²: the body stands "
-            "on its head, or the accelerometers tell gravity instead of specific force",
+            "alignment.mean-specific-force-down-axis",
             file=source,
             quantity="accel_z",
-            remedy="if it stands upright, mend the signs or the axes when the log is read: at "
-            "rest and level the down axis reads -9.8",
+            force=force[2],
         ),
     )
 
@@ -139,12 +136,11 @@ def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Find
         return ()
     return (
         Finding(
-            f"gravity is measured {1e6 * change:+.4g} ppm off that of the site, "
-            f"{abs(change) / max(sd, 1e-300):.1f} standard deviations of the accelerometers",
+            "alignment.gravity-measured-ppm-off-site",
             file=source,
             quantity="accel",
-            remedy="check the height and the latitude of the site, the scale of the "
-            "accelerometers and their stated bias, and that the vehicle did not drive",
+            change=1000000.0 * change,
+            change_2=abs(change) / max(sd, 1e-300),
         ),
     )
 
@@ -161,13 +157,13 @@ def _check_alive(values: Array, source: str | None) -> None:
         channel = (GYRO if name == "gyro" else ACCEL)[int(np.argmax(still))]
         value = values[0, columns][int(np.argmax(still))]
         raise DataError(
-            f"it reads {value:.6g} on all {len(values)} samples while the other axes change: it "
-            f"is dead or stuck, and {WHAT_IT_READS[name]} cannot be told without it",
+            "alignment.reads-all-samples-while-other",
             file=source,
             row=1,
             quantity=channel,
-            remedy="mend the sensor or its cable, use a redundant unit, or take a stretch in "
-            "which it works",
+            value=value,
+            count=len(values),
+            what_it_reads=WHAT_IT_READS[name],
         )
 
 
@@ -179,12 +175,13 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
     count = f"{len(gaps)} gaps" if len(gaps) > 1 else "a gap"
     return (
         Finding(
-            f"{count}, the longest of {worst.length:.3g} s at {worst.start:.6g} s where "
-            f"steps are of {worst.usual:.3g} s: rate and force are taken for straight lines "
-            "across them, and what the body did in them is not known",
+            "alignment.longest-steps-rate-force-taken",
             file=source,
             row=worst.sample + 1,
             quantity="time",
-            remedy="align over a stretch without gaps",
+            count=count,
+            length=worst.length,
+            start=worst.start,
+            usual=worst.usual,
         ),
     )

@@ -14,7 +14,7 @@ from strapdown.alignment.mean_errors import force_covariance, gravity_change
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.site import Site
 from strapdown.alignment.tilt_and_heading import error_of_force_and_heading
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables.checks import source_of
 
@@ -96,12 +96,12 @@ def _disturbed(
     length: float, loud: float, turning: float, swing: Array, source: str | None
 ) -> Finding:
     return Finding(
-        f"the body does not stand still: the mean specific forces of {BLOCKS} blocks of "
-        f"{length / BLOCKS:.3g} s scatter {loud:.3g} times as much as the noise of the "
-        f"accelerometers, the mean rates {turning:.3g} times as much as that of the gyros, and it "
-        f"swings by {np.degrees(np.sqrt(np.trace(swing))):.2g} deg (root "
-        "mean square) about its mean attitude: this is in the stated uncertainty",
+        "alignment.body-does-not-stand-still",
         file=source,
         quantity="accel",
-        remedy="align while nobody moves the body, for longer, or with inertial_frame",
+        blocks=BLOCKS,
+        length=length / BLOCKS,
+        loud=loud,
+        turning=turning,
+        sqrt_deg=np.degrees(np.sqrt(np.trace(swing))),
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.site import Site
 from strapdown.earth import radii_of_curvature
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.tables import VELOCITY, VELOCITY_SD, check_gnss
 from strapdown.tables.checks import source_of
 
@@ -73,5 +73,21 @@ def still_by_gnss(
     file = source_of(gnss)
     remedy = "align while the vehicle stands, or with gnss_course while it drives"
     if error > heading_sd:
-        raise DataError(what, file=file, row=row, quantity="VN, VE", remedy=remedy)
-    return (Finding(what, file=file, row=row, quantity="VN, VE", remedy=remedy),)
+        raise DataError(
+            "alignment.message",
+            file=file,
+            row=row,
+            quantity="VN, VE",
+            message=what,
+            remedy_text=remedy,
+        )
+    return (
+        Finding(
+            "alignment.message",
+            file=file,
+            row=row,
+            quantity="VN, VE",
+            message=what,
+            remedy_text=remedy,
+        ),
+    )

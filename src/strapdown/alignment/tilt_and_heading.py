@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -48,12 +48,10 @@ def error_of_force_and_heading(
     """
     if not abs(pitch_deg) <= STEEPEST:
         raise DataError(
-            f"the body points to the zenith or the nadir (pitch {pitch_deg:.4g} deg), where a "
-            "heading means nothing",
+            "alignment.body-points-zenith-or-nadir",
             file=source,
             quantity="pitch",
-            remedy="name the body's axes so that forward is level, or use two_vector or "
-            "inertial_frame, which need no heading",
+            pitch_deg=pitch_deg,
         )
     steep, heading = np.tan(np.radians(pitch_deg)), np.radians(heading_deg)
     row = np.array([steep * np.cos(heading), steep * np.sin(heading), 1.0])

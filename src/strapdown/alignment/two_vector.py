@@ -31,7 +31,7 @@ from strapdown.alignment.record_checks import check_gravity, check_record, gravi
 from strapdown.alignment.site import Site
 from strapdown.alignment.still import still_by_gnss
 from strapdown.constants import DEG_PER_HOUR
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables.checks import source_of
 
@@ -64,9 +64,7 @@ class TwoVector(CoarseAlignment):
     def __post_init__(self) -> None:
         if isinstance(self.blocks, bool) or self.blocks not in range(2, 1001):
             raise ConfigError(
-                f"{self.blocks!r} is no number of blocks that tells a scatter",
-                quantity="blocks",
-                remedy="use 2 to 1000",
+                "alignment.no-number-blocks-tells-scatter", quantity="blocks", blocks=self.blocks
             )
 
     def align(
@@ -178,16 +176,21 @@ def _check_rate(
         return ()
     bias = max(sensors.gyro.axis("bias")) * DEG_PER_HOUR
     told = Finding(
-        f"the mean rate over {means.length:.4g} s is {size * DEG_PER_HOUR:.4g} deg/h (standard "
-        f"deviation {sd * DEG_PER_HOUR:.2g}), and the Earth's is {earth * DEG_PER_HOUR:.4g}",
+        "alignment.message",
         file=source,
         quantity="gyro",
-        remedy=unit_remedy(rate, site)
-        or "the vehicle turned or travelled, or the bias of the gyros is larger than stated "
-        f"({bias:.3g} deg/h): align while it stands, or state the right sensor",
+        message=f"the mean rate over {means.length:.4g} s is {size * DEG_PER_HOUR:.4g} deg/h (standard deviation {sd * DEG_PER_HOUR:.2g}), and the Earth's is {earth * DEG_PER_HOUR:.4g}",
+        remedy_text=unit_remedy(rate, site)
+        or f"the vehicle turned or travelled, or the bias of the gyros is larger than stated ({bias:.3g} deg/h): align while it stands, or state the right sensor",
     )
     if size > 2.0 * earth + CONTRADICTION * sd:
-        raise DataError(told.what, file=told.file, quantity=told.quantity, remedy=told.remedy)
+        raise DataError(
+            "alignment.message",
+            file=told.file,
+            quantity=told.quantity,
+            message=told.what,
+            remedy_text=told.remedy,
+        )
     return (told,)
 
 
@@ -195,11 +198,11 @@ def _refuse_motion(disturbed: Finding, heading_sd: float, source: str | None) ->
     """Refuse where it is the motion that hides north."""
     if heading_sd > LARGEST_SD:
         raise DataError(
-            f"{disturbed.what}: the heading is not known to better than "
-            f"{np.degrees(heading_sd):.3g} deg",
+            "alignment.message",
             file=source,
             quantity=disturbed.quantity,
-            remedy=disturbed.remedy,
+            message=f"{disturbed.what}: the heading is not known to better than {np.degrees(heading_sd):.3g} deg",
+            remedy_text=disturbed.remedy,
         )
 
 
@@ -236,13 +239,14 @@ def _disturbed(
     angle = np.degrees(np.sqrt(np.trace(swing)))
     first, last = (middle + off.min()) % 360.0, (middle + off.max()) % 360.0
     return Finding(
-        f"the body does not stand still: the mean rates of {len(off)} blocks of "
-        f"{means.length / len(off):.3g} s scatter {loud_rate:.3g} times as much as the noise of "
-        f"the gyros, the mean forces {loud_force:.3g} times as much as that of the "
-        f"accelerometers; the headings of the blocks run from {first:.4g} to {last:.4g} deg. It "
-        f"rocks by {angle:.2g} deg (root mean square) about its mean attitude, and what is left "
-        "of a swing in a mean rate passes for the Earth's",
+        "alignment.body-does-not-stand-still-2",
         file=source,
         quantity="gyro",
-        remedy="use inertial_frame, which lets the body rock; or align while nobody moves it",
+        count=len(off),
+        length=means.length / len(off),
+        loud_rate=loud_rate,
+        loud_force=loud_force,
+        first=first,
+        last=last,
+        angle=angle,
     )

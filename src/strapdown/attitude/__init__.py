@@ -18,7 +18,7 @@ from strapdown.attitude.quaternion import Quaternion
 from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
-from strapdown.exceptions import ConfigError, DivergenceError, nearest
+from strapdown.errors import ConfigError, DivergenceError, nearest
 from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 
@@ -70,9 +70,11 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
     name, _, rest = text.strip().lower().partition(":")
     if name not in ALGORITHMS:
         raise ConfigError(
-            f"'{name}' is no attitude algorithm",
+            "attitude.no-attitude-algorithm",
             quantity="algorithms",
-            remedy=nearest(name, ALGORITHMS),
+            name=name,
+            word=name,
+            known=ALGORITHMS,
         )
     cls = ALGORITHMS[name]
     known = {f.name: f.default for f in fields(cls)}
@@ -81,9 +83,12 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
         key, _, value = item.partition("=")
         if key not in known:
             raise ConfigError(
-                f"'{key}' is no option of {name}",
+                "attitude.no-option" if known else "attitude.no-option-2",
                 quantity="algorithms",
-                remedy=nearest(key, known) if known else f"{name} has no options",
+                key=key,
+                name=name,
+                word=key,
+                known=known,
             )
         options[key] = _option(name, key, value.strip().lower(), known[key])
     return cls(**options)
@@ -101,9 +106,7 @@ def _option(name: str, key: str, value: str, default: object) -> object:
             wanted = "a whole number"
     else:
         return value
-    raise ConfigError(
-        f"'{value}' is not {wanted}", quantity=f"{name}:{key}", remedy=f"use {wanted}"
-    )
+    raise ConfigError("attitude.not", quantity=f"{name}:{key}", value=value, wanted=wanted)
 
 
 def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64]) -> None:
@@ -111,10 +114,9 @@ def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64])
     bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
     if bad.size:
         raise DivergenceError(
-            "its numbers left the range of floating point",
+            "attitude.numbers-left-range-floating-point",
             row=int(bad[0]) + 1,
             quantity=algorithm.label,
-            remedy="use a higher order, a higher rate, or let it normalise or orthogonalise",
         )
 
 

@@ -10,7 +10,7 @@ from strapdown import rotation
 from strapdown._kernels import attitude as kernel
 from strapdown._kernels import rotation as kernel_rotation
 from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -43,16 +43,12 @@ class DirectionCosine(AttitudeAlgorithm):
 
     def __post_init__(self) -> None:
         if not 0 <= self.order <= 20:
-            raise ConfigError(
-                f"{self.order} is out of range",
-                quantity="dcm:order",
-                remedy="use 1 to 20, or 0 for the closed form",
-            )
+            raise ConfigError("attitude.out-range", quantity="dcm:order", order=self.order)
         if self.orthogonalise_every < 0:
             raise ConfigError(
-                f"{self.orthogonalise_every} is negative",
+                "attitude.negative",
                 quantity="dcm:orthogonalise_every",
-                remedy="use a number of steps, or 0 for never",
+                orthogonalise_every=self.orthogonalise_every,
             )
 
     def begin(self, q_nb: Array) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from strapdown import rotation
 from strapdown._kernels import attitude as kernel
 from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, quaternions_from_angles
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,7 @@ class EulerKrylov(AttitudeAlgorithm):
 
     def __post_init__(self) -> None:
         if self.step not in ("forward", "rk4"):
-            raise ConfigError(
-                f"'{self.step}' is no step", quantity="euler:step", remedy="use forward or rk4"
-            )
+            raise ConfigError("attitude.no-step", quantity="euler:step", step=self.step)
 
     def begin(self, q_nb: Array) -> Array:
         """Return roll, pitch, heading in rad, least |cos(pitch)|, its step, steps so far."""

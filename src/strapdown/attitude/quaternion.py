@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown._kernels import attitude as kernel
 from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -40,11 +40,7 @@ class Quaternion(AttitudeAlgorithm):
 
     def __post_init__(self) -> None:
         if not 0 <= self.order <= 20:
-            raise ConfigError(
-                f"{self.order} is out of range",
-                quantity="quaternion:order",
-                remedy="use 1 to 20, or 0 for the exact limit",
-            )
+            raise ConfigError("attitude.out-range-2", quantity="quaternion:order", order=self.order)
 
     def begin(self, q_nb: Array) -> Array:
         """Return the quaternion itself."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown._kernels import rotation_vector as kernel
 from strapdown.attitude.algorithm import Accuracy, Array, AttitudeAlgorithm, unit_quaternions
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 _COEFFICIENTS = {"auto": kernel.AUTO, "miller": kernel.MILLER, "fit": kernel.FIT}
 
@@ -51,15 +51,15 @@ class RotationVector(AttitudeAlgorithm):
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= 4:
             raise ConfigError(
-                f"{self.samples} is out of range",
-                quantity="rotvec:samples",
-                remedy="use 1, 2, 3 or 4 increments",
+                "attitude.out-range-3", quantity="rotvec:samples", samples=self.samples
             )
         if self.coefficients not in _COEFFICIENTS:
             raise ConfigError(
-                f"'{self.coefficients}' is no kind of coefficients",
+                "attitude.no-kind-coefficients",
                 quantity="rotvec:coefficients",
-                remedy=nearest(str(self.coefficients), _COEFFICIENTS),
+                coefficients=self.coefficients,
+                word=str(self.coefficients),
+                known=_COEFFICIENTS,
             )
 
     def begin(self, q_nb: Array) -> Array:

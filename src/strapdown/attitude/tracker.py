@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from strapdown import rotation
 from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
 from strapdown.attitude.algorithm import Array, AttitudeAlgorithm
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables import SAMPLINGS
 
 # Looked up once: at half a microsecond a call, finding a name is a tenth of it.
@@ -50,9 +50,10 @@ class AttitudeTracker:
     ) -> None:
         if sampling not in SAMPLINGS:
             raise ConfigError(
-                f"'{sampling}' is no kind of sampling",
+                "attitude.no-kind-sampling",
                 quantity="sampling",
-                remedy=f"use {' or '.join(SAMPLINGS)}",
+                sampling=sampling,
+                samplings=SAMPLINGS,
             )
         unit = rotation.normalise(q_nb)
         head = np.zeros(HEAD)
@@ -92,17 +93,19 @@ class AttitudeTracker:
     def _refuse(self, time: float, gyro: Array | Sequence[float]) -> NoReturn:
         if self._record[SAMPLES] > 0 and time <= self._record[TIME] and np.size(gyro) == 3:
             raise DataError(
-                f"time does not advance: {self._record[TIME]:.9g} s is followed by {time:.9g} s",
+                "attitude.time-does-not-advance-followed",
                 row=int(self._record[SAMPLES]) + 1,
                 quantity="time",
-                remedy="leave the sample out; the attitude is as before it",
+                record=self._record[TIME],
+                time=time,
             )
         raise DataError(
-            f"time {time}, rate {np.asarray(gyro).tolist()}: a time and three finite rates below "
-            f"{LARGEST:g} rad/s are needed",
+            "attitude.time-rate-time-three-finite",
             row=int(self._record[SAMPLES]) + 1,
             quantity="gyro",
-            remedy="leave the sample out; the attitude is as before it",
+            time=time,
+            asarray=np.asarray(gyro).tolist(),
+            largest=LARGEST,
         )
 
     @property

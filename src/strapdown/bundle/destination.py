@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from strapdown.bundle.seal import MANIFEST
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["check_destination"]
 
@@ -30,19 +30,9 @@ def check_destination(out: Path, force: bool) -> None:
     if out.is_dir() and not any(out.iterdir()):
         return
     if not force:
-        raise ConfigError(
-            "it exists already",
-            file=str(out),
-            quantity="--out",
-            remedy="name another folder with --out, or replace this one with --force",
-        )
+        raise ConfigError("bundle.exists-already", file=str(out), quantity="--out")
     if not (out.is_dir() and (out / MANIFEST).is_file()):
-        raise ConfigError(
-            "it exists and is no bundle; --force replaces bundles alone",
-            file=str(out),
-            quantity="--out",
-            remedy="name another folder",
-        )
+        raise ConfigError("bundle.exists-no-bundle-force-replaces", file=str(out), quantity="--out")
 
 
 def _refuse_unwritable(out: Path) -> None:
@@ -50,8 +40,5 @@ def _refuse_unwritable(out: Path) -> None:
     parent = next(p for p in out.absolute().parents if p.exists())
     if not parent.is_dir() or not os.access(parent, os.W_OK):
         raise ConfigError(
-            f"it cannot be made: {parent} is no folder that may be written",
-            file=str(out),
-            quantity="--out",
-            remedy="name another folder with --out",
+            "bundle.cannot-made-no-folder-may", file=str(out), quantity="--out", parent=parent
         )

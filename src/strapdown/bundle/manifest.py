@@ -10,7 +10,7 @@ from typing import Any
 from strapdown.bundle.configuration_paths import with_paths
 from strapdown.bundle.environment import machine, versions
 from strapdown.bundle.seal import SCHEMA, UNSEALED, files_of, sha256
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results.inputs import InputFiles
 
 __all__ = ["make_manifest"]
@@ -62,11 +62,7 @@ def make_manifest(
 
 def _refuse_changed(file: Path, digest: str) -> None:
     if not file.is_file() or sha256(file) != digest:
-        raise DataError(
-            "it has changed or gone since it was read",
-            file=file.name,
-            remedy="run again",
-        )
+        raise DataError("bundle.changed-or-gone-since-read", file=file.name)
 
 
 def _keep(

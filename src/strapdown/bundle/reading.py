@@ -8,7 +8,7 @@ from typing import Any
 
 from strapdown.bundle.configuration_paths import named_paths
 from strapdown.bundle.seal import MANIFEST, SCHEMA, UNSEALED, files_of, sha256
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["read_manifest", "unsealed_changes"]
 
@@ -33,28 +33,16 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
     """
     path = bundle / MANIFEST
     if not bundle.exists():
-        raise DataError("there is no such folder", file=str(bundle), remedy="check the path")
+        raise DataError("bundle.no-such-folder", file=str(bundle))
     if not path.is_file():
-        raise DataError(
-            "no manifest.json in it: this is no bundle of strapdown",
-            file=str(bundle),
-            remedy="name the folder that a run wrote",
-        )
+        raise DataError("bundle.no-manifest-json-no-bundle", file=str(bundle))
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise DataError(
-            f"no JSON any more: {error}",
-            file=MANIFEST,
-            remedy="the bundle was changed after it was sealed; get it again",
-        ) from None
+        raise DataError("bundle.no-json-any-more", file=MANIFEST, error=error) from None
     wanted = {"schema", "command", "configuration", "inputs", "outputs", "versions", "platform"}
     if not isinstance(manifest, dict) or wanted - set(manifest) or manifest["schema"] != SCHEMA:
-        raise DataError(
-            f"not a manifest of the form '{SCHEMA}'",
-            file=MANIFEST,
-            remedy="use the version of strapdown that wrote it",
-        )
+        raise DataError("bundle.not-manifest-form-strapdown-bundle", file=MANIFEST)
     _refuse_escape(manifest)
     return manifest
 
@@ -77,11 +65,7 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
         if not isinstance(manifest["command"], str):
             raise ValueError
     except (TypeError, KeyError, ValueError, AttributeError):
-        raise DataError(
-            "it is malformed, or names files outside the folder or outside the seal",
-            file=MANIFEST,
-            remedy="do not trust this bundle; get it again from its source",
-        ) from None
+        raise DataError("bundle.malformed-or-names-files-outside", file=MANIFEST) from None
 
 
 def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:

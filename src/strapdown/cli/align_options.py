@@ -12,7 +12,7 @@ from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.alignment_checks import NOT_BEFORE_FINE
 from strapdown.config.alignment_file import alignment_spec
-from strapdown.exceptions import ConfigError, StrapdownError
+from strapdown.errors import ConfigError, StrapdownError
 from strapdown.formats import read_raw
 
 __all__ = [
@@ -78,11 +78,11 @@ def flag_words(
         return
     flag = flag_of(written[0])
     raise ConfigError(
-        f"{what} says how it is run, and this is said beside it",
+        "cli.says-how-run-said-beside",
         file=source.name,
         quantity=flag,
-        remedy=f"write {_key(flag, flags)} in the file; --out, --force, --json and --quiet go "
-        "with both",
+        what=what,
+        key=_key(flag, flags),
     )
 
 
@@ -123,13 +123,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     """
     keys = log_keys(given)
     if given["sensor"] is None:
-        raise ConfigError(
-            "nothing says how good the sensors are, and without that no attitude has a bound: a "
-            "gyro bias of 0.01 deg/h is 0.05° of heading",
-            quantity="--sensor",
-            remedy="name one of the catalogue (strapdown modules) or a .toml file of your own; or "
-            "state bias and noise in the file of an alignment (strapdown init align)",
-        )
+        raise ConfigError("cli.nothing-says-how-good-sensors", quantity="--sensor")
     coarse = module_of_flag(given["method"] or "inertial_frame")
     alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
     table = {
@@ -172,7 +166,9 @@ def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> Config
         remedy = context.get("remedy") or "give another value"
     if context.get("key"):
         path.append(context["key"])
-    return ConfigError(what, quantity=(flag or _flag)(", ".join(path)), remedy=remedy)
+    return ConfigError(
+        "cli.message", quantity=(flag or _flag)(", ".join(path)), message=what, remedy_text=remedy
+    )
 
 
 def as_flag(error: StrapdownError, flag: Callable[[str], str] | None = None) -> StrapdownError:
@@ -205,12 +201,7 @@ def _site(log: Path, given: Mapping[str, Any]) -> dict[str, float]:
             return {k: v if place[k] is None else place[k] for k, v in said.items()}
     for key, flag in (("lat_deg", "--lat"), ("lon_deg", "--lon")):
         if place[key] is None:
-            raise ConfigError(
-                "nothing says where the body stands, and the rate of the Earth that it feels "
-                "depends on it",
-                quantity=flag,
-                remedy="give --lat and --lon in degrees, to a hundredth; --alt in metres",
-            )
+            raise ConfigError("cli.nothing-says-body-stands-rate", quantity=flag)
     return {k: float(v) for k, v in place.items() if v is not None}
 
 
@@ -221,11 +212,7 @@ def module_of_flag(text: str) -> dict[str, Any]:
     for part in (p for p in rest.split(",") if p.strip()):
         key, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or not value:
-            raise ConfigError(
-                f"'{part}' is no option",
-                quantity=kind,
-                remedy="write name=value after the colon, several joined by commas",
-            )
+            raise ConfigError("cli.no-option", quantity=kind, part=part)
         out[key] = _value(value)
     return out
 

@@ -247,16 +247,12 @@ def attitude(
 
 def _numbers(text: str | None) -> list[float]:
     """Numbers joined by blanks or commas."""
-    from strapdown.exceptions import ConfigError
+    from strapdown.errors import ConfigError
 
     try:
         return [float(word) for word in (text or "").replace(",", " ").split()]
     except ValueError:
-        raise ConfigError(
-            f"'{text}' is no list of numbers",
-            quantity="--rates",
-            remedy="give numbers in Hz joined by commas, as in 100,50,20",
-        ) from None
+        raise ConfigError("cli.no-list-numbers", quantity="--rates", text=text) from None
 
 
 def _split(text: str) -> list[str]:

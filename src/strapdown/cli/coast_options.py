@@ -8,7 +8,7 @@ from typing import Any
 
 from strapdown.cli.align_options import as_flag, module_of_flag
 from strapdown.config.coast import CoastSpec, coast_spec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["coast_of_flags"]
 
@@ -73,17 +73,13 @@ def coast_of_flags(
     _refuse_others(source, of_run, motion, start, keep, run)
     parts = [key for key in ("from_s", "to_s", "duration_s") if run.get(key) is not None]
     if run.get("at_s") is not None and parts:
-        raise ConfigError(
-            "--at says where the one outage is",
-            quantity=FLAGS[parts[0]],
-            remedy="keep one of the two",
-        )
+        raise ConfigError("cli.says-outage", quantity=FLAGS[parts[0]])
     aiding: dict[str, Any] = {}
     for text in keep:
         module = module_of_flag(text)
         kind = module.pop("kind")
         if kind in aiding:
-            raise ConfigError(f"'{kind}' stands there twice", quantity="--with", remedy="keep one")
+            raise ConfigError("cli.stands-twice", quantity="--with", kind=kind)
         aiding[kind] = module
     sensor = str(Path(source).absolute()) if source.lower().endswith(".toml") else source
     table = {
@@ -125,14 +121,6 @@ def _refuse_others(
         return
     if of_run:
         raise ConfigError(
-            "a run of navigation says how it moved, what its filter knew and which aids stay",
-            file=Path(source).name,
-            quantity=said[0],
-            remedy="leave it out, or name a sensor: strapdown coast SENSOR; aids that stay stand "
-            "in the file of the run, as [aiding.no_slip]",
+            "cli.run-navigation-says-how-moved", file=Path(source).name, quantity=said[0]
         )
-    raise ConfigError(
-        "a sensor alone has no record to take fixes from",
-        quantity=said[0],
-        remedy="leave it out, or name a folder that strapdown navigate wrote",
-    )
+    raise ConfigError("cli.sensor-alone-no-record-take", quantity=said[0])

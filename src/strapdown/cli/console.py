@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from strapdown.bundle.seal import Seal
-    from strapdown.exceptions import Finding
+    from strapdown.errors import Finding
     from strapdown.report.document import TableBlock
 
 

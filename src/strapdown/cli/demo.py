@@ -77,18 +77,13 @@ def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress
 def _check(out: Path, names: list[str], force: bool) -> None:
     """Refuse before the first run what a later one would be refused for."""
     from strapdown.bundle.destination import check_destination
-    from strapdown.exceptions import ConfigError
+    from strapdown.errors import ConfigError
 
     for name in (*names, _PAGE):
         if "." not in name:
             check_destination(out / name, force)
         elif (out / name).exists() and not force:
-            raise ConfigError(
-                "it exists already",
-                file=str(out / name),
-                quantity="--out",
-                remedy="name another folder with --out, or replace this one with --force",
-            )
+            raise ConfigError("cli.exists-already", file=str(out / name), quantity="--out")
 
 
 def _write_whole(path: Path, text: str) -> None:

@@ -7,7 +7,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["check_free", "write_file"]
 
@@ -29,19 +29,9 @@ def check_free(path: Path, usual: str, *, force: bool) -> None:
         A file is there and may not be replaced, or a folder is.
     """
     if path.is_dir():
-        raise ConfigError(
-            "it is a folder",
-            file=str(path),
-            quantity="--out",
-            remedy=f"name a file in it: --out {path / usual}",
-        )
+        raise ConfigError("cli.folder", file=str(path), quantity="--out", path=path / usual)
     if path.exists() and not force:
-        raise ConfigError(
-            "the file exists, and may hold what you wrote",
-            file=str(path),
-            quantity="--out",
-            remedy="name another with --out, or add --force to replace it",
-        )
+        raise ConfigError("cli.file-exists-may-hold-you", file=str(path), quantity="--out")
 
 
 def write_file(path: Path, text: str, usual: str, *, force: bool) -> None:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from strapdown.config.toml_text import Asked
-    from strapdown.exceptions import Finding
+    from strapdown.errors import Finding
 
 EPILOG = "Example: strapdown init crash recorder.csv"
 ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align align.toml"

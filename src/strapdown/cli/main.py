@@ -28,7 +28,7 @@ from strapdown.cli import (
     verify,
 )
 from strapdown.cli.interrupts import keep_interrupts
-from strapdown.exceptions import Finding, StrapdownError
+from strapdown.errors import Finding, StrapdownError
 
 EXIT_CODES = (
     "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
@@ -105,9 +105,10 @@ def run() -> None:
         if error.errno == errno.EPIPE:
             _reader_gone()
         what = Finding(
-            error.strerror or str(error),
+            "cli.message",
             file=str(error.filename) if error.filename else None,
-            remedy="check the path and the free space, or name another folder with --out",
+            message=error.strerror or str(error),
+            remedy_text="check the path and the free space, or name another folder with --out",
         )
         _fail(str(what), 4)
 

@@ -19,7 +19,7 @@ from strapdown.cli.console import Stopwatch, print_seal, progress
 from strapdown.cli.latency_table import print_latency
 from strapdown.cli.navigate_tables import print_navigation
 from strapdown.config.navigation_file import read_navigation_spec
-from strapdown.exceptions import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.live.clock import MachineClock
 from strapdown.live.received import live_spec
 from strapdown.live.run import LiveRun, receive, result_of
@@ -68,18 +68,11 @@ def navigate_live(
     flag = next((name for name, value in given.items() if value is not None), None)
     if flag is not None or file.suffix.lower() != ".toml":
         raise ConfigError(
-            f"--live takes the file of a run, and no {'log' if flag is None else flag}",
-            quantity="--live",
-            remedy="write a file (strapdown init navigate) with [live] in place of [log]",
+            "cli.live-takes-file-run-no", quantity="--live", value="log" if flag is None else flag
         )
     received = folder.parent / f"{folder.name}-received"
     if received.exists():
-        raise ConfigError(
-            "it is what a run before received, and could not be made a result",
-            file=str(received),
-            quantity="--out",
-            remedy="move it away, or name another folder",
-        )
+        raise ConfigError("cli.run-before-received-could-not", file=str(received), quantity="--out")
     clock = MachineClock()
     spec = live_spec(read_navigation_spec(file))
     live = receive(
@@ -92,9 +85,7 @@ def navigate_live(
         every,
     )
     if not len(live.got.samples):
-        raise DataError(
-            "no sample came", quantity="--live", remedy="send lines imu,TIME,GX,GY,GZ,AX,AY,AZ"
-        )
+        raise DataError("cli.no-sample-came", quantity="--live")
     with redirect_stdout(sys.stderr):
         seal = _sealed(live, file, folder, received, force=force, quiet=quiet)
         if not quiet and live.latency is not None:

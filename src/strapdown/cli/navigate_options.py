@@ -13,7 +13,7 @@ from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.systems.sins.proposal import propose
 
 __all__ = ["FLAGS", "navigation_of_flags"]
@@ -73,43 +73,25 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     if given["sensor"] is None:
         near = proposal.table.get("sensors", {}).get("sensor")
         raise ConfigError(
-            "nothing says how good the sensors are, and without that no position has a bound, and "
-            "no aid a weight",
+            "cli.message",
             quantity="--sensor",
-            remedy="name one of the catalogue (strapdown modules) or a .toml file of your own"
+            message="nothing says how good the sensors are, and without that no position has a bound, and no aid a weight",
+            remedy_text="name one of the catalogue (strapdown modules) or a .toml file of your own"
             + (f"; nearest by the noise of the log is {near}" if near else ""),
         )
     whole = {"name": log.resolve().stem, **proposal.table}
     if "position_sd_m" in whole.get("aiding", {}).get("gnss", {}):
         raise ConfigError(
-            "the fixes do not state how well they know their places",
-            file=Path(given["gnss"]).name,
-            quantity="--gnss",
-            remedy="write a file with strapdown init navigate, and position_sd_m of the fixes in "
-            "it; or add columns north_sd, east_sd, down_sd",
+            "cli.fixes-do-not-state-how", file=Path(given["gnss"]).name, quantity="--gnss"
         )
     coarse = whole["coarse"]
     if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
-        raise ConfigError(
-            "nothing tells the heading: there is neither a rest with gyros that find north, nor a "
-            "drive with fixes",
-            quantity="--heading",
-            remedy="give --heading in degrees from north, or --gnss with fixes of a drive; or "
-            "write a file (strapdown init navigate)",
-        )
+        raise ConfigError("cli.nothing-tells-heading-neither-rest", quantity="--heading")
     if "site" not in whole and proposal.gnss is None:
-        raise ConfigError(
-            "nothing says where it begins: there are no fixes",
-            quantity="--lat",
-            remedy="give --lat and --lon in degrees and --alt in metres, or --gnss",
-        )
+        raise ConfigError("cli.nothing-says-begins-no-fixes", quantity="--lat")
     if given["lever_arm"] is not None:
         if "aiding" not in whole:
-            raise ConfigError(
-                "there is no receiver whose antenna it would be of",
-                quantity="--lever-arm",
-                remedy="give --gnss, too",
-            )
+            raise ConfigError("cli.no-receiver-whose-antenna-would", quantity="--lever-arm")
         whole["aiding"]["gnss"]["lever_arm_m"] = _arm(given["lever_arm"])
     if given["truth"] is not None:
         whole["truth"] = {"path": str(given["truth"])}
@@ -151,9 +133,7 @@ def _site(given: Mapping[str, Any]) -> tuple[float, float, float] | None:
         return None
     for value, flag in ((lat, "--lat"), (lon, "--lon")):
         if value is None:
-            raise ConfigError(
-                "a place has a latitude and a longitude", quantity=flag, remedy=f"give {flag}, too"
-            )
+            raise ConfigError("cli.place-latitude-longitude", quantity=flag, flag=flag)
     return lat, lon, alt or 0.0
 
 
@@ -161,9 +141,5 @@ def _arm(text: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError(
-            f"'{text}' is no lever arm",
-            quantity="--lever-arm",
-            remedy="give three numbers in m, forward, right, down: --lever-arm 0.5,0,-1.2",
-        ) from None
+        raise ConfigError("cli.no-lever-arm", quantity="--lever-arm", text=text) from None
     return x, y, z

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from strapdown.config.alignment import AlignmentSpec
@@ -93,7 +93,8 @@ def refuse_result(source: str | Path, wanted: str) -> None:
             at = path / own["name"] if own["kept"] == "copy" else Path(own["name"])
             remedy += f"; its {own['role']} is {at}"
     raise ConfigError(
-        f"it is a result that strapdown {command} wrote, and no {wanted}",
+        "cli.message",
         file=path.resolve().name,
-        remedy=remedy,
+        message=f"it is a result that strapdown {command} wrote, and no {wanted}",
+        remedy_text=remedy,
     )

@@ -93,10 +93,10 @@ class AxesTable(TableSpec):
         apart = [n for n in ("gyro_matrix", "accel_matrix") if getattr(self, n) is not None]
         if len(written) > 1 or (written and apart):
             two = [*written, *apart][:2]
-            raise refuse(two[1], f"{two[0]} says it already", "keep one of the two")
+            raise refuse(two[1], "config.says-already", two=two[0])
         if len(apart) == 1:
             other = "accel_matrix" if apart[0] == "gyro_matrix" else "gyro_matrix"
-            raise refuse(apart[0], f"{other} is missing", "give both, or one matrix = for both")
+            raise refuse(apart[0], "config.missing", other=other)
         return self
 
 
@@ -180,11 +180,7 @@ class AlignmentSpec(TableSpec):
         if isinstance(data, dict):
             there = [n for n in ("log", "simulation") if data.get(n) is not None]
             if len(there) == 2:
-                raise refuse("simulation", "[log] is given, too", "keep one of the two")
+                raise refuse("simulation", "config.log-given-too")
             if not there:
-                raise refuse(
-                    "log",
-                    "it is missing",
-                    "write [log] and path = … below it, or [simulation] and duration_s = …",
-                )
+                raise refuse("log", "config.missing-2")
         return data

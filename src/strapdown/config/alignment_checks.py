@@ -55,8 +55,9 @@ class _Checks(SourceChecks):
             if spec.simulation.rate_hz * longest > MOST_SAMPLES:
                 raise self.refuse(
                     ("simulation", "duration_s"),
-                    f"{spec.simulation.rate_hz * longest:.3g} samples are too many",
-                    f"stay below {MOST_SAMPLES:.0e}: a lower rate_hz, or a shorter duration_s",
+                    "config.samples-too-many",
+                    rate_hz=spec.simulation.rate_hz * longest,
+                    most_samples=MOST_SAMPLES,
                 )
         if (
             longest is not None
@@ -64,9 +65,7 @@ class _Checks(SourceChecks):
             and spec.coarse.duration_s > longest
         ):
             raise self.refuse(
-                ("coarse", "duration_s"),
-                f"it is longer than the record's {longest:g} s",
-                "give less, or leave it out",
+                ("coarse", "duration_s"), "config.longer-than-record", longest=longest
             )
 
     def stages(self, spec: AlignmentSpec) -> None:
@@ -78,22 +77,19 @@ class _Checks(SourceChecks):
         """What one stage leaves, and another needs."""
         kind = spec.coarse.kind
         if kind in NEEDS_GNSS and spec.gnss is None:
-            raise self.refuse(
-                ("coarse", "kind"),
-                "it takes the course from satellite fixes, and none are given",
-                "write [gnss] and path = … below it, or take another kind",
-            )
+            raise self.refuse(("coarse", "kind"), "config.takes-course-satellite-fixes-none")
         if spec.gnss is not None and kind not in NEEDS_GNSS:
             raise self.refuse(
                 ("gnss", "path"),
-                f"the coarse alignment '{kind}' takes no fixes",
-                f'leave [gnss] out, or write kind = "{NEEDS_GNSS[0]}" in [coarse]',
+                "config.coarse-alignment-takes-no-fixes",
+                kind=kind,
+                needs_gnss=NEEDS_GNSS[0],
             )
         if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
             raise self.refuse(
                 ("coarse", "kind"),
-                f"{NOT_BEFORE_FINE[kind]}, and a fine alignment follows",
-                'write kind = "none" in [fine], or take another coarse alignment',
+                "config.fine-alignment-follows",
+                not_before_fine=NOT_BEFORE_FINE[kind],
             )
         if spec.fine.kind != "none":
             self.told(("fine",), partial(_begun, spec))

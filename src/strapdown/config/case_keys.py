@@ -11,7 +11,7 @@ from strapdown.config.shown import shown, shown_key
 from strapdown.config.spec import TableSpec
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError, nearest
 
 __all__ = ["canonical"]
 
@@ -88,9 +88,12 @@ class _Keys:
     def _twice(self, first: str, second: str, table: dict[str, Any], path: KeyPath) -> ConfigError:
         return self.file.refuse(
             (*path, second),
-            f"{second} = {shown(table[second])} and, in line {self.file.line((*path, first))}, "
-            f"{first} = {shown(table[first])} are one quantity in two units",
-            "keep one of the two",
+            "config.line-quantity-two-units",
+            second=second,
+            table=shown(table[second]),
+            at_line=self.file.line((*path, first)),
+            first=first,
+            table_2=shown(table[first]),
         )
 
     def _unknown(self, key: str, value: Any, form: type[TableSpec], path: KeyPath) -> ConfigError:

@@ -15,7 +15,7 @@ from strapdown.config.slots import Option, Slot, options_of
 from strapdown.config.spec import TableSpec
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError, nearest
 
 __all__ = ["ChoiceSpec", "choice_form", "make_choice"]
 
@@ -82,7 +82,9 @@ def _unknown(
     what = f"there is no {shown(kind)}" if kind else "it is missing"
     remedy = nearest(str(kind), kinds) if kind else f"write kind = …; known: {', '.join(kinds)}"
     if file is None:
-        return ConfigError(what, quantity=f"{slot.name}, kind", remedy=remedy)
+        return ConfigError(
+            "config.message", quantity=f"{slot.name}, kind", message=what, remedy_text=remedy
+        )
     return file.refuse((*path, "kind"), what, remedy)
 
 
@@ -209,7 +211,14 @@ def _group(option: Option, spec: TableSpec) -> Any:
 def _inside(error: ConfigError, key: str) -> ConfigError:
     f = error.finding
     quantity = f"{key}, {f.quantity}" if f.quantity else key
-    return ConfigError(f.what, file=f.file, row=f.row, quantity=quantity, remedy=f.remedy)
+    return ConfigError(
+        "config.message",
+        file=f.file,
+        row=f.row,
+        quantity=quantity,
+        message=f.what,
+        remedy_text=f.remedy,
+    )
 
 
 def _keyed(error: ConfigError, entry: type) -> ConfigError:
@@ -217,4 +226,11 @@ def _keyed(error: ConfigError, entry: type) -> ConfigError:
     f = error.finding
     keys = {o.field: o.key for o in options_of(entry)}
     quantity = keys.get(f.quantity or "", f.quantity)
-    return ConfigError(f.what, file=f.file, row=f.row, quantity=quantity, remedy=f.remedy)
+    return ConfigError(
+        "config.message",
+        file=f.file,
+        row=f.row,
+        quantity=quantity,
+        message=f.what,
+        remedy_text=f.remedy,
+    )

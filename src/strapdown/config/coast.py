@@ -12,7 +12,7 @@ from strapdown.config.crash_case import FileName, NotNegative, Number, Positive
 from strapdown.config.shown import shown
 from strapdown.config.slots import SLOTS
 from strapdown.config.spec import TableSpec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["CoastMotionTable", "CoastSpec", "CoastStartTable", "coast_spec"]
 
@@ -95,10 +95,7 @@ def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
     for kind, given in aiding.items():
         if kind not in KEPT:
             raise ConfigError(
-                f"'{kind}' is no aid that can stay while it coasts along a stated motion",
-                quantity="aiding",
-                remedy=f"keep any of {', '.join(KEPT)}; of a run of navigation all but its "
-                "receivers stay",
+                "config.no-aid-can-stay-while", quantity="aiding", kind=kind, kept=KEPT
             )
         form = choice_form(SLOTS["aiding"], {"kind": kind, **given}, ChoiceSpec, path=(kind,))
         forms[kind] = (form, ...)
@@ -132,4 +129,6 @@ def _refused(error: Any) -> ConfigError:
     else:
         what = f"{shown(error['input'])} does not fit: {error['msg'].lower()}"
         remedy = "give a finite number"
-    return ConfigError(what, quantity=", ".join(place), remedy=remedy)
+    return ConfigError(
+        "config.message", quantity=", ".join(place), message=what, remedy_text=remedy
+    )

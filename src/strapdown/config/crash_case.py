@@ -42,7 +42,7 @@ def _one_or_three(value: Any) -> Any:
 
 def _sizes(value: float | Triple) -> float | Triple:
     if min(value if isinstance(value, tuple) else (value,)) < 0.0:
-        raise refuse("", f"{shown(value)} is negative", "give its size, zero or more")
+        raise refuse("", "config.negative", value=shown(value))
     return value
 
 
@@ -50,7 +50,7 @@ def _number_or_words(value: Any) -> Any:
     if isinstance(value, str):
         return words(value)
     if not _is_number(value):
-        raise refuse("", f"{shown(value)} is neither a finite number nor text", "write one of them")
+        raise refuse("", "config.neither-finite-number-nor-text", value=shown(value))
     return float(value)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from strapdown.config.shown import shown, shown_key
 from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError, nearest
 
 __all__ = ["explained"]
 
@@ -84,7 +84,12 @@ def explained(
     where = _in_file(file, path, written or {})
     quantity = place(_renamed(path, written or {}))
     return ConfigError(
-        what, file=file.path.name, line=file.line(where), quantity=quantity, remedy=remedy
+        "config.message",
+        file=file.path.name,
+        line=file.line(where),
+        quantity=quantity,
+        message=what,
+        remedy_text=remedy,
     )
 
 

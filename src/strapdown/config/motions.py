@@ -123,11 +123,7 @@ class StraightSpec(TableSpec):
     @model_validator(mode="after")
     def _one(self) -> StraightSpec:
         if (self.duration_s is None) == (self.distance_m is None):
-            raise refuse(
-                "duration_s, distance_m",
-                "one of the two is wanted",
-                "give how long, or how far, and not both",
-            )
+            raise refuse("duration_s, distance_m", "config.two-wanted")
         return self
 
 
@@ -259,16 +255,12 @@ class WaypointsSpec(TableSpec):
         timed = [w.time_s is not None for w in self.waypoints]
         paced = [w.speed_m_per_s is not None for w in self.waypoints]
         if any(timed) and (self.speed_m_per_s is not None or any(paced) or not all(timed)):
-            raise refuse(
-                "waypoints",
-                "some have a time, and others none or a speed",
-                "give each a time_s, or none and a speed_m_per_s",
-            )
+            raise refuse("waypoints", "config.some-time-others-none-or")
         if not any(timed) and self.speed_m_per_s is None and not all(paced[1:]):
             raise refuse(
                 "waypoints",
-                f"waypoint {paced.index(False, 1) + 1} has neither a time nor a speed",
-                "give each a time_s, or a speed_m_per_s for all or for each",
+                "config.waypoint-neither-time-nor-speed",
+                index=paced.index(False, 1) + 1,
             )
         return self
 

@@ -304,13 +304,9 @@ class NavigationSpec(TableSpec):
         if isinstance(data, dict):
             there = [n for n in ("log", "simulation") if data.get(n) is not None]
             if len(there) == 2:
-                raise refuse("simulation", "[log] is given, too", "keep one of the two")
+                raise refuse("simulation", "config.log-given-too")
             if not there and data.get("live") is None:
-                raise refuse(
-                    "log",
-                    "it is missing",
-                    "write [log] and path = … below it, or [simulation] and [simulation.motion]",
-                )
+                raise refuse("log", "config.missing-3")
         return data
 
 

@@ -26,8 +26,8 @@ from strapdown.config.slots import SLOTS
 from strapdown.config.source_checks import MOST_SAMPLES, SourceChecks
 from strapdown.config.together import together
 from strapdown.ellipsoids import find_ellipsoid
+from strapdown.errors import ConfigError
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.exceptions import ConfigError, nearest
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import with_states
@@ -113,9 +113,7 @@ class _Checks(SourceChecks):
             duration = getattr(spec, stage).duration_s
             if duration is not None and duration > longest:
                 raise self.refuse(
-                    (stage, "duration_s"),
-                    f"it is longer than the record's {longest:g} s",
-                    "give less, or leave it out",
+                    (stage, "duration_s"), "config.longer-than-record", longest=longest
                 )
 
     def begins(self, spec: NavigationSpec) -> None:
@@ -126,35 +124,19 @@ class _Checks(SourceChecks):
                 self.place(name, table.lat_deg, table.lon_deg, table.alt_m)
                 for key in ("position_sd_m", "velocity_sd_m_per_s"):
                     if np.min(getattr(table, key)) < 0.0:
-                        raise self.refuse(
-                            (name, key),
-                            "no standard deviation is below zero",
-                            "give one or three, zero or more",
-                        )
+                        raise self.refuse((name, key), "config.no-standard-deviation-below-zero")
         if spec.start is not None:
             if abs(spec.start.heading_deg) > 360.0:
-                raise self.refuse(
-                    ("start", "heading_deg"), "more than a turn", "give degrees from 0 to 360"
-                )
+                raise self.refuse(("start", "heading_deg"), "config.more-than-turn")
             for stage in ("coarse", "fine"):
                 if getattr(spec, stage).kind != "none":
                     raise self.refuse(
-                        (stage, "kind"),
-                        "[start] says attitude and place already",
-                        f"leave [{stage}] out, or [start]",
+                        (stage, "kind"), "config.start-says-attitude-place-already", stage=stage
                     )
             if spec.site is not None:
-                raise self.refuse(
-                    ("site", "lat_deg"),
-                    "[start] says the place already",
-                    "leave [site] out, or [start]",
-                )
+                raise self.refuse(("site", "lat_deg"), "config.start-says-place-already")
         elif spec.coarse.kind == "none":
-            raise self.refuse(
-                ("start", "lat_deg"),
-                "nothing says where navigation begins: there is no [start], and [coarse] is none",
-                "write [start] with place and attitude, or a kind of [coarse]",
-            )
+            raise self.refuse(("start", "lat_deg"), "config.nothing-says-navigation-begins-no")
 
     def stage(self, spec: NavigationSpec, name: str) -> None:
         self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
@@ -162,11 +144,7 @@ class _Checks(SourceChecks):
     def height(self, spec: NavigationSpec) -> None:
         """A height that is damped has a loop of its own."""
         if getattr(spec.mechanization, "height", "") == "damped":
-            raise self.refuse(
-                ("mechanization", "height"),
-                "the filter has no states for the loop that damps the height",
-                'write "free", and give heights by an aid (barometer, gnss); or "held"',
-            )
+            raise self.refuse(("mechanization", "height"), "config.filter-no-states-loop-damps")
 
     def modes(self, spec: NavigationSpec) -> None:
         """What ends each alignment, and what is said of one that is not there."""
@@ -176,41 +154,28 @@ class _Checks(SourceChecks):
             given = getattr(spec, stage)
             ends = [n for n in ENDS if getattr(given, n, None) is not None]
             if given.kind == "none" and ends:
-                raise self.refuse(
-                    (stage, ends[0]), "there is no such alignment to end", "leave it out"
-                )
+                raise self.refuse((stage, ends[0]), "config.no-such-alignment-end")
             commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
             if given.kind != "none" and not [n for n in ends if n != "window_s"]:
                 if commanded or spec.live is not None:
                     continue
                 raise self.refuse(
-                    (stage, "duration_s"),
-                    "nothing ends this alignment, and navigation never begins",
-                    "write duration_s = …, until_heading_sd_deg = … or until_tilt_sd_deg = …",
+                    (stage, "duration_s"), "config.nothing-ends-alignment-navigation-never"
                 )
 
     def alignment(self, spec: NavigationSpec) -> None:
         """What coarse and fine alignment need of one another, and of the aids."""
         kind = spec.coarse.kind
         if kind in NEEDS_GNSS and not _fixes(spec):
-            raise self.refuse(
-                ("coarse", "kind"),
-                "it takes the course from satellite fixes, and no aid gives them",
-                "write [aiding.gnss] with path = …, or take another kind",
-            )
+            raise self.refuse(("coarse", "kind"), "config.takes-course-satellite-fixes-no")
         if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
             raise self.refuse(
                 ("coarse", "kind"),
-                f"{NOT_BEFORE_FINE[kind]}, and a fine alignment follows",
-                'write kind = "none" in [fine], or take another coarse alignment',
+                "config.fine-alignment-follows",
+                not_before_fine=NOT_BEFORE_FINE[kind],
             )
         if spec.start is None and spec.site is None and not _fixes(spec):
-            raise self.refuse(
-                ("site", "lat_deg"),
-                "nothing says where the body is: there is neither [start] nor [site], and no aid "
-                "gives fixes",
-                "write [site] with lat_deg and lon_deg",
-            )
+            raise self.refuse(("site", "lat_deg"), "config.nothing-says-body-neither-start")
 
     def aid(self, spec: NavigationSpec, name: str) -> None:
         """One aid: its options, and whether it has what it observes by."""
@@ -221,54 +186,41 @@ class _Checks(SourceChecks):
         if not takes and given.path is not None:
             raise self.refuse(
                 ("aiding", name, "path"),
-                f"'{given.kind}' watches the inertial sensors, and takes no file",
-                "leave path out",
+                "config.watches-inertial-sensors-takes-no",
+                kind=given.kind,
             )
         sent = name in receivers_of(spec) or spec.live is not None
         if takes and given.path is None and not sent:
             raise self.refuse(
-                ("aiding", name, "path"),
-                f"it is missing: '{given.kind}' takes what it measured from a file",
-                "write path = …, from the folder of this file",
+                ("aiding", name, "path"), "config.missing-takes-measured-file", kind=given.kind
             )
         for key in ("position_sd_m", "velocity_sd_m_per_s"):
             if getattr(given, key) is not None and given.kind != "gnss":
-                raise self.refuse(
-                    ("aiding", name, key),
-                    f"'{given.kind}' takes no fixes",
-                    'leave it out: it belongs to an aid of kind = "gnss"',
-                )
+                raise self.refuse(("aiding", name, key), "config.takes-no-fixes", kind=given.kind)
         height = getattr(spec.mechanization, "height", None)
         if given.kind in HEIGHTS and height == "held":
             raise self.refuse(
-                ("aiding", name, "kind"),
-                'it observes the height, and [mechanization] height = "held" keeps it where it is',
-                'write height = "free", or leave this aid out',
+                ("aiding", name, "kind"), "config.observes-height-mechanization-height-held"
             )
 
     def gaps(self, spec: NavigationSpec) -> None:
         if spec.gaps.beyond == "align" and spec.start is not None:
-            raise self.refuse(
-                ("gaps", "beyond"),
-                "with [start] there is no alignment to begin anew with",
-                'write "refuse" or "coast", or [coarse] in place of [start]',
-            )
+            raise self.refuse(("gaps", "beyond"), "config.start-no-alignment-begin-anew")
 
     def receiver(self, name: str, receiver: ReceiverTable) -> None:
         """A receiver that is simulated."""
         for key in ("position_noise_m", "position_drift_m", "velocity_noise_m_per_s"):
             if np.min(getattr(receiver, key)) < 0.0:
                 raise self.refuse(
-                    ("simulation", "gnss", name, key),
-                    "no standard deviation is below zero",
-                    "give one or three, above zero",
+                    ("simulation", "gnss", name, key), "config.no-standard-deviation-below-zero-2"
                 )
         for begin, end in receiver.outages_s:
             if not begin < end:
                 raise self.refuse(
                     ("simulation", "gnss", name, "outages_s"),
-                    f"a span from {begin:g} to {end:g} s has no length",
-                    "write begin and end of each: [[80.0, 110.0]]",
+                    "config.span-no-length",
+                    begin=begin,
+                    end=end,
                 )
 
     def withhold(self, spec: NavigationSpec) -> None:
@@ -277,40 +229,35 @@ class _Checks(SourceChecks):
         if given is None:
             return
         if given.aid is None and not _fixes(spec):
-            raise self.refuse(
-                ("withhold", "aid"), "no aid gives fixes to keep back", "leave [withhold] out"
-            )
+            raise self.refuse(("withhold", "aid"), "config.no-aid-gives-fixes-keep")
         if given.aid is not None and given.aid not in _fixes(spec):
             raise self.refuse(
                 ("withhold", "aid"),
-                "there is no aid of this name that gives fixes",
-                nearest(given.aid, _fixes(spec)),
+                "config.no-aid-name-gives-fixes",
+                word=given.aid,
+                known=_fixes(spec),
             )
         if bool(given.spans_s) == bool(given.lengths_s):
             raise self.refuse(
                 ("withhold", "spans_s"),
-                "nothing says when" if not given.spans_s else "lengths_s is given, too",
-                "write spans_s = [[begin, end]], or lengths_s = [10.0, 30.0, 60.0] and places = 5",
+                "config.nothing-says-when" if not given.spans_s else "config.lengths-given-too",
             )
         for begin, end in given.spans_s:
             if not begin < end:
-                raise self.refuse(
-                    ("withhold", "spans_s"),
-                    f"from {begin:g} to {end:g} s there is no time",
-                    "give the begin before the end",
-                )
+                raise self.refuse(("withhold", "spans_s"), "config.no-time", begin=begin, end=end)
 
     def output(self, spec: NavigationSpec) -> None:
         for form in spec.output.files:
             if form not in TRAJECTORY_FILES:
                 raise self.refuse(
                     ("output", "files"),
-                    f"there is no form '{form}'",
-                    f"use any of {', '.join(TRAJECTORY_FILES)}",
+                    "config.no-form",
+                    form=form,
+                    trajectory_files=TRAJECTORY_FILES,
                 )
         simulation = spec.simulation
         if simulation is not None and simulation.rate_hz > MOST_SAMPLES:
-            raise self.refuse(("simulation", "rate_hz"), "it is no rate", "give Hz, as 100.0")
+            raise self.refuse(("simulation", "rate_hz"), "config.no-rate")
 
     def chain(self, spec: NavigationSpec) -> None:
         """Begin the filter, which refuses parts that do not go together."""

@@ -34,7 +34,7 @@ from strapdown.config.spec import TableSpec
 from strapdown.config.state_tables import StatesTable
 from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["NAVIGATION_STAGES", "navigation_spec", "read_navigation_spec", "stage_default"]
 
@@ -124,7 +124,9 @@ def _simulation_form(table: Mapping[str, Any], file: TomlFile | None) -> type[Ta
             what = "there is no aid of this name that takes its fixes"
             remedy = f'write [aiding.{name}] with kind = "gnss" and without path, or leave it out'
             if file is None:
-                raise ConfigError(what, quantity=place_of(path), remedy=remedy)
+                raise ConfigError(
+                    "config.message", quantity=place_of(path), message=what, remedy_text=remedy
+                )
             raise file.refuse(path, what, remedy)
     forms: dict[str, Any] = {name: (ReceiverTable, ReceiverTable()) for name in sorted(names)}
     receivers = create_model("Receivers", __base__=TableSpec, **forms)
@@ -141,7 +143,9 @@ def _refuse_name(name: Any, path: KeyPath, file: TomlFile | None) -> None:
     if isinstance(name, str) and hasattr(BaseModel, name):
         what, remedy = "this name is taken by the form of the file", "choose another"
     if file is None:
-        raise ConfigError(what, quantity=place_of(path), remedy=remedy)
+        raise ConfigError(
+            "config.message", quantity=place_of(path), message=what, remedy_text=remedy
+        )
     raise file.refuse(path, what, remedy)
 
 

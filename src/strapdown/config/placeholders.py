@@ -8,7 +8,7 @@ from typing import Any
 from strapdown.config.case_wanted import wanted_at
 from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["PLACEHOLDER", "refuse_placeholders"]
 
@@ -41,10 +41,10 @@ def refuse_placeholders(file: TomlFile, wanted_of: Callable[[KeyPath], str] = wa
     count = len(open_keys)
     what = "one value is still open" if count == 1 else f"{count} values are still open"
     raise ConfigError(
-        "\n".join([f"{what}:", *lines]),
+        "config.message",
         file=file.path.name,
-        remedy=f'put what you know in place of each "{PLACEHOLDER}", numbers without quotation '
-        "marks; a key that may be left out may be deleted",
+        message="\n".join([f"{what}:", *lines]),
+        remedy_text=f'put what you know in place of each "{PLACEHOLDER}", numbers without quotation marks; a key that may be left out may be deleted',
     )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from strapdown.config.alignment import AxesTable, LogTable, SensorsTable
 from strapdown.config.crash_checks import Written
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError, nearest
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.unit_words import parse_unit
 from strapdown.sensors.axes_matrix import NAMED_AXES, check_axes_matrix
@@ -34,7 +34,9 @@ class SourceChecks:
     def refuse(self, path: tuple[str, ...], why: str, remedy: str) -> ConfigError:
         """An error at a key."""
         if self._written is None:
-            return ConfigError(why, quantity=", ".join(path), remedy=remedy)
+            return ConfigError(
+                "config.message", quantity=", ".join(path), message=why, remedy_text=remedy
+            )
         return self._written.refuse(path, why, remedy)
 
     def told(self, path: tuple[str, ...], make: Callable[[], Any]) -> Any:
@@ -48,7 +50,9 @@ class SourceChecks:
             where = (*path, *(own if self._known((*path, *own)) else ()))
             remedy = f.remedy or "give another value"
             if self._written is None:
-                raise ConfigError(f.what, quantity=", ".join(where), remedy=remedy) from None
+                raise ConfigError(
+                    "config.message", quantity=", ".join(where), message=f.what, remedy_text=remedy
+                ) from None
             raise self._written.refuse_as_told(where, f.what, remedy) from None
 
     def _known(self, path: tuple[str, ...]) -> bool:
@@ -65,9 +69,7 @@ class SourceChecks:
             remedy = "give degrees from -180 to 180, east positive"
             raise self.refuse((table, "lon_deg"), "a longitude of more than a turn", remedy)
         if not -1e4 <= alt_m <= 1e5:
-            raise self.refuse(
-                (table, "alt_m"), "no height of a body at rest on the Earth", "give metres"
-            )
+            raise self.refuse((table, "alt_m"), "config.no-height-body-rest-earth")
 
     def axes(self, axes: AxesTable) -> None:
         """Whether axes are those of a sensor."""
@@ -104,10 +106,7 @@ class SourceChecks:
 
         if given.sensor is None and not given.gyro and not given.accel:
             raise self.refuse(
-                ("sensors", "sensor"),
-                f"nothing says how good the sensors are, and {why}",
-                "write sensor = …, a name of the catalogue (strapdown modules) or a .toml file, "
-                "or state bias and noise in [sensors.gyro] and [sensors.accel]",
+                ("sensors", "sensor"), "config.nothing-says-how-good-sensors", why=why
             )
         sensor = None
         if given.sensor is not None:
@@ -118,18 +117,14 @@ class SourceChecks:
         if simulated is not None:
             self.told(("simulation", "sensor"), lambda: load_sensor(simulated))
         if simulation is not None and simulated is None and given.sensor is None:
-            raise self.refuse(
-                ("simulation", "sensor"),
-                "nothing says which sensor to simulate",
-                "write sensor = … here or in [sensors]",
-            )
+            raise self.refuse(("simulation", "sensor"), "config.nothing-says-sensor-simulate")
 
     def span(self, log: LogTable | None) -> float | None:
         """Length of the part of a log that is used, s; None where it does not say it."""
         if log is None:
             return None
         if log.to_s is not None and log.duration_s is not None:
-            raise self.refuse(("log", "duration_s"), "to_s says it already", "keep one of the two")
+            raise self.refuse(("log", "duration_s"), "config.says-already-2")
         if log.from_s is not None and log.to_s is not None:
             if not log.from_s < log.to_s:
                 why = f"it ends before it begins, at {log.from_s:g} s"

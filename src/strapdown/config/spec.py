@@ -7,7 +7,7 @@ from typing import Any, ClassVar, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["Spec", "TableSpec", "refuse", "specify"]
 
@@ -35,7 +35,7 @@ class TableSpec(Spec):
         for key in data if isinstance(data, dict) else ():
             if key not in cls.model_fields:
                 known = [name for name in cls.model_fields if name not in cls.unwritten]
-                raise refuse(key, "there is no such key", nearest(key, known))
+                raise refuse(key, "config.no-such-key", word=key, known=known)
         return data
 
 
@@ -76,7 +76,5 @@ def specify(form: type[S], **values: Any) -> S:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
         raise ConfigError(
-            f"{first['input']!r} does not fit: {first['msg'].lower()}",
-            quantity=place,
-            remedy="give another value",
+            "config.does-not-fit", quantity=place, first=first["input"], lower=first["msg"].lower()
         ) from None

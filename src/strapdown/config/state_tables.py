@@ -8,9 +8,9 @@ from pydantic import create_model
 
 from strapdown.config.crash_case import OneOrThree, Positive
 from strapdown.config.spec import TableSpec
+from strapdown.errors import ConfigError
 from strapdown.estimation.state_process import StateProcess
 from strapdown.estimation.stated_states import STATED_STATES
-from strapdown.exceptions import ConfigError
 from strapdown.sensors.stated_uncertainty import STATED_KEYS
 
 __all__ = ["StatesTable", "processes_of"]
@@ -74,11 +74,7 @@ def processes_of(table: TableSpec) -> dict[str, StateProcess]:
                 if value is None:
                     continue
                 if part in given:
-                    raise ConfigError(
-                        "it is stated in two units",
-                        quantity=f"states.{name}, {key}",
-                        remedy="keep one of the two",
-                    )
+                    raise ConfigError("config.stated-two-units", quantity=f"states.{name}, {key}")
                 single = isinstance(value, int | float)
                 given[part] = scale * value if single else tuple(scale * x for x in value)
         out[name] = StateProcess(correlation_time=one.correlation_time_s, **given)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["together"]
 
@@ -30,7 +30,8 @@ def together(found: Sequence[ConfigError]) -> ConfigError:
         place = ", ".join(str(p) for p in (f.line and f"line {f.line}", f.quantity) if p)
         lines += [f"  {place}: {f.what}" if place else f"  {f.what}", f"    {f.remedy}"]
     return ConfigError(
-        "\n".join([f"{len(found)} things do not fit:", *lines]),
+        "config.message",
         file=found[0].finding.file,
-        remedy="mend each of them",
+        message="\n".join([f"{len(found)} things do not fit:", *lines]),
+        remedy_text="mend each of them",
     )

@@ -11,7 +11,7 @@ from typing import Any
 
 from strapdown.config.shown import shown, shown_key
 from strapdown.config.toml_lines import DEEPEST, KeyPath, key_lines, line_of
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["TomlFile", "read_toml"]
 
@@ -66,11 +66,12 @@ class TomlFile:
     def refuse(self, path: KeyPath, what: str, remedy: str, quantity: str = "") -> ConfigError:
         """An error at a key."""
         return ConfigError(
-            what,
+            "config.message",
             file=self.path.name,
             line=self.line(path),
             quantity=quantity or place_of(path),
-            remedy=remedy,
+            message=what,
+            remedy_text=remedy,
         )
 
 
@@ -96,7 +97,9 @@ def read_toml(path: Path, form: str) -> TomlFile:
             raise RecursionError
         return TomlFile(path, tomllib.loads(text), lines)
     except RecursionError:
-        raise ConfigError("it is nested too deep", file=path.name, remedy=form) from None
+        raise ConfigError(
+            "config.message", file=path.name, message="it is nested too deep", remedy_text=form
+        ) from None
     except ValueError as error:
         raise _no_toml(path, text, str(error)) from None
 
@@ -105,25 +108,23 @@ def _text(path: Path) -> str:
     try:
         if not path.is_file():
             what = "it is no file" if path.exists() else "there is no such file"
-            raise ConfigError(what, file=str(path), remedy="check the path")
+            raise ConfigError(
+                "config.message", file=str(path), message=what, remedy_text="check the path"
+            )
         # With the mark that some editors on Windows begin a file with, or without.
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         before = error.object[: error.start]
         raise ConfigError(
-            f"it is no TOML: byte {error.object[error.start]:#04x} is not UTF-8",
+            "config.no-toml-byte-not-utf",
             file=path.name,
             line=before.count(b"\n") + 1 if isinstance(before, bytes) else None,
-            remedy="save it as UTF-8 text, from an editor for plain text",
+            object=error.object[error.start],
         ) from None
     except OSError as error:
-        raise ConfigError(
-            f"it cannot be read: {error.strerror}", file=str(path), remedy="check its permissions"
-        ) from None
+        raise ConfigError("config.cannot-read-2", file=str(path), strerror=error.strerror) from None
     except ValueError as error:
-        raise ConfigError(
-            f"it is no name of a file: {error}", file=shown(str(path)), remedy="check the path"
-        ) from None
+        raise ConfigError("config.no-name-file", file=shown(str(path)), error=error) from None
 
 
 #: Endings of tables, which are no configurations.
@@ -147,16 +148,22 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
         if what.startswith(("Cannot", "Duplicate")) and twice:
             key, first = twice
             return ConfigError(
-                f"it is written twice: in line {first} too",
+                "config.written-twice-line-too",
                 file=path.name,
                 line=number,
                 quantity=place_of(key),
-                remedy="keep one of the two; of several tables each begins with [[…]]",
+                first=first,
             )
     remedy = next((r for pattern, r in _SLIPS if re.search(pattern, line)), "mend it where it says")
     if path.suffix.lower() in RECORDS:
         remedy = "it seems to be a record: strapdown init writes a file from it, and that is given"
-    return ConfigError(f"it is no TOML: {what}", file=path.name, line=number, remedy=remedy)
+    return ConfigError(
+        "config.message",
+        file=path.name,
+        line=number,
+        message=f"it is no TOML: {what}",
+        remedy_text=remedy,
+    )
 
 
 def _twice(text: str, line: int) -> tuple[KeyPath, int] | None:

@@ -60,11 +60,7 @@ def read_trajectory_spec(path: Path, **instead: Any) -> TrajectorySpec:
     file = read_toml(path, "a trajectory has three levels")
     table = dict(file.table)
     if "name" in table:
-        raise file.refuse(
-            ("name",),
-            "there is no such key",
-            "a trajectory is named after its file; write title = …",
-        )
+        raise file.refuse(("name",), "config.no-such-key-2")
     table["name"] = path.stem
     sensor = table.get("sensor")
     if isinstance(sensor, str) and sensor.lower().endswith(".toml"):

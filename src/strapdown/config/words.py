@@ -38,7 +38,7 @@ def file_name(text: str) -> str:
 
 def _filled(text: str) -> str:
     if not text.strip():
-        raise refuse("", "it is empty", "write it, or leave the key out")
+        raise refuse("", "config.empty")
     return text
 
 

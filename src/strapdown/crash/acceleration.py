@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import (
     as_array,
     check_columns,
@@ -68,20 +68,21 @@ class Acceleration:
         for name, known in (("frame", FRAMES), ("sampling", SAMPLINGS)):
             if getattr(self, name) not in known:
                 raise ConfigError(
-                    f"{getattr(self, name)!r} is unknown",
+                    "crash.unknown",
                     file=self.source,
                     quantity=name,
-                    remedy=f"use one of {', '.join(known)}",
+                    value=getattr(self, name),
+                    known=known,
                 )
         time = as_array(self.time, None, "time", self.source).copy()
         values = as_array(self.values, 3, "acceleration", self.source).copy()
         check_same_length(self.source, time=time, acceleration=values)
         if len(time) < 2:
             raise DataError(
-                f"{len(time)} sample: a change of velocity needs at least two",
+                "crash.sample-change-velocity-needs-least",
                 file=self.source,
                 quantity="time",
-                remedy="record for longer, or check that the right file was given",
+                count=len(time),
             )
         check_time(time, self.source)
         check_rows(values, ["accel_x", "accel_y", "accel_z"], self.source)
@@ -123,10 +124,10 @@ class Acceleration:
         """
         if self.frame != "ned":
             raise ConfigError(
-                f"the record is in the frame {self.frame}, and a heading turns north-east-down",
+                "crash.record-frame-heading-turns-north",
                 file=self.source,
                 quantity="frame",
-                remedy="use it as it is, or resolve it with resolved_acceleration first",
+                frame=self.frame,
             )
         q = rotation.conjugate(rotation.quaternion_from_euler([0.0, 0.0, heading_deg]))
         return replace(self, values=rotation.rotate(q, self.values), frame="impact")
@@ -137,13 +138,7 @@ def _force_of(imu: pd.DataFrame) -> tuple[Array, str, str | None]:
     check_columns(imu, ACCEL, source)
     sampling = imu.attrs.get("sampling")
     if sampling not in SAMPLINGS:
-        raise DataError(
-            f"attrs['sampling'] is {sampling!r}",
-            file=source,
-            quantity="sampling",
-            remedy="say 'instantaneous' (value at the stamp) or 'mean' (over the interval that "
-            "ends there)",
-        )
+        raise DataError("crash.attrs-sampling", file=source, quantity="sampling", sampling=sampling)
     return values_of(imu, ACCEL), str(sampling), source
 
 
@@ -175,10 +170,7 @@ def body_acceleration(imu: pd.DataFrame, at_rest: Sequence[float]) -> Accelerati
     rest = np.asarray(at_rest, dtype=np.float64)
     if rest.shape != (3,) or not np.isfinite(rest).all():
         raise DataError(
-            f"{at_rest!r} are not three finite numbers",
-            file=source,
-            quantity="at_rest",
-            remedy="give the mean specific force at rest, (0, 0, -9.81) if level and unbiased",
+            "crash.not-three-finite-numbers", file=source, quantity="at_rest", at_rest=at_rest
         )
     return Acceleration(index_of(imu), force - rest, "body", sampling, source)
 
@@ -257,10 +249,11 @@ def attitude_of_samples(
     q = rotation.normalise(q_nb)
     if q.shape != (samples, 4):
         raise DataError(
-            f"attitudes of shape {q.shape} for {samples} samples",
+            "crash.attitudes-shape-samples",
             file=source,
             quantity="q_nb",
-            remedy="pass one quaternion a sample, scalar first",
+            shape=q.shape,
+            samples=samples,
         )
     if sampling == "mean":
         # Half the turn of the step, from its start.

@@ -15,7 +15,7 @@ from strapdown.crash.combined_effects import SampleWeights, combine_effects
 from strapdown.crash.mean_weights import by_none, crash_steps, force_weights
 from strapdown.crash.sample_effects import SampleEffects, level_turned_by
 from strapdown.crash.unit_differences import TINY
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.prepared_unit import Levelling
 from strapdown.sensors.rest import LEAST_SAMPLES, rest_between
@@ -66,22 +66,20 @@ def combine_units(units: Sequence[AtPoint], method: str = "weighted") -> AtPoint
     """
     if method not in COMBINATIONS:
         raise ConfigError(
-            f"{method!r} is no way to combine units",
+            "crash.no-way-combine-units",
             quantity="method",
-            remedy=f"use {' or '.join(COMBINATIONS)}",
+            method=method,
+            combinations=COMBINATIONS,
         )
     if len(units) < 2 or (method == "median" and len(units) < 3):
         raise ConfigError(
-            f"{len(units)} units cannot be combined by {method}",
-            quantity="units",
-            remedy="give two units or more, three or more for a median",
+            "crash.units-cannot-combined", quantity="units", count=len(units), method=method
         )
     if method == "median" and any(u.unmeasured is not None for u in units):
         raise ConfigError(
-            "a median takes every unit's value, and some units have assumed axes",
+            "crash.median-takes-every-unit-value",
             file=next(u.name for u in units if u.unmeasured is not None),
             quantity="units",
-            remedy="combine by weights, or leave out the units that lack an axis",
         )
     time = _common_stamps(units)
     at = [_at(u, time) for u in units]
@@ -151,11 +149,7 @@ def _common_stamps(units: Sequence[AtPoint]) -> Array:
     time = units[0].time
     time = time[(time >= first) & (time <= last)]
     if time.size < 2:
-        raise DataError(
-            f"the units share {time.size} samples",
-            quantity="units",
-            remedy="look whether their clocks agree",
-        )
+        raise DataError("crash.units-share-samples", quantity="units", size=time.size)
     return time
 
 

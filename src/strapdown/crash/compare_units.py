@@ -35,7 +35,7 @@ from strapdown.crash.unit_differences import (
     joint_covariance,
     velocity_increments,
 )
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -93,9 +93,7 @@ def compare_units(
     """
     if not (pieces >= 3 and 0.0 < level < 1.0):
         raise ConfigError(
-            f"{pieces} pieces at a level of {level:g}",
-            quantity="pieces, level",
-            remedy="give at least 3 pieces, and a probability between 0 and 1, as 0.001",
+            "crash.pieces-level", quantity="pieces, level", pieces=pieces, level=level
         )
     edges = common_edges(units, window, pieces)
     increments = [velocity_increments(u, edges) for u in units]
@@ -299,46 +297,45 @@ def _disagreement(
     row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
     share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
     return Finding(
-        f"it and {second.name} disagree at their common point: chi-square {chi:.4g} of {freedom} "
-        f"degrees of freedom, probability {share}; their delta-V differs most, for its bound, "
-        f"along {AXES[axis]} at {edges[row + 1]:.4g} s, by {curve[row + 1, axis]:+.3g} m/s with a "
-        f"stated standard deviation of {sd[row + 1, axis]:.2g} m/s",
+        "crash.disagree-their-common-point-chi",
         file=first.name,
         quantity="delta-V",
-        remedy="look at what follows on axes, mounting and positions; without such, one of them "
-        "rings or bends with its place, or states too small uncertainties",
+        name=second.name,
+        chi=chi,
+        freedom=freedom,
+        share=share,
+        axes=AXES[axis],
+        edges=edges[row + 1],
+        curve=curve[row + 1, axis],
+        sd=sd[row + 1, axis],
     )
 
 
 def _left_out(unit: AtPoint, edges: Array, cut: Flags) -> Finding:
     pieces = np.flatnonzero(cut)
     return Finding(
-        f"it was at the end of its range between {edges[pieces[0]]:.4g} and "
-        f"{edges[pieces[-1] + 1]:.4g} s: {pieces.size} of {cut.size} pieces of the record are left "
-        "out where it is compared with other units",
+        "crash.end-range-between-pieces-record",
         file=unit.name,
         quantity="comparison",
-        remedy="what was cut off is missing from its change of velocity, and no comparison can "
-        "show how much; believe a unit that was not at its end",
+        edges=edges[pieces[0]],
+        edges_2=edges[pieces[-1] + 1],
+        size=pieces.size,
+        size_2=cut.size,
     )
 
 
 def _nothing_whole(first: AtPoint, second: AtPoint) -> Finding:
     return Finding(
-        f"it and {second.name} have no piece of the record in which neither was at the end of its "
-        "range, and are not compared",
+        "crash.no-piece-record-neither-end",
         file=first.name,
         quantity="comparison",
-        remedy="compare them over another stretch (window), or by a unit of a wider range",
+        name=second.name,
     )
 
 
 def _nothing_in_common(first: AtPoint, second: AtPoint) -> Finding:
     return Finding(
-        f"it and {second.name} measure no axis in common, and are not compared",
-        file=first.name,
-        quantity="delta-V",
-        remedy="the mean of the units has each axis from the one that measures it",
+        "crash.measure-no-axis-common-not", file=first.name, quantity="delta-V", name=second.name
     )
 
 
@@ -351,11 +348,4 @@ def _odd_one(units: Sequence[AtPoint], pairs: Sequence[UnitPair]) -> list[Findin
     ]
     if len(odd) != 1:
         return []
-    return [
-        Finding(
-            "the others agree with one another and not with it",
-            file=odd[0],
-            quantity="delta-V",
-            remedy="leave it out, or combine by median",
-        )
-    ]
+    return [Finding("crash.others-agree-another-not", file=odd[0], quantity="delta-V")]

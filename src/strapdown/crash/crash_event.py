@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,5 @@ def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
     except (TypeError, ValueError):
         sds = np.empty(0)
     if sds.shape != (3,) or not (np.isfinite(sds).all() and (sds >= 0.0).all()):
-        raise ConfigError(
-            f"{given!r} is no standard deviation",
-            quantity=name,
-            remedy="give one number, or three (forward, right, down), in m/s²",
-        )
+        raise ConfigError("crash.no-standard-deviation", quantity=name, given=given)
     return float(sds[0]), float(sds[1])

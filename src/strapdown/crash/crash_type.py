@@ -13,7 +13,7 @@ from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.pdof import Pdof, pdof
 from strapdown.crash.pdof_interval import AngleInterval, pdof_interval
 from strapdown.crash.tipping import PASSENGER_CAR, RollMotion, TippingBody
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["BORDERS", "CrashType", "classify_crash", "classify_crashes", "side_of"]
 
@@ -140,11 +140,7 @@ def classify_crash(
     roll = None
     if time is not None or roll_rate is not None:
         if time is None or roll_rate is None:
-            raise ConfigError(
-                "rates need their stamps, and stamps their rates",
-                quantity="roll_rate",
-                remedy="give both time and roll_rate, or neither",
-            )
+            raise ConfigError("crash.rates-need-their-stamps-stamps", quantity="roll_rate")
         roll = body.roll_motion(
             time,
             roll_rate,
@@ -225,9 +221,10 @@ def classify_crashes(
     """
     if len(changes) != len(events) or (covariances is not None and len(covariances) != len(events)):
         raise ConfigError(
-            f"{len(changes)} changes of velocity for {len(events)} events",
+            "crash.changes-velocity-events",
             quantity="delta-V",
-            remedy="give one change, and one covariance or none at all, an event",
+            count=len(changes),
+            count_2=len(events),
         )
     types = []
     for k, event in enumerate(events):

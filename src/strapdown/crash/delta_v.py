@@ -13,7 +13,7 @@ from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.velocity_course import VelocityCourse
 from strapdown.crash.window_weights import check_within, window_weights
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
@@ -133,21 +133,19 @@ def delta_v(
     time, source = acceleration.time, acceleration.source
     check_within(time, start, end, source)
     if not end > start:
-        raise DataError(
-            f"the window from {start:.6g} to {end:.6g} s is empty",
-            file=source,
-            quantity="time",
-            remedy="let it end after it begins",
-        )
+        raise DataError("crash.window-empty", file=source, quantity="time", start=start, end=end)
     holes = [] if across_gaps else acceleration.gaps(start, end)
     if holes:
         raise DataError(
-            f"no sample for {holes[0].length * 1e3:.4g} ms between {holes[0].start:.6g} and "
-            f"{holes[0].end:.6g} s, within the window from {start:.6g} to {end:.6g} s",
+            "crash.no-sample-ms-between-within",
             file=source,
             row=holes[0].sample + 1,
             quantity="acceleration",
-            remedy="take another window or unit, or say across_gaps=True to bridge it by a line",
+            length=holes[0].length * 1000.0,
+            start=holes[0].start,
+            end=holes[0].end,
+            start_2=start,
+            end_2=end,
         )
     weights = window_weights(time, start, end, acceleration.sampling)
     course = VelocityCourse(acceleration)
@@ -220,9 +218,7 @@ def cumulative_delta_v(
         # A step that falls on the end but for rounding is the end.
         at = np.minimum(start + np.arange(int((end - start) / every + 1e-9) + 1) * every, end)
     else:
-        raise ConfigError(
-            f"{every:g} s is no step", quantity="every", remedy="give a positive one, as 0.010"
-        )
+        raise ConfigError("crash.no-step", quantity="every", every=every)
     course = VelocityCourse(acceleration)
     change = course.velocity(at) - course.velocity(np.array([start]))
     size = np.sqrt((change**2).sum(axis=1))
@@ -264,7 +260,7 @@ def trailing_delta_v(
         The record, or what was asked of it, is shorter than the window.
     """
     if not (math.isfinite(window) and window > 0.0):
-        raise ConfigError(f"{window:g} s is no window", quantity="window", remedy="give 0.030")
+        raise ConfigError("crash.no-window", quantity="window", window=window)
     time = acceleration.time
     # A record of just the window's length may lack a rounding of it.
     slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))
@@ -272,12 +268,14 @@ def trailing_delta_v(
     high = acceleration.end if end is None else min(end, acceleration.end)
     if low > high + slack:
         raise DataError(
-            f"a window of {window * 1e3:g} ms that ends between {low:.6g} and {high:.6g} s does "
-            f"not fit into the record, which has {acceleration.begin:.6g} to "
-            f"{acceleration.end:.6g} s",
+            "crash.window-ms-ends-between-does",
             file=acceleration.source,
             quantity="window",
-            remedy="take a shorter window or a longer record",
+            window=window * 1000.0,
+            low=low,
+            high=high,
+            begin=acceleration.begin,
+            end=acceleration.end,
         )
     high = max(low, high)
     course = VelocityCourse(acceleration)

@@ -15,7 +15,7 @@ from strapdown.crash.by_contributor import NOISE, by_contributor
 from strapdown.crash.leg import ATTITUDE, VELOCITY
 from strapdown.crash.path import CrashPath
 from strapdown.crash.sample_effects import SampleEffects
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.rotation import cross_matrix
 
 Array = NDArray[np.float64]
@@ -130,9 +130,12 @@ def resolved_delta_v_bound(
     low, high = path.time[0] - 1e-9, path.time[-1] + 1e-9
     if not (low <= start < end <= high):
         raise DataError(
-            f"the window from {start:g} s to {end:g} s is not within the path",
+            "crash.window-not-within-path",
             quantity="window",
-            remedy=f"choose instants from {path.time[0]:.6g} s to {path.time[-1]:.6g} s",
+            start=start,
+            end=end,
+            time=path.time[0],
+            time_2=path.time[-1],
         )
     velocity = path.errors[:, :, VELOCITY]
     each = _at(path.time, velocity, end) - _at(path.time, velocity, start)
@@ -193,9 +196,5 @@ def _direction(given: ArrayLike) -> Array:
     d = np.asarray(given, dtype=np.float64)
     size = float(np.sqrt(d @ d)) if d.shape == (3,) else 0.0
     if not (math.isfinite(size) and size > 0.0):
-        raise DataError(
-            f"{d.tolist()} has no length, or not three components",
-            quantity="direction",
-            remedy="give three finite components that are not all zero",
-        )
+        raise DataError("crash.no-length-or-not-three", quantity="direction", d=d.tolist())
     return np.asarray(d / size)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_numbers import finite, triple
 
 Array = NDArray[np.float64]
@@ -73,9 +73,10 @@ class Entry:
         for name, unit in NUMBERS:
             if not finite(getattr(self, name)):
                 raise ConfigError(
-                    f"{getattr(self, name)!r} is no number",
+                    "crash.no-number",
                     quantity=f"entry, {name}",
-                    remedy=f"give one finite number in {unit}",
+                    value=getattr(self, name),
+                    unit=unit,
                 )
 
     @classmethod
@@ -126,21 +127,13 @@ class Entry:
         }
         for name, value in numbers.items():
             if not finite(value) or (value < 0.0 and name.split("_deg")[0].endswith("sd")):
-                raise ConfigError(
-                    f"{value!r} is not possible",
-                    quantity=f"entry, {name}",
-                    remedy="give a finite number, and a standard deviation of zero or more",
-                )
+                raise ConfigError("crash.not-possible", quantity=f"entry, {name}", value=value)
         if abs(speed) > 150.0:
-            raise ConfigError(
-                f"{speed:g} m/s is no speed of a road vehicle",
-                quantity="entry, speed",
-                remedy="give it in m/s: km/h divided by 3.6",
-            )
+            raise ConfigError("crash.no-speed-road-vehicle", quantity="entry, speed", speed=speed)
         for name in others:
             if name not in OTHERS:
                 raise ConfigError(
-                    f"an entry has no '{name}'", quantity="entry", remedy=nearest(name, OTHERS)
+                    "crash.entry-no", quantity="entry", name=name, word=name, known=OTHERS
                 )
         course = math.radians(heading_deg + slip_deg)
         along = (math.cos(course), math.sin(course), 0.0)
@@ -191,18 +184,10 @@ class Entry:
         """
         given = np.asarray(covariance, dtype=np.float64)
         if given.shape != (6, 6) or not np.allclose(given, given.T, rtol=1e-9, atol=0.0):
-            raise ConfigError(
-                "it is no symmetric matrix of 6 x 6",
-                quantity="covariance",
-                remedy="give that of attitude (rad) and velocity (m/s), in this order",
-            )
+            raise ConfigError("crash.no-symmetric-matrix-x", quantity="covariance")
         values, vectors = np.linalg.eigh(given)
         if values[0] < -1e-9 * values[-1]:
-            raise ConfigError(
-                f"it has an eigenvalue of {values[0]:.3g}",
-                quantity="covariance",
-                remedy="give a covariance: no direction can be known better than exactly",
-            )
+            raise ConfigError("crash.eigenvalue", quantity="covariance", values=values[0])
         columns = vectors * np.sqrt(np.maximum(values, 0.0))
         roll, pitch, heading = triple(roll_pitch_heading, "roll_pitch_heading", "give deg")
         north, east, down = triple(velocity, "velocity", "give north, east, down in m/s")

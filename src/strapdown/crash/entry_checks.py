@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.crash.entry_estimate import Fixes
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables import ACCEL, POSITION_SD, VELOCITY_SD, check_gnss, check_imu
 from strapdown.tables.checks import index_of, values_of
 
@@ -33,49 +33,37 @@ def check_arguments(
     check_gnss(gnss)
     if ACCEL[0] not in imu.columns:
         raise DataError(
-            "there is no accelerometer: nothing carries the velocity from fix to fix",
+            "crash.no-accelerometer-nothing-carries-velocity",
             file=imu.attrs.get("source"),
             quantity="accel",
-            remedy="give an Imu table with the specific force in vehicle axes",
         )
     if not (math.isfinite(impact) and math.isfinite(anchor) and anchor <= impact):
-        raise ConfigError(
-            f"an anchor at {anchor:g} s, with the impact at {impact:g} s",
-            quantity="anchor",
-            remedy="give the instant of the impact in s, and an anchor not after it",
-        )
+        raise ConfigError("crash.anchor-impact", quantity="anchor", anchor=anchor, impact=impact)
     if not 1.0 <= window <= LONGEST_WINDOW:
         raise ConfigError(
-            f"a window of {window:g} s",
-            quantity="window",
-            remedy=f"use 1 to {LONGEST_WINDOW:g} s: beyond, the sensitivities lose their meaning",
+            "crash.window", quantity="window", window=window, longest_window=LONGEST_WINDOW
         )
     if len(antenna) != 3 or not all(math.isfinite(x) for x in antenna):
-        raise ConfigError(
-            f"{antenna!r} are not three finite numbers",
-            quantity="antenna",
-            remedy="give forward, right, down from the reference point, in m",
-        )
+        raise ConfigError("crash.not-three-finite-numbers-2", quantity="antenna", antenna=antenna)
     sensed = index_of(imu)
     step = float(np.median(np.diff(sensed)))
     if not sensed[0] < anchor <= sensed[-1] + step:
         raise DataError(
-            f"it goes from {sensed[0]:.6g} s to {sensed[-1]:.6g} s, and the anchor is at "
-            f"{anchor:.6g} s",
+            "crash.goes-anchor",
             file=imu.attrs.get("source"),
             quantity="time",
-            remedy="give a record that reaches from before the fixes to the impact, on the same "
-            "clock as the impact",
+            sensed=sensed[0],
+            sensed_2=sensed[-1],
+            anchor=anchor,
         )
     sd = values_of(gnss, [*POSITION_SD, *VELOCITY_SD])
     if (sd == 0.0).any():
         row, column = (int(i) for i in np.argwhere(sd == 0.0)[0])
         raise DataError(
-            "a standard deviation of zero: nothing is measured exactly",
+            "crash.standard-deviation-zero-nothing-measured",
             file=gnss.attrs.get("source"),
             row=row + 1,
             quantity=[*POSITION_SD, *VELOCITY_SD][column],
-            remedy="give what the receiver is good for, and inf where it does not measure it",
         )
 
 
@@ -89,10 +77,13 @@ def check_enough(fixes: Fixes, why: list[str], source: str | None) -> None:
     reasons = Counter(w.split(" of ")[0] for w in why if w)
     told = "; ".join(f"{count} {what}" for what, count in reasons.items()) or "none was refused"
     raise DataError(
-        f"{len(fixes.instants)} fixes over {span:.3g} s are left before the impact, {placed} of "
-        f"them with a place; not used: {told}",
+        "crash.fixes-over-left-before-impact",
         file=source,
         quantity="fixes",
-        remedy=f"at least {LEAST_FIXES} with a place over {LEAST_SPAN:g} s are needed: use a "
-        "longer window, or take the entry speed from elsewhere",
+        count=len(fixes.instants),
+        span=span,
+        placed=placed,
+        told=told,
+        least_fixes=LEAST_FIXES,
+        least_span=LEAST_SPAN,
     )

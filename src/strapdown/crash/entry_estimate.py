@@ -21,7 +21,7 @@ from strapdown.crash.entry_sensitivity import (
 )
 from strapdown.crash.entry_state import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import DivergenceError
+from strapdown.errors import DivergenceError
 from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
@@ -140,11 +140,10 @@ def estimate(
         if search.take(step) and not changed:
             return search.result(weights, iteration)
     raise DivergenceError(
-        f"the search for the entry state has not come to rest in {MOST_ITERATIONS} iterations",
+        "crash.search-entry-state-not-come",
         file=imu.attrs.get("source"),
         quantity="entry state",
-        remedy="look at the fixes (units, sd), the axes of the Imu table (-9.8 on z "
-        "at level rest), and whether both tables have the same clock",
+        most_iterations=MOST_ITERATIONS,
     )
 
 

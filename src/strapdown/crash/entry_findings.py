@@ -9,7 +9,7 @@ import pandas as pd
 
 from strapdown.crash.entry_estimate import Estimate
 from strapdown.crash.entry_priors import EntryPriors
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 # A heading that is known less well is told.
 WIDE_HEADING = 5.0  # deg
@@ -39,67 +39,57 @@ def findings(
     if len(refused):
         found.append(
             Finding(
-                f"{len(refused)} fixes before the impact are not believed; the first, at "
-                f"{refused.index[0]:.6g} s: {refused['why'].iloc[0]}",
+                "crash.fixes-before-impact-not-believed",
                 file=source,
                 quantity="fixes",
-                remedy="look at EntryState.fixes; a receiver is not believed under such motion",
+                count=len(refused),
+                index=refused.index[0],
+                iloc=refused["why"].iloc[0],
             )
         )
     lower = record[record["used"] & (record["why"] != "")]
     if len(lower):
         found.append(
             Finding(
-                f"{len(lower)} fixes have less weight or none; the first, at "
-                f"{lower.index[0]:.6g} s: {lower['why'].iloc[0]}",
+                "crash.fixes-less-weight-or-none",
                 file=source,
                 quantity="fixes",
-                remedy="look at EntryState.fixes; reflections from buildings make such fixes",
+                count=len(lower),
+                index=lower.index[0],
+                iloc=lower["why"].iloc[0],
             )
         )
     used = record.index[record["used"]]
     if impact - used[-1] > 2.0:
         found.append(
             Finding(
-                f"the last fix that is used is {impact - used[-1]:.3g} s before the anchor: the "
-                "inertial sensors alone carry the state from there",
+                "crash.last-fix-used-before-anchor",
                 file=source,
                 quantity="fixes",
-                remedy="nothing, if this is expected: the standard deviations have grown with it",
+                impact=impact - used[-1],
             )
         )
     if priors.side_slip_sd_deg is not None and not best.slip_fixes:
-        found.append(
-            Finding(
-                "the side slip was not used: at no fix is the vehicle faster than 3 m/s and nearly "
-                "straight",
-                file=source,
-                quantity="heading",
-                remedy="use a longer window, or a heading from elsewhere",
-            )
-        )
+        found.append(Finding("crash.side-slip-not-used-no", file=source, quantity="heading"))
     heading_sd = math.degrees(math.sqrt(best.covariance[8, 8]))
     if heading_sd > WIDE_HEADING:
         found.append(
             Finding(
-                f"the heading is known to {min(heading_sd, 180.0):.3g} deg only: in this drive the "
-                "vehicle hardly speeds up, brakes or turns",
+                "crash.heading-known-only-drive-vehicle",
                 file=source,
                 quantity="heading",
-                remedy="if it travels along its axis, say so (side_slip_sd_deg); give a heading "
-                "from elsewhere; or use a longer window",
+                heading_sd=min(heading_sd, 180.0),
             )
         )
     if unlikely(best.chi_square, best.degrees_of_freedom):
         found.append(
             Finding(
-                f"the fixes fit worse than their standard deviations say: chi-square "
-                f"{best.chi_square:.4g} of {best.degrees_of_freedom} degrees of freedom",
+                "crash.fixes-fit-worse-than-their",
                 file=source,
                 quantity="fixes",
-                remedy="the covariance is too small by up to "
-                f"{best.chi_square / best.degrees_of_freedom:.3g}: look for a wrong antenna, time "
-                "offset or axes, vibration, or a receiver that claims too much",
+                chi_square=best.chi_square,
+                degrees_of_freedom=best.degrees_of_freedom,
+                chi_square_2=best.chi_square / best.degrees_of_freedom,
             )
         )
     return found

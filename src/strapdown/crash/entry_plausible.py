@@ -9,7 +9,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.events import CrashEvents
 from strapdown.crash.leg import VELOCITY
 from strapdown.crash.path import CrashPath, reconstruct_path
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.mechanization import NorthEastDown
 
 __all__ = ["check_standing", "entry_findings"]
@@ -31,12 +31,11 @@ def check_standing(at_point: AtPoint, entry: Entry | None) -> None:
     rest = at_point.rest
     if entry is None and rest is not None and rest.grade == "steady":
         raise DataError(
-            f"nothing says how fast the vehicle was: it is quiet from {rest.start:.4g} s to "
-            f"{rest.end:.4g} s, and a constant velocity is as quiet as a rest",
+            "crash.nothing-says-how-fast-vehicle",
             file=at_point.name,
             quantity="entry",
-            remedy="give Entry.from_speed(speed, sd) in m/s; or, for a vehicle that stood until "
-            "it was struck, preparation={'moving_at_impact': False}",
+            start=rest.start,
+            end=rest.end,
         )
 
 
@@ -67,12 +66,12 @@ def entry_findings(
         first = events.events[0].time_zero
         found.append(
             Finding(
-                f"it is stated for {entry.time:.4g} s, and the crash began "
-                f"{1e3 * (entry.time - first):.4g} ms before, at {first:.4g} s",
+                "crash.stated-crash-began-ms-before",
                 file=at_point.name,
                 quantity="entry",
-                remedy=f"if it is the speed before the crash, give it with time={first:.3f}, and a "
-                "rest that ends before that; if the trigger is late, correct it",
+                time=entry.time,
+                time_2=1000.0 * (entry.time - first),
+                first=first,
             )
         )
         # Its speed need not be that at the beginning.
@@ -95,13 +94,15 @@ def entry_findings(
     if abs(speed - felt) > SIGMAS * float(np.hypot(sd, felt_sd)):
         found.append(
             Finding(
-                f"it is {speed:.4g} ± {1.96 * sd:.2g} m/s at {entry.time:.4g} s, and from the "
-                f"rest until {rest.end:.4g} s the record itself comes to {felt:.4g} ± "
-                f"{1.96 * felt_sd:.2g} m/s",
+                "crash.rest-until-record-itself-comes",
                 file=at_point.name,
                 quantity="entry speed",
-                remedy="give it in m/s: km/h divided by 3.6, mph times 0.44704; else check the "
-                "rest, the scale factors and the range of the accelerometers",
+                speed=speed,
+                sd=1.96 * sd,
+                time=entry.time,
+                end=rest.end,
+                felt=felt,
+                felt_sd=1.96 * felt_sd,
             )
         )
     return found
@@ -120,13 +121,13 @@ def _slope(at_point: AtPoint, entry: Entry, path: CrashPath) -> list[Finding]:
         return []
     return [
         Finding(
-            f"its vertical velocity is {0.0 - along[2]:.3g} m/s upward, and the vehicle points "
-            f"{pitch:+.1f} deg up from level at {entry.time:.4g} s: along it, that would be "
-            f"{climbs - along[2]:.3g} m/s",
+            "crash.vertical-velocity-upward-vehicle-points",
             file=at_point.name,
             quantity="entry",
-            remedy="on a slope, give Entry(time, velocity=(north, east, down), heading_deg) or, "
-            "with Entry.from_speed, climb_sd; else check the levelling",
+            along=0.0 - along[2],
+            pitch=pitch,
+            time=entry.time,
+            climbs=climbs - along[2],
         )
     ]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 
 def _positive(value: float, name: str, kind: str) -> None:
     if not (math.isfinite(value) and value > 0.0):
-        raise ConfigError(f"{value} is no {kind[2:]}", quantity=name, remedy="give more than zero")
+        raise ConfigError("crash.no", quantity=name, value=value, kind=kind[2:])
 
 
 @dataclass(frozen=True)
@@ -38,9 +38,7 @@ class FixCorrelation:
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.share <= 1.0:
-            raise ConfigError(
-                f"{self.share} is no share", quantity="share", remedy="give a number from 0 to 1"
-            )
+            raise ConfigError("crash.no-share", quantity="share", share=self.share)
         _positive(self.time, "time", "a correlation time")
 
 
@@ -98,28 +96,23 @@ class EntryPriors:
     def __post_init__(self) -> None:
         if (self.heading_deg is None) != (self.heading_sd_deg is None):
             raise ConfigError(
-                "a heading is worth something only with its standard deviation",
+                "crash.heading-worth-something-only-standard",
                 quantity="heading_deg, heading_sd_deg",
-                remedy="give both, or neither",
             )
         for name in ("roll_deg", "pitch_deg", "heading_deg", "time_offset"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
-                raise ConfigError(
-                    f"not a finite number ({value})", quantity=name, remedy="give a number"
-                )
+                raise ConfigError("crash.not-finite-number", quantity=name, value=value)
         for name in ("tilt_sd_deg", "heading_sd_deg", "side_slip_sd_deg"):
             if getattr(self, name) is not None:
                 _positive(getattr(self, name), name, "a standard deviation")
         for name in ("antenna_sd", "time_offset_sd"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError(
-                    f"{value} is no standard deviation", quantity=name, remedy="give zero or more"
-                )
+                raise ConfigError("crash.no-standard-deviation-2", quantity=name, value=value)
         if len(self.no_slip_point) != 3 or not all(map(math.isfinite, self.no_slip_point)):
             raise ConfigError(
-                f"{self.no_slip_point!r} are not three finite numbers",
+                "crash.not-three-finite-numbers-3",
                 quantity="no_slip_point",
-                remedy="give forward, right, down in m",
+                no_slip_point=self.no_slip_point,
             )

@@ -12,8 +12,8 @@ from strapdown.crash.entry_estimate import Fixes
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_sensitivity import between
 from strapdown.ellipsoids import WGS84
+from strapdown.errors import Finding
 from strapdown.evaluation.control_points import rigid_fit
-from strapdown.exceptions import Finding
 from strapdown.frames import geodetic_from_ned, place_difference
 from strapdown.mechanization import NavigationRun
 from strapdown.nav_state import NavState
@@ -68,13 +68,7 @@ def first_guesses(
             headings.append(by_change)
         if speed < LEAST_SPEED:
             findings.append(
-                Finding(
-                    f"the fixes before the anchor say {speed:.3g} m/s: too slow for a heading from "
-                    "the direction of travel",
-                    quantity="heading",
-                    remedy="give a heading from elsewhere (heading_deg, heading_sd_deg), or a "
-                    "longer window in which the vehicle moves",
-                )
+                Finding("crash.fixes-before-anchor-say-too", quantity="heading", speed=speed)
             )
     guesses = [
         NavState.from_degrees(

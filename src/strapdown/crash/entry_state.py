@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.crash.angle_rates import angles_sd
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.nav_state import NavState
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from strapdown._kernels import crash_events as kernel
 from strapdown._kernels import window_change as rows
 from strapdown.crash.crash_event import CrashEvent, two_sds
 from strapdown.crash.event_rule import PART_563, EventRule
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables.imu import SAMPLINGS
 
 Array = NDArray[np.float64]
@@ -61,10 +61,11 @@ class EventDetector:
     ) -> None:
         if sampling not in SAMPLINGS:
             raise ConfigError(
-                f"'{sampling}' is no kind of sampling",
+                "crash.no-kind-sampling",
                 file=source,
                 quantity="sampling",
-                remedy=f"use {' or '.join(SAMPLINGS)}",
+                sampling=sampling,
+                samplings=SAMPLINGS,
             )
         options = np.zeros(kernel.OPTIONS)
         options[kernel.MEAN] = float(sampling == "mean")
@@ -203,30 +204,32 @@ class EventDetector:
     def _check(self, time: Array, accel: Array) -> None:
         if time.ndim != 1 or accel.shape != (len(time), 3):
             raise DataError(
-                f"stamps of shape {time.shape} and accelerations of shape {accel.shape}",
+                "crash.stamps-shape-accelerations-shape",
                 file=self._source,
                 row=self.samples + 1,
                 quantity="acceleration",
-                remedy="pass one stamp and three components a sample",
+                shape=time.shape,
+                shape_2=accel.shape,
             )
         bad = np.flatnonzero(~(np.isfinite(time) & np.isfinite(accel).all(axis=1)))
         if bad.size:
             raise DataError(
-                f"time {time[bad[0]]}, acceleration {accel[bad[0]].tolist()}: not finite",
+                "crash.time-acceleration-not-finite",
                 file=self._source,
                 row=self.samples + int(bad[0]) + 1,
                 quantity="acceleration",
-                remedy="leave the sample out",
+                time=time[bad[0]],
+                accel=accel[bad[0]].tolist(),
             )
         last = self._rows[self._held - 1, rows.T] if self._held else -math.inf
         back = np.flatnonzero(np.diff(time, prepend=last) <= 0.0)
         if back.size:
             raise DataError(
-                f"time does not advance: {time[back[0]]:.9g} s is not after the sample before",
+                "crash.time-does-not-advance-not",
                 file=self._source,
                 row=self.samples + int(back[0]) + 1,
                 quantity="time",
-                remedy="leave the sample out; the detector is as before it",
+                time=time[back[0]],
             )
 
     def _make_room(self, more: int) -> None:

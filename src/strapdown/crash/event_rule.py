@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 #: km/h in m/s.
 KMH = 1.0 / 3.6
@@ -82,22 +82,20 @@ class EventRule:
                 continue
             least = 0.0 if f.name == "quiet" else math.ulp(0.0)
             if not (math.isfinite(value) and value >= least):
-                raise ConfigError(
-                    f"{value:g} is no threshold or window",
-                    quantity=f.name,
-                    remedy="give a positive number, or leave it out for that of 49 CFR 563",
-                )
+                raise ConfigError("crash.no-threshold-or-window", quantity=f.name, value=value)
         if self.zero_at not in ZERO_AT:
             raise ConfigError(
-                f"'{self.zero_at}' is no place of time zero",
+                "crash.no-place-time-zero",
                 quantity="zero_at",
-                remedy=nearest(self.zero_at, ZERO_AT),
+                zero_at=self.zero_at,
+                word=self.zero_at,
+                known=ZERO_AT,
             )
         if max(self.wake_window, self.lateral_window) >= self.trigger_window:
             raise ConfigError(
-                f"{self.trigger_window:g} s is not longer than the windows of time zero",
+                "crash.not-longer-than-windows-time",
                 quantity="trigger_window",
-                remedy="give a longer one, or leave it out for the 0.150 s of 49 CFR 563",
+                trigger_window=self.trigger_window,
             )
 
 

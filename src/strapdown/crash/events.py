@@ -10,7 +10,7 @@ from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.crash_event import CrashEvent
 from strapdown.crash.event_detector import EventDetector
 from strapdown.crash.event_rule import KMH, PART_563, EventRule
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 
 __all__ = ["PART_563", "CrashEvent", "CrashEvents", "EventDetector", "EventRule", "detect_events"]
 
@@ -57,10 +57,11 @@ class CrashEvents:
         if not self.events:
             finding = self.findings[-1]
             raise DataError(
-                finding.what,
+                "crash.message",
                 file=finding.file,
                 quantity=finding.quantity,
-                remedy=finding.remedy,
+                message=finding.what,
+                remedy_text=finding.remedy,
             )
         return self.events[0]
 
@@ -127,12 +128,7 @@ def detect_events(
     """
     source = acceleration.source
     if acceleration.frame == "ned":
-        raise ConfigError(
-            "the record is in north-east-down, and an event is told forward and right",
-            file=source,
-            quantity="frame",
-            remedy="turn it with Acceleration.along(heading at the impact)",
-        )
+        raise ConfigError("crash.record-north-east-down-event", file=source, quantity="frame")
     detector = EventDetector(
         rule, sampling=acceleration.sampling, noise=noise, bias_sd=bias_sd, source=source
     )
@@ -154,38 +150,36 @@ def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) ->
     if event.starts_before_record:
         found.append(
             Finding(
-                f"the record begins in the event: {rule.wake / KMH:g} km/h are reached "
-                f"{event.woken - acceleration.begin:.4f} s after its first sample at "
-                f"{acceleration.begin:.6g} s, so that time zero and all changes of velocity count "
-                "from there and are too small",
+                "crash.record-begins-event-km-h",
                 file=source,
                 quantity="time zero",
-                remedy="use a record that begins at least 20 ms before the impact, or state the "
-                "velocity at which this one begins",
+                wake=rule.wake / KMH,
+                woken=event.woken - acceleration.begin,
+                begin=acceleration.begin,
             )
         )
     if event.lasts_beyond_record:
         found.append(
             Finding(
-                f"the record ends at {acceleration.end:.6g} s, "
-                f"{acceleration.end - event.time_zero:.4f} s after time zero, while the velocity "
-                f"still changes by more than {rule.wake / KMH:g} km/h within "
-                f"{rule.wake_window * 1e3:g} ms",
+                "crash.record-ends-after-time-zero",
                 file=source,
                 quantity="end of event",
-                remedy="take its delta-V for that up to the end of the record",
+                end=acceleration.end,
+                end_2=acceleration.end - event.time_zero,
+                wake=rule.wake / KMH,
+                wake_window=rule.wake_window * 1000.0,
             )
         )
     for gap in acceleration.gaps(event.time_zero, event.end):
         found.append(
             Finding(
-                f"no sample for {gap.length * 1e3:.4g} ms within the event, from {gap.start:.6g} "
-                f"to {gap.end:.6g} s; it was bridged by a straight line",
+                "crash.no-sample-ms-within-event",
                 file=source,
                 row=gap.sample + 1,
                 quantity="acceleration",
-                remedy="use another unit's record for this event, or distrust its delta-V by the "
-                "acceleration beside the gap times its length",
+                length=gap.length * 1000.0,
+                start=gap.start,
+                end=gap.end,
             )
         )
     return found
@@ -211,4 +205,10 @@ def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
         often = "once" if detector.woken == 1 else f"{detector.woken} times"
         what += f"; it changed by more than {rule.wake / KMH:g} km/h in "
         what += f"{rule.wake_window * 1e3:g} ms {often}, and not for long"
-    return Finding(what, file=acceleration.source, quantity="delta-V", remedy=remedy)
+    return Finding(
+        "crash.message",
+        file=acceleration.source,
+        quantity="delta-V",
+        message=what,
+        remedy_text=remedy,
+    )

@@ -15,7 +15,7 @@ from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_start import first_guesses
 from strapdown.crash.entry_state import EntryState
 from strapdown.crash.entry_trust import AVERAGED, RECOVERY, judge_fixes, record_of_fixes
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
@@ -114,12 +114,11 @@ def entry_state_from_gnss(
     reached = later & (instants <= sensed[last])
     if not reached.any():
         raise DataError(
-            f"there is no fix from {begin:.6g} s to {sensed[last]:.6g} s, between the beginning of "
-            "the window and the anchor",
+            "crash.no-fix-between-beginning-window",
             file=source,
             quantity="time",
-            remedy="use a longer window or an earlier anchor, or check that both tables have the "
-            "same clock",
+            begin=begin,
+            sensed=sensed[last],
         )
     first = float(instants[reached][0])
     piece = _between(imu, first, last)

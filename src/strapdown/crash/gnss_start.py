@@ -14,7 +14,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.entry_priors import EntryPriors
 from strapdown.crash.entry_state import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, VELOCITY, EntryState
 from strapdown.crash.gnss_entry import entry_state_from_gnss
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.borrowed_gyro import turned_uncertainty
 from strapdown.sensors.triad_numbers import finite, triple
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -62,18 +62,18 @@ class GnssEntry:
         for name in ("impact", "window", "before"):
             if not finite(getattr(self, name)):
                 raise ConfigError(
-                    f"{getattr(self, name)!r} is no number",
-                    quantity=f"GNSS entry, {name}",
-                    remedy="give one finite number in s, or leave it out",
+                    "crash.no-number-2", quantity=f"GNSS entry, {name}", value=getattr(self, name)
                 )
         how = "give forward, right, down in m from the vehicle's origin"
         triple(self.antenna, "GNSS entry, antenna", how)
         for name in self.priors:
             if name not in OTHER_PRIORS:
                 raise ConfigError(
-                    f"there is no prior {name!r}",
+                    "crash.no-prior",
                     quantity="GNSS entry, priors",
-                    remedy=nearest(str(name), OTHER_PRIORS),
+                    name=name,
+                    word=str(name),
+                    known=OTHER_PRIORS,
                 )
         EntryPriors(gyro=TriadUncertainty(), accel=TriadUncertainty(), **self.priors)
 
@@ -109,20 +109,13 @@ def start_from_gnss(
     """
     unit = None if at.prepared is None else at.prepared.unit
     if unit is None or unit.gyro is None:
-        raise DataError(
-            "a mean of several units has no sensors of its own whose errors a receiver could show",
-            file=at.name,
-            quantity="entry",
-            remedy="let each unit find its entry, and state that of the mean",
-        )
+        raise DataError("crash.mean-several-units-no-sensors", file=at.name, quantity="entry")
     if at.assumed_axes:
         raise DataError(
-            f"its {', '.join(at.assumed_axes)} is assumed and not measured: nothing carries the "
-            "velocity from fix to fix",
+            "crash.assumed-not-measured-nothing-carries",
             file=at.name,
             quantity="entry",
-            remedy="give Entry.from_speed(speed, sd) in m/s, or borrow what is missing from "
-            "another unit",
+            assumed_axes=at.assumed_axes,
         )
     C_vs = unit.mounting.C_vs
     anchor = given.impact - given.before

@@ -14,7 +14,7 @@ from strapdown._kernels.error_growth import grow_errors, grow_noise
 from strapdown._kernels.ned import ROW, Q, V, reverse_increments
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import DivergenceError
+from strapdown.errors import DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
@@ -165,10 +165,10 @@ def make_leg(
     made, _ = mechanization.advance_rows(own, increments, np.empty(0), earth, nominal[1:])
     if made < steps:
         raise DivergenceError(
-            f"the path leaves what a vehicle can do at {time[made]:.6g} s",
+            "crash.path-leaves-vehicle-can-do",
             file=imu.attrs.get("source"),
             quantity="path",
-            remedy="check the unit of the specific force (m/s²) and of the rates (rad/s)",
+            time=time[made],
         )
     return Leg(
         backward,

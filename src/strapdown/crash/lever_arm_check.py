@@ -13,7 +13,7 @@ from strapdown.crash.unit_differences import (
     difference_covariance,
     floored,
 )
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 
@@ -123,14 +123,17 @@ def lever_arm_findings(
         d = check.directions[:, k] * np.sign(along[k])
         found.append(
             Finding(
-                f"in the direction ({d[0]:+.2f}, {d[1]:+.2f}, {d[2]:+.2f}) it is "
-                f"{float(d @ stated) + abs(float(along[k])):.3f} ± {check.sd[k]:.3f} m from "
-                f"{second} by their forces, and {float(d @ stated):.3f} ± {stated_sd:.3f} m as "
-                "stated",
+                "crash.direction-their-forces-stated",
                 file=first,
                 quantity="position",
-                remedy="measure both places again, from one origin and with one sign convention: "
-                "forward, right, down",
+                d=d[0],
+                d_2=d[1],
+                d_3=d[2],
+                d_4=float(d @ stated) + abs(float(along[k])),
+                sd=check.sd[k],
+                second=second,
+                d_5=float(d @ stated),
+                stated_sd=stated_sd,
             )
         )
     return found

@@ -15,7 +15,7 @@ from strapdown.crash.unit_differences import (
     difference_covariance,
     floored,
 )
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 
@@ -187,13 +187,16 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
         have = "have" if who.endswith("s") else "has"
         found.append(
             Finding(
-                f"{who} {have} other axes than stated: {', '.join(moved)} "
-                f"({math.sqrt(lead):.0f} standard deviations better){doubt}",
+                "crash.other-axes-than-stated-standard"
+                if who == "the unit"
+                else "crash.other-axes-than-stated-standard-2",
                 file=second,
                 quantity="axes",
-                remedy="correct the mounting angles"
-                if who == "the unit"
-                else "swap or invert the columns of that triad, or the other unit's",
+                who=who,
+                have=have,
+                moved=moved,
+                sqrt=math.sqrt(lead),
+                doubt=doubt,
             )
         )
     return found

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown._kernels.perturbed_runs import perturbed_runs
 from strapdown.crash.leg import VELOCITY
 from strapdown.crash.path import CrashPath
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -142,24 +142,12 @@ def sample_paths(
 
 def _check(path: object, runs: object, seed: object, workers: object) -> None:
     if not isinstance(path, CrashPath):
-        raise ConfigError(
-            f"this is of kind {type(path).__name__}",
-            quantity="path",
-            remedy="give the path of a unit: crash.main.path of what reconstruct_crash returned",
-        )
+        raise ConfigError("crash.kind", quantity="path", name=type(path).__name__)
     if not _is_whole(runs, 2, MOST_RUNS):
-        raise ConfigError(
-            f"{runs!r} runs",
-            quantity="runs",
-            remedy=f"use 2 to {MOST_RUNS}; 10 000 know a standard deviation to 0.7 %",
-        )
+        raise ConfigError("crash.runs", quantity="runs", runs=runs, most_runs=MOST_RUNS)
     for name, given, least in (("seed", seed, 0), ("workers", workers, 1)):
         if not (_is_whole(given, least) or (name == "workers" and given is None)):
-            raise ConfigError(
-                f"{given!r} is none",
-                quantity=name,
-                remedy=f"give a whole number of {least} or more",
-            )
+            raise ConfigError("crash.none", quantity=name, given=given, least=least)
 
 
 def _is_whole(given: object, least: int, most: float = math.inf) -> bool:

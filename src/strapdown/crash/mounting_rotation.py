@@ -14,7 +14,7 @@ from strapdown.crash.unit_differences import (
     difference_covariance,
     floored,
 )
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 
@@ -163,12 +163,16 @@ def rotation_findings(
     sd = found.sd_deg
     return [
         Finding(
-            f"it is turned against {first} by {x:+.2f}, {y:+.2f}, {z:+.2f} deg about forward, "
-            f"right, down (± {sd[0]:.2f}, {sd[1]:.2f}, {sd[2]:.2f}), more than the stated "
-            f"{np.degrees(stated_sd):.2g} deg between them",
+            "crash.turned-against-about-forward-right",
             file=second,
             quantity="mounting angles",
-            remedy="look how the two are fixed, and correct the angles of the one that is turned; "
-            "structure that bends between them looks the same",
+            first=first,
+            x=x,
+            y=y,
+            z=z,
+            sd=sd[0],
+            sd_2=sd[1],
+            sd_3=sd[2],
+            stated_sd_deg=np.degrees(stated_sd),
         )
     ]

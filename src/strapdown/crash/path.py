@@ -22,7 +22,7 @@ from strapdown.crash.reconstruction_summary import path_line
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
 from strapdown.sensors.prepared_unit import Levelling
@@ -115,11 +115,7 @@ class CrashPath:
             There is no such sample.
         """
         if not -len(self.time) <= row < len(self.time):
-            raise ConfigError(
-                f"there is no sample {row}",
-                quantity="row",
-                remedy=f"the path has {len(self.time)} samples, counted from 0, or back from -1",
-            )
+            raise ConfigError("crash.no-sample", quantity="row", at_row=row, count=len(self.time))
         noise = {NOISE: np.diagonal(self.noise_covariance[row])}
         return by_contributor(self.errors[:, row] ** 2, ERROR, self.contributors, noise)
 
@@ -270,19 +266,17 @@ def _carried(
     at = anchor if level_time is None else int(np.searchsorted(time, level_time - 1e-9))
     if at > anchor:
         raise DataError(
-            f"the vehicle was levelled at {level_time:.6g} s, after the entry at "
-            f"{time[anchor]:.6g} s",
+            "crash.vehicle-levelled-after-entry",
             file=imu.attrs.get("source"),
             quantity="entry",
-            remedy="tie the path to an instant after the stationary stretch",
+            level_time=level_time,
+            time=time[anchor],
         )
     if entry is None and level_time is None:
         raise DataError(
-            "nothing says how fast the vehicle was",
+            "crash.nothing-says-how-fast-vehicle-2",
             file=imu.attrs.get("source"),
             quantity="entry speed",
-            remedy="give the entry speed with its standard deviation, or a record that begins "
-            "with the vehicle at rest",
         )
     still = replace(origin, velocity=(0.0, 0.0, 0.0), heading_deg=0.0)
     begin = _state(still, levelling.roll_deg, levelling.pitch_deg, float(time[at]))

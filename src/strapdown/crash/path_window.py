@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -42,20 +42,21 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
     slack = 1e-9 + 0.5 * float(np.median(np.diff(time))) if len(time) > 1 else 0.0
     if not time[0] - slack <= at <= time[-1] + slack:
         raise DataError(
-            f"the entry at {at:.6g} s is not within the record, which has {time[0]:.6g} s to "
-            f"{time[-1]:.6g} s",
+            "crash.entry-not-within-record",
             file=imu.attrs.get("source"),
             quantity="entry",
-            remedy="give the velocity at an instant of the record",
+            at=at,
+            time=time[0],
+            time_2=time[-1],
         )
     begin, end = (float(x) for x in (_usual(time, at) if window is None else window))
     if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
         raise DataError(
-            f"the window from {begin:g} s to {end:g} s is not within the record, which has "
-            f"{time[0]:.6g} s to {time[-1]:.6g} s",
+            "crash.message",
             file=imu.attrs.get("source"),
             quantity="window",
-            remedy="choose a window within it, its start before its end, in s from the trigger"
+            message=f"the window from {begin:g} s to {end:g} s is not within the record, which has {time[0]:.6g} s to {time[-1]:.6g} s",
+            remedy_text="choose a window within it, its start before its end, in s from the trigger"
             + _overlap(begin, end, time),
         )
     anchor = int(np.argmin(np.abs(time - at)))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.pdof_convention import clock_of
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import within_half_turn
 
 Array = NDArray[np.float64]
@@ -84,17 +84,11 @@ def vector_of(change: DeltaV | ArrayLike, frames: Sequence[str]) -> Array:
     """
     if isinstance(change, DeltaV) and change.frame not in frames:
         raise ConfigError(
-            f"the delta-V is in the frame {change.frame}, and {' or '.join(frames)} is needed",
-            quantity="frame",
-            remedy="use pdof for a change along vehicle axes, ned_pdof for one over ground",
+            "crash.delta-v-frame-needed", quantity="frame", frame=change.frame, frames=frames
         )
     vector = np.asarray(change.vector if isinstance(change, DeltaV) else change, dtype=np.float64)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
-        raise DataError(
-            f"{vector.tolist()} has no direction",
-            quantity="delta-V",
-            remedy="give three finite components in m/s that are not all zero",
-        )
+        raise DataError("crash.no-direction", quantity="delta-V", vector=vector.tolist())
     return vector
 
 
@@ -152,11 +146,7 @@ def ned_pdof(change: DeltaV | ArrayLike, heading_deg: float) -> NedPdof:
         It is zero, or no three finite numbers; or the heading is not finite.
     """
     if not math.isfinite(heading_deg):
-        raise DataError(
-            f"{heading_deg} is no heading",
-            quantity="heading",
-            remedy="give the heading at the impact in deg, clockwise from north",
-        )
+        raise DataError("crash.no-heading", quantity="heading", heading_deg=heading_deg)
     azimuth, vertical = _angles(vector_of(change, ("ned",)))
     relative = float(within_half_turn(np.array([azimuth - heading_deg]))[0])
     full = azimuth % 360.0
@@ -185,11 +175,7 @@ def pdof_gradient(change: DeltaV | ArrayLike) -> Array:
     x, y, z = vector_of(change, ("body", "impact", "ned")).tolist()
     h2 = x * x + y * y
     if h2 == 0.0:
-        raise DataError(
-            f"the change of velocity, {z:g} m/s, is vertical, and has no horizontal direction",
-            quantity="delta-V",
-            remedy="use pdof_interval, which says what is undetermined",
-        )
+        raise DataError("crash.change-velocity-vertical-no-horizontal", quantity="delta-V", z=z)
     h, r2 = math.sqrt(h2), h2 + z * z
     return np.degrees([[-y / h2, x / h2, 0.0], [-z * x / (h * r2), -z * y / (h * r2), h / r2]])
 
@@ -235,8 +221,6 @@ def covariance_of(given: ArrayLike) -> Array:
         good = good and bool(np.linalg.eigvalsh(matrix).min() >= -1e-9 * scale)
     if not good:
         raise DataError(
-            f"{np.asarray(given).tolist()} is no covariance",
-            quantity="covariance",
-            remedy="give a symmetric (3, 3) matrix in m²/s² without negative variances",
+            "crash.no-covariance", quantity="covariance", asarray=np.asarray(given).tolist()
         )
     return 0.5 * (matrix + matrix.T)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = [
     "CONVENTIONS",
@@ -76,9 +76,11 @@ CONVENTIONS: dict[str, PdofConvention] = {
 def _convention(name: str) -> PdofConvention:
     if name not in CONVENTIONS:
         raise ConfigError(
-            f"'{name}' is no convention of the direction of force",
+            "crash.no-convention-direction-force",
             quantity="convention",
-            remedy=nearest(name, CONVENTIONS),
+            name=name,
+            word=name,
+            known=CONVENTIONS,
         )
     return CONVENTIONS[name]
 
@@ -173,7 +175,7 @@ def direction_of_clock(hour: int) -> float:
         It is no hour.
     """
     if hour not in range(1, 13):
-        raise ConfigError(f"{hour} is no hour", quantity="clock", remedy="give 1 to 12")
+        raise ConfigError("crash.no-hour", quantity="clock", hour=hour)
     return _wrapped(30.0 * hour, False)
 
 
@@ -192,5 +194,5 @@ def _wrapped(angle: float, full_turn: bool) -> float:
 
 def _finite(angle: float) -> float:
     if not math.isfinite(angle):
-        raise ConfigError(f"{angle} is no angle", quantity="direction", remedy="give degrees")
+        raise ConfigError("crash.no-angle", quantity="direction", angle=angle)
     return float(angle)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.pdof import covariance_of, vector_of
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.rotation import within_half_turn
 
 Array = NDArray[np.float64]
@@ -105,11 +105,7 @@ def pdof_interval(
     `pdof_sd` times z is the same for small angles.
     """
     if not 0.0 < level < 1.0:
-        raise ConfigError(
-            f"{level:g} is no probability",
-            quantity="level",
-            remedy="give 0.95, or another in (0, 1)",
-        )
+        raise ConfigError("crash.no-probability", quantity="level", level=level)
     vector = vector_of(change, ("body", "impact", "ned"))
     matrix = covariance_of(covariance)
     z = NormalDist().inv_cdf(0.5 + 0.5 * level)

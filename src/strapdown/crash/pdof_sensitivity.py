@@ -11,7 +11,7 @@ import pandas as pd
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.pdof import ned_pdof, pdof
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["pdof_by_shift", "pdof_by_window"]
 
@@ -126,9 +126,11 @@ def _fits(acceleration: Acceleration, start: float, end: float) -> bool:
 def _no_window(acceleration: Acceleration, zero: float, windows: Sequence[float]) -> DataError:
     shortest = min(windows, default=0.0)
     return DataError(
-        f"no window from {zero:.6g} s on, the shortest of {shortest * 1e3:g} ms, is within the "
-        f"record, which has {acceleration.begin:.6g} to {acceleration.end:.6g} s",
+        "crash.no-window-shortest-ms-within",
         file=acceleration.source,
         quantity="window",
-        remedy="give time zero within the record, and windows that it holds",
+        zero=zero,
+        shortest=shortest * 1000.0,
+        begin=acceleration.begin,
+        end=acceleration.end,
     )

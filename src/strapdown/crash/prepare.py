@@ -23,7 +23,7 @@ from strapdown.crash.rest_attitude import (
     level_at_rest,
     with_gravity,
 )
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.high_g_bias import bias_from_lower_range

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.range_merge import MergedRanges
@@ -54,33 +54,30 @@ def rest_findings(
             )
         if not levelled:
             raise DataError(
-                what,
+                "crash.message",
                 file=unit.name,
                 quantity="rest",
-                remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road, "
-                "and the biases stay at their stated standard deviations; or name the stretch, "
-                "rest=(start, end) in s (of reconstruct_crash: in preparation={...})",
+                message=what,
+                remedy_text="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road, and the biases stay at their stated standard deviations; or name the stretch, rest=(start, end) in s (of reconstruct_crash: in preparation={...})",
             )
         return [
             Finding(
-                what,
+                "crash.message",
                 file=unit.name,
                 quantity="rest",
-                remedy="the stated attitude is used, and the biases stay at their stated standard "
-                "deviations; a record that begins before the vehicle moves off would do better",
+                message=what,
+                remedy_text="the stated attitude is used, and the biases stay at their stated standard deviations; a record that begins before the vehicle moves off would do better",
             )
         ]
     if rest.grade == "steady":
         return [
             Finding(
-                f"no stationary stretch; the {rest.end - rest.start:.3g} s from {rest.start:.4g} s "
-                "are quiet and without turning, and may be at speed: an acceleration of "
-                f"{steady_acceleration:g} m/s² (one sigma) cannot be told from a tilt in them",
+                "crash.no-stationary-stretch-quiet-without",
                 file=unit.name,
                 quantity="rest",
-                remedy="if the vehicle stood still until it was struck, say "
-                "moving_at_impact=False; if its velocity was constant, steady_acceleration=0 (of "
-                "reconstruct_crash: in preparation={...})",
+                end=rest.end - rest.start,
+                start=rest.start,
+                steady_acceleration=steady_acceleration,
             )
         ]
     return []
@@ -100,20 +97,19 @@ def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[
     lowest = unit.accelerometers[0]
     if NEAR_ONE[0] <= length <= NEAR_ONE[1]:
         raise DataError(
-            f"the specific force at rest is {length:.3g} long: that is gravity in g, not in m/s²",
+            "crash.specific-force-rest-long-gravity",
             file=f"{unit.name}, {lowest.name}",
             quantity="accel",
-            remedy="multiply the accelerations by 9.80665",
+            length=length,
         )
     found = []
     if mean[2] > 0.5 * gravity:
         found.append(
             Finding(
-                f"the specific force at rest is {mean[2]:+.3g} m/s² along the vehicle's down axis: "
-                "the vehicle stands on its roof, or the unit reports gravity or has axes up",
+                "crash.specific-force-rest-along-vehicle",
                 file=f"{unit.name}, {lowest.name}",
                 quantity="accel_z",
-                remedy="state the mounting angles; a forward-right-down unit reads -9.8 at rest",
+                mean=mean[2],
             )
         )
     u = lowest.uncertainty
@@ -121,12 +117,13 @@ def length_findings(unit: CrashUnit, rest: RestStretch, gravity: float) -> list[
     if stated > 0.0 and abs(length - gravity) > SIGMAS * stated and 8.0 < length < 11.6:
         found.append(
             Finding(
-                f"the specific force at rest is {length:.4g} m/s² long, {length - gravity:+.2g} "
-                f"off gravity, {abs(length - gravity) / stated:.1f} times the "
-                f"{stated:.2g} m/s² that bias and scale factor are stated to make",
+                "crash.specific-force-rest-long-off",
                 file=f"{unit.name}, {lowest.name}",
                 quantity="accel",
-                remedy="state a larger bias, or look for another scale factor",
+                length=length,
+                length_2=length - gravity,
+                length_3=abs(length - gravity) / stated,
+                stated=stated,
             )
         )
     return found
@@ -175,20 +172,23 @@ def _ends(
         if limits.found[k]:
             found.append(
                 Finding(
-                    f"it is held between {limits.lower[k]:.5g} and {limits.upper[k]:.5g} {u}, and "
-                    f"its stated full scale is {stated[k]:.5g} {u}",
+                    "crash.held-between-stated-full-scale",
                     file=source,
                     quantity=f"{quantity}_{axis}",
-                    remedy="the ends that were found are used; correct the stated full scale",
+                    lower=limits.lower[k],
+                    upper=limits.upper[k],
+                    u=u,
+                    stated=stated[k],
                 )
             )
         if limits.beyond[k]:
             found.append(
                 Finding(
-                    f"it reads more than its stated full scale of {stated[k]:.5g} {u}",
+                    "crash.reads-more-than-stated-full",
                     file=source,
                     quantity=f"{quantity}_{axis}",
-                    remedy="correct the stated full scale or the unit of the values",
+                    stated=stated[k],
+                    u=u,
                 )
             )
     return found
@@ -208,11 +208,11 @@ def _clipped(
         if rows.size:
             found.append(
                 Finding(
-                    f"{rows.size} samples are at the end of the range, the first "
-                    f"{time[rows[0]]:.5g} s from the trigger, the last {time[rows[-1]]:.5g} s",
+                    "crash.message",
                     file=f"{unit.name}, {triad.name}",
                     quantity=f"{quantity}_{axis}",
-                    remedy=remedy,
+                    message=f"{rows.size} samples are at the end of the range, the first {time[rows[0]]:.5g} s from the trigger, the last {time[rows[-1]]:.5g} s",
+                    remedy_text=remedy,
                 )
             )
     return found
@@ -235,11 +235,11 @@ def bias_findings(
                 why = f"{unit.accelerometers[j - 1].name} is at its end in the quiet stretch"
             found.append(
                 Finding(
-                    f"its bias is not known, because {why}",
+                    "crash.bias-not-known-because",
                     file=source,
                     quantity="bias",
-                    remedy="it stays at its stated standard deviation, "
-                    f"{max(triad.uncertainty.axis('bias')):.3g} m/s²",
+                    why=why,
+                    axis=max(triad.uncertainty.axis("bias")),
                 )
             )
             continue
@@ -251,13 +251,13 @@ def bias_findings(
             if stated[k] > 0.0 and abs(own[k]) > SIGMAS * stated[k]:
                 found.append(
                     Finding(
-                        f"its bias is {own[k]:+.3g} m/s² against "
-                        f"{unit.accelerometers[j - 1].name}, {abs(own[k]) / stated[k]:.1f} times "
-                        f"the {stated[k]:.2g} m/s² stated",
+                        "crash.bias-against-times-stated",
                         file=source,
                         quantity=f"accel_{axis}",
-                        remedy="it is taken off all the same; look whether axes are swapped or "
-                        "inverted, which moves gravity from one axis to another",
+                        own=own[k],
+                        name=unit.accelerometers[j - 1].name,
+                        own_2=abs(own[k]) / stated[k],
+                        stated=stated[k],
                     )
                 )
     return found
@@ -286,13 +286,14 @@ def step_findings(unit: CrashUnit, merged: MergedRanges) -> list[Finding]:
             if abs(merged.step[j, k]) > SIGMAS * sd:
                 found.append(
                     Finding(
-                        f"where {low.name} and {high.name} take over from one another they differ "
-                        f"by {merged.step[j, k]:+.3g} m/s² in the mean of {merged.switches[j, k]} "
-                        f"places, {abs(merged.step[j, k]) / sd:.1f} standard deviations",
+                        "crash.take-over-another-they-differ",
                         file=unit.name,
                         quantity=f"accel_{axis}",
-                        remedy="look for different filters, delays or scale factors of the two; a "
-                        "margin that is wider keeps the low range further from its end",
+                        name=low.name,
+                        name_2=high.name,
+                        step=merged.step[j, k],
+                        switches=merged.switches[j, k],
+                        step_2=abs(merged.step[j, k]) / sd,
                     )
                 )
     return found

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_numbers import check_sd, finite, triple
 
 __all__ = ["OPTIONS", "check_options", "checked_options"]
@@ -36,9 +36,7 @@ def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
     for name in options:
         if name not in OPTIONS:
             raise ConfigError(
-                f"there is no option {name!r}",
-                quantity="preparation",
-                remedy=nearest(str(name), OPTIONS),
+                "crash.no-option", quantity="preparation", name=name, word=str(name), known=OPTIONS
             )
     return dict(options)
 
@@ -54,36 +52,24 @@ def check_options(unit: str, **given: Any) -> None:
     gravity, rest, levelling = given["gravity"], given["rest"], given["levelling"]
     if not (finite(gravity) and 9.7 < gravity < 9.9):
         raise ConfigError(
-            f"{gravity!r} m/s² is gravity nowhere on the ground",
-            file=unit,
-            quantity="gravity",
-            remedy="give it in m/s², or leave it out",
+            "crash.gravity-nowhere-ground", file=unit, quantity="gravity", gravity=gravity
         )
     if not (isinstance(rest, str) and rest == "auto") and not _is_stretch(rest):
-        raise ConfigError(
-            f"{rest!r} is no stretch",
-            file=unit,
-            quantity="rest",
-            remedy="say 'auto', or give its start and end in s from the trigger, as (-3, -1)",
-        )
+        raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=rest)
     if levelling is not None:
         how = "give roll, pitch and their standard deviation in deg, as in (0, 0, 1)"
         _, pitch, sd = triple(levelling, "levelling", how, unit)
         if abs(pitch) > 90.0 or sd < 0.0:
             raise ConfigError(
-                f"{levelling!r} is no attitude with its standard deviation",
+                "crash.message",
                 file=unit,
                 quantity="levelling",
-                remedy=how,
+                message=f"{levelling!r} is no attitude with its standard deviation",
+                remedy_text=how,
             )
     for name in ("impact", "margin", "hysteresis", "fade"):
         if not finite(given[name]):
-            raise ConfigError(
-                f"{given[name]!r} is no number",
-                file=unit,
-                quantity=name,
-                remedy="give one finite number, or leave it out",
-            )
+            raise ConfigError("crash.no-number-3", file=unit, quantity=name, given=given[name])
     check_sd(given["steady_acceleration"], "steady_acceleration", "m/s²", unit)
     check_sd(given["steady_rate"], "steady_rate", "rad/s", unit)
 

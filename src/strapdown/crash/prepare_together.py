@@ -12,7 +12,7 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.prepare_options import checked_options
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.synchronise import SynchronisedUnit, SynchronisedUnits
 
 # Over which the attitude that is lent is read, in samples.
@@ -67,11 +67,12 @@ def prepare_together(
             if hint is None or error.finding.quantity != "gyro":
                 raise
             raise DataError(
-                error.finding.what,
+                "crash.message",
                 file=error.finding.file,
                 row=error.finding.row,
                 quantity="gyro",
-                remedy=f"{hint.remedy}; or state how far the vehicle turned (assumed)",
+                message=error.finding.what,
+                remedy_text=f"{hint.remedy}; or state how far the vehicle turned (assumed)",
             ) from None
         if hint is not None:
             prepared = replace(prepared, findings=(*prepared.findings, hint))
@@ -90,12 +91,12 @@ def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding |
     if unit.lender is not None or _turns(unit) or not turning:
         return None
     return Finding(
-        f"it has no gyro and borrows none, where {' and '.join(turning)} "
-        f"{'have one' if len(turning) > 1 else 'has one'}",
+        "crash.no-gyro-borrows-none",
         file=unit.unit.name,
         quantity="gyro",
-        remedy=f"if both are fixed to one rigid vehicle, give it gyro_from = {turning[0]!r}: what "
-        "is measured there goes before any assumption",
+        turning=turning,
+        value="have one" if len(turning) > 1 else "has one",
+        turning_2=turning[0],
     )
 
 

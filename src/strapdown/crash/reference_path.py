@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.leg import PLACE
 from strapdown.crash.path import CrashPath
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import NED, POSITION_SD
 
@@ -80,11 +80,7 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         least one instant after it.
     """
     if not isinstance(reference, pd.DataFrame):
-        raise DataError(
-            f"this is of kind {type(reference).__name__}",
-            quantity="reference path",
-            remedy="give a DataFrame with north, east and down in m, indexed by time in s",
-        )
+        raise DataError("crash.kind-2", quantity="reference path", name=type(reference).__name__)
     time, values, sd = _columns(reference)
     from scipy.interpolate import CubicHermiteSpline
 
@@ -93,11 +89,14 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
     entry = path.entry.time
     if not (inside.any() and time[0] <= entry + 1e-9 and time[inside][-1] > entry):
         raise DataError(
-            f"it has {time[0]:.6g} s to {time[-1]:.6g} s, and the path {path.time[0]:.6g} s to "
-            f"{path.time[-1]:.6g} s with its entry at {entry:.6g} s",
+            "crash.path-entry",
             file=reference.attrs.get("source"),
             quantity="reference path",
-            remedy="give a reference on the common clock that begins at or before the entry",
+            time=time[0],
+            time_2=time[-1],
+            time_3=path.time[0],
+            time_4=path.time[-1],
+            entry=entry,
         )
     origin = np.array([np.interp(entry, time, values[:, k]) for k in range(3)])
     at_origin = np.array([np.interp(entry, time, sd[:, k]) for k in range(3)])
@@ -135,21 +134,20 @@ def _columns(reference: pd.DataFrame) -> tuple[Array, Array, Array]:
     missing = [c for c in wanted if c not in reference.columns]
     if missing:
         raise DataError(
-            f"there is no column {', '.join(missing)}",
+            "crash.no-column",
             file=reference.attrs.get("source"),
             quantity="reference path",
-            remedy="give north, east and down in m, and the standard deviation of all three or "
-            "of none",
+            missing=missing,
         )
     try:
         time = reference.index.to_numpy(dtype=np.float64)
         both = reference[wanted].to_numpy(dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(
-            f"not all of it are numbers: {error}",
+            "crash.not-all-numbers",
             file=reference.attrs.get("source"),
             quantity="reference path",
-            remedy="give numbers: metres, and the time in s as the index",
+            error=error,
         ) from None
     values, sd = both[:, :3], both[:, 3:] if some else np.zeros((len(both), 3))
     bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
@@ -161,17 +159,15 @@ def _columns(reference: pd.DataFrame) -> tuple[Array, Array, Array]:
     ):
         if rows.any():
             raise DataError(
-                what,
+                "crash.message",
                 file=reference.attrs.get("source"),
                 row=int(np.argmax(rows)) + 1,
                 quantity="reference path",
-                remedy=remedy,
+                message=what,
+                remedy_text=remedy,
             )
     if not len(time):
         raise DataError(
-            "it has no rows",
-            file=reference.attrs.get("source"),
-            quantity="reference path",
-            remedy="give the place at the entry and at least one instant after it",
+            "crash.no-rows", file=reference.attrs.get("source"), quantity="reference path"
         )
     return time, values, sd

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.levelling import level
 from strapdown.crash.acceleration import force_at_rest
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.prepared_unit import Levelling
@@ -52,12 +52,12 @@ def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str
         roll, pitch = level(rest.accel_mean)
     except DataError as error:
         raise DataError(
-            f"{error.finding.what} ({rest.start:.6g} to {rest.end:.6g} s)",
+            "crash.reason-start",
             file=source,
             quantity="levelling",
-            remedy="name another stretch with rest=(start, end), check that the accelerometer is "
-            "in m/s², or give levelling=(roll, pitch, sd): then the bias of the lowest range is "
-            "taken from gravity in that attitude",
+            reason=error.finding,
+            start=rest.start,
+            end=rest.end,
         ) from None
     across = math.hypot(max(rest.accel_mean_sd), unknown) / gravity
     sd = math.degrees(across / max(math.cos(math.radians(pitch)), 1e-3))
@@ -132,11 +132,10 @@ def with_gravity(
     if levelling is None:
         missing = " and no ".join(ACCEL[k] for k in absent)
         raise DataError(
-            f"it has no {missing}, and without three axes the attitude at rest is not felt",
+            "crash.no-without-three-axes-attitude",
             file=unit.name,
             quantity="levelling",
-            remedy="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1) for a level road (of "
-            "reconstruct_crash: in preparation={...})",
+            missing=missing,
         )
     at_rest = force_at_rest(levelling[0], levelling[1], gravity) @ unit.mounting.C_vs
     filled = tuple(y.copy() for y in data.accelerometers)

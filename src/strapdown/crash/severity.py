@@ -9,7 +9,7 @@ are not: their coefficients were found in programs that name no table of a publi
 from __future__ import annotations
 
 from strapdown.crash.severity_model import SeverityModel, Term
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["SEVERITY_MODELS", "find_severity_model"]
 
@@ -68,8 +68,10 @@ def find_severity_model(name: str) -> SeverityModel:
     """
     if name not in SEVERITY_MODELS:
         raise ConfigError(
-            f"there is no severity model '{name}'",
+            "crash.no-severity-model",
             quantity="severity model",
-            remedy=f"{nearest(name, SEVERITY_MODELS)} Or load a table of your own.",
+            name=name,
+            word=name,
+            known=SEVERITY_MODELS,
         )
     return SEVERITY_MODELS[name]

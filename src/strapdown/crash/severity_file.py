@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.crash.severity_model import SPEEDS, TRANSFORMS, SeverityModel, Term
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["load_severity_model"]
 
@@ -47,10 +47,10 @@ def load_severity_model(path: str | Path) -> SeverityModel:
     texts = {key: _text(file, table, key) for key in TEXTS}
     year = table.get("year")
     if isinstance(year, bool) or not isinstance(year, int):
-        raise _bad(file, "year", f"it is {year!r}", "write the year of publication: year = 2004")
+        raise _bad(file, "year", "crash.year", year=year)
     note = table.get("note", "")
     if not isinstance(note, str):
-        raise _bad(file, "note", "it is no text", 'write note = "…"')
+        raise _bad(file, "note", "crash.no-text")
     terms = _terms(file, table)
     return SeverityModel(
         name=file.stem,
@@ -66,19 +66,17 @@ def load_severity_model(path: str | Path) -> SeverityModel:
 
 def _table(file: Path) -> dict[str, Any]:
     if not file.is_file():
-        raise ConfigError("there is no such file", file=str(file), remedy="check the path")
+        raise ConfigError("crash.no-such-file", file=str(file))
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"it is no TOML: {error}", file=file.name, remedy="mend it where it says"
-        ) from None
+        raise ConfigError("crash.no-toml", file=file.name, error=error) from None
 
 
 def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
     rows = table.get("terms")
     if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) for r in rows):
-        raise _bad(file, "terms", "there are none", "write [[terms]], one for each coefficient")
+        raise _bad(file, "terms", "crash.none-2")
     terms: list[Term] = []
     for k, row in enumerate(rows, start=1):
         place = f"terms {k}"
@@ -94,8 +92,10 @@ def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
                 raise _bad(
                     file,
                     f"{place}.transform",
-                    f"'{transform}' is none",
-                    nearest(str(transform), TRANSFORMS),
+                    "crash.none-3",
+                    transform=transform,
+                    word=str(transform),
+                    known=TRANSFORMS,
                 )
             term = Term(name, coefficient, _text(file, row, "unit", f"{place}."), transform)
         for other in terms:
@@ -123,34 +123,34 @@ def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
 
 def _validity(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
     if not isinstance(given, dict):
-        raise _bad(file, "validity", "it is no table", "write [validity]")
+        raise _bad(file, "validity", "crash.no-table")
     numbers = {t.input: t for t in terms if t.equals is None}
     ranges: dict[str, tuple[float, float]] = {}
     for name, pair in given.items():
         place = f"validity.{name}"
         if name not in numbers:
-            raise _bad(file, place, "no term has this number as its input", nearest(name, numbers))
+            raise _bad(file, place, "crash.no-term-number-input", word=name, known=numbers)
         if not isinstance(pair, list) or len(pair) != 2:
-            raise _bad(file, place, f"it is {pair!r}", f"write {name} = [least, greatest]")
+            raise _bad(file, place, "crash.pair", pair=pair, name=name)
         low, high = (_number(file, value, place) for value in pair)
         if not low < high:
-            raise _bad(file, place, f"from {low:g} to {high:g} is no range", "least first")
+            raise _bad(file, place, "crash.no-range", low=low, high=high)
         ranges[name] = (low, high)
     return ranges
 
 
 def _applies(file: Path, given: Any) -> dict[str, tuple[str, ...]]:
     if not isinstance(given, dict):
-        raise _bad(file, "applies", "it is no table", "write [applies]")
+        raise _bad(file, "applies", "crash.no-table-2")
     for name, words in given.items():
         if not isinstance(words, list) or not words or not all(isinstance(w, str) for w in words):
-            raise _bad(file, f"applies.{name}", f"it is {words!r}", f'write {name} = ["front"]')
+            raise _bad(file, f"applies.{name}", "crash.words", words=words, name=name)
     return {name: tuple(words) for name, words in given.items()}
 
 
 def _number(file: Path, value: Any, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _bad(file, key, f"it is {value!r}", "write the number of the table")
+        raise _bad(file, key, "crash.value", value=value)
     return float(value)
 
 
@@ -169,8 +169,10 @@ def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> s
 def _known(file: Path, table: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
     for key in table:
         if key not in known:
-            raise _bad(file, f"{prefix}{key}", "there is no such key", nearest(key, known))
+            raise _bad(file, f"{prefix}{key}", "crash.no-such-key", word=key, known=known)
 
 
 def _bad(file: Path, key: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError(what, file=file.name, quantity=key, remedy=remedy)
+    return ConfigError(
+        "crash.message", file=file.name, quantity=key, message=what, remedy_text=remedy
+    )

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, Finding
 
 __all__ = ["SPEEDS", "InjuryRisk", "SeverityModel", "Term", "injury_risk"]
 
@@ -191,20 +191,14 @@ def _check_options(
 ) -> None:
     if outside not in OUTSIDE:
         raise ConfigError(
-            f"'{outside}' is no option", quantity="outside", remedy=nearest(outside, OUTSIDE)
+            "crash.no-option-2", quantity="outside", outside=outside, word=outside, known=OUTSIDE
         )
     if not 0.0 < coverage < 1.0:
-        raise ConfigError(
-            f"a coverage of {coverage} is none",
-            quantity="coverage",
-            remedy="give a share between 0 and 1, such as 0.95",
-        )
+        raise ConfigError("crash.coverage-none", quantity="coverage", coverage=coverage)
     for name, value in sd.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise ConfigError(
-                f"{value} is no standard deviation",
-                quantity=f"sd of {name}",
-                remedy="give zero or more",
+                "crash.no-standard-deviation-2", quantity=f"sd of {name}", value=value
             )
 
 
@@ -213,9 +207,7 @@ def _given(model: SeverityModel, inputs: Mapping[str, float | str], name: str) -
         unit = model.unit(name)
         how = "a word" if not unit else "m/s" if unit in SPEEDS else unit
         raise DataError(
-            f"{model.name} needs {name}, and it is not given",
-            quantity=name,
-            remedy=f"give {name} ({how}), or take a model that does without it",
+            "crash.needs-not-given", quantity=name, name=model.name, name_2=name, how=how
         )
     return inputs[name]
 
@@ -224,9 +216,11 @@ def _value(model: SeverityModel, name: str, given: float | str) -> float:
     """Return a number in the unit of the model's table."""
     if isinstance(given, str) or not math.isfinite(given):
         raise DataError(
-            f"{given!r} is no finite number",
+            "crash.no-finite-number",
             quantity=name,
-            remedy=f"give {name} in {'m/s' if model.unit(name) in SPEEDS else model.unit(name)}",
+            given=given,
+            name=name,
+            value="m/s" if model.unit(name) in SPEEDS else model.unit(name),
         )
     return float(given) / SPEEDS.get(model.unit(name), 1.0)
 
@@ -238,9 +232,11 @@ def _transformed(model: SeverityModel, term: Term, value: float) -> tuple[float,
     if term.transform == "log":
         if value <= 0.0:
             raise DataError(
-                f"{model.name} takes the logarithm, and the value is {value:g} {term.unit}",
+                "crash.takes-logarithm-value",
                 quantity=term.input,
-                remedy="there is no risk by this model at zero; give a value above it",
+                name=model.name,
+                value=value,
+                unit=term.unit,
             )
         return math.log(value), 1.0 / value
     return value, 1.0
@@ -258,9 +254,11 @@ def _validity(
         if name not in inputs:
             findings.append(
                 Finding(
-                    f"{model.name} is for {' and '.join(categories)}, and it is not stated",
+                    "crash.not-stated",
                     quantity=name,
-                    remedy=f"state {name}",
+                    name=model.name,
+                    categories=categories,
+                    name_2=name,
                 )
             )
         elif inputs[name] not in categories:
@@ -278,10 +276,13 @@ def _validity(
         elif not low <= value - error <= value + error <= high:
             findings.append(
                 Finding(
-                    f"{value:.4g} ± {error:.2g} {model.unit(name)}: the bound leaves the range in "
-                    f"which {model.name} is {limits}",
+                    "crash.bound-leaves-range",
                     quantity=name,
-                    remedy="read the ends of the bound with that in mind",
+                    value=value,
+                    error=error,
+                    unit=model.unit(name),
+                    name=model.name,
+                    limits=limits,
                 )
             )
     return findings
@@ -289,5 +290,10 @@ def _validity(
 
 def _outside(what: str, name: str, remedy: str, outside: str) -> Finding:
     if outside == "refuse":
-        raise DataError(what, quantity=name, remedy=f"{remedy}; or pass outside='tell'")
-    return Finding(what, quantity=name, remedy=remedy)
+        raise DataError(
+            "crash.message",
+            quantity=name,
+            message=what,
+            remedy_text=f"{remedy}; or pass outside='tell'",
+        )
+    return Finding("crash.message", quantity=name, message=what, remedy_text=remedy)

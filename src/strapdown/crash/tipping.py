@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
 
 Array = NDArray[np.float64]
@@ -87,11 +87,7 @@ class TippingBody:
         for f in fields(self):
             value = getattr(self, f.name)
             if not (math.isfinite(value) and value > 0.0):
-                raise ConfigError(
-                    f"{value:g} is no dimension of a vehicle",
-                    quantity=f.name,
-                    remedy="give a positive number, or leave it out for a passenger car",
-                )
+                raise ConfigError("crash.no-dimension-vehicle", quantity=f.name, value=value)
 
     def energy_share(self, roll: ArrayLike, rate: ArrayLike) -> Array:
         """Energy of a roll over that which tips the body over.
@@ -156,11 +152,7 @@ class TippingBody:
         first = -math.inf if since is None else since
         counted = stamps >= first
         if not counted.any():
-            raise DataError(
-                f"there is no rate of roll from {first:.6g} s on",
-                quantity="roll_rate",
-                remedy="give the rates of the event, on the clock of its time zero",
-            )
+            raise DataError("crash.no-rate-roll", quantity="roll_rate", first=first)
         roll = math.radians(start_roll_deg) + running_integral(stamps, rate)
         share = self.energy_share(roll, rate)[counted]
         best = int(np.argmax(share))

@@ -7,7 +7,7 @@ import pandas as pd
 
 from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.window_weights import check_within
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import index_of, source_of, values_of
 from strapdown.tables.columns import VELOCITY
 from strapdown.tables.trajectory import check_trajectory
@@ -39,12 +39,7 @@ def trajectory_delta_v(trajectory: pd.DataFrame, start: float, end: float) -> De
     time, source = index_of(trajectory), source_of(trajectory)
     check_within(time, start, end, source)
     if not end > start:
-        raise DataError(
-            f"the window from {start:.6g} to {end:.6g} s is empty",
-            file=source,
-            quantity="time",
-            remedy="let it end after it begins",
-        )
+        raise DataError("crash.window-empty", file=source, quantity="time", start=start, end=end)
     velocity = values_of(trajectory, VELOCITY)
     weights = np.zeros(len(time))
     rates = []

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from strapdown.crash.lever_arm_check import LeverArmCheck
 from strapdown.crash.match_axes import AxisMatch
 from strapdown.crash.mounting_rotation import MountingRotation
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.crash.at_point import AtPoint
 from strapdown.crash.noise_of_sums import NoiseOfSums, noise_of_sums
 from strapdown.crash.window_weights import window_weights
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
@@ -201,11 +201,7 @@ def common_edges(
         A piece is shorter than two samples of a unit.
     """
     if len(units) < 2:
-        raise DataError(
-            f"{len(units)} unit, and a comparison needs two",
-            quantity="units",
-            remedy="give another unit on the same vehicle",
-        )
+        raise DataError("crash.unit-comparison-needs-two", quantity="units", count=len(units))
     first = max(float(u.time[0]) for u in units)
     last = min(float(u.time[-1]) for u in units)
     start, end = (max(first, -0.1), min(last, 0.75)) if window is None else window
@@ -214,20 +210,24 @@ def common_edges(
         ends = next(u.name for u in units if u.time[-1] == last)
         wanted = (-0.1, 0.75) if window is None else window
         raise DataError(
-            f"{', '.join(u.name for u in units)} share {first:.5g} to {last:.5g} s, which does not "
-            f"cover {wanted[0]:.5g} to {wanted[1]:.5g} s: {begins} begins last, {ends} ends first",
+            "crash.share-does-not-cover-begins",
             quantity="window",
-            remedy=f"look whether a record of {ends} is cut off, or of {begins} begins late, and "
-            "whether their triggers are right; else give a window within what they share",
+            units=[u.name for u in units],
+            first=first,
+            last=last,
+            wanted=wanted[0],
+            wanted_2=wanted[1],
+            begins=begins,
+            ends=ends,
         )
     coarsest = max(float(np.median(np.diff(u.time))) for u in units)
     most = int((end - start) / (2.0 * coarsest))
     if most < 3:
         raise ConfigError(
-            f"{end - start:.4g} s at steps of {coarsest:.4g} s cannot be cut into three pieces of "
-            "two samples",
+            "crash.steps-cannot-cut-into-three",
             quantity="window",
-            remedy="give a longer one",
+            end=end - start,
+            coarsest=coarsest,
         )
     return np.linspace(start, end, min(pieces, most) + 1)
 

@@ -19,7 +19,7 @@ from strapdown.crash.sample_effects import (
     level_turned_by,
 )
 from strapdown.crash.triad_curves import AXES, Curve, constant, triad_curves
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.lever_arm import MovedImu
 from strapdown.sensors.prepared_unit import FROM_GRAVITY, PreparedUnit
@@ -72,12 +72,7 @@ class _UnitEffects:
     def __init__(self, prepared: PreparedUnit, moved: MovedImu, time_sd: float) -> None:
         unit = prepared.unit
         if unit.gyro is None:
-            raise DataError(
-                "there is no gyro, nor one that is borrowed",
-                file=unit.name,
-                quantity="gyro",
-                remedy="name the unit whose gyro this one borrows (gyro_from)",
-            )
+            raise DataError("crash.no-gyro-nor-borrowed", file=unit.name, quantity="gyro")
         self.prepared, self.time_sd = prepared, time_sd
         lender = unit.lender or unit
         assert lender.gyro is not None

@@ -24,7 +24,7 @@ from strapdown.crash.path import CrashPath, reconstruct_path
 from strapdown.crash.reconstruction_summary import summary_table, unit_line
 from strapdown.crash.sample_effects import SampleEffects
 from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.mechanization import NorthEastDown
 
 Array = NDArray[np.float64]
@@ -167,12 +167,13 @@ def reconstruct_unit(
             ned.append(None)
             findings.append(
                 Finding(
-                    f"the event from {start:.6g} s to {end:.6g} s is not within the path, "
-                    f"which has {path.time[0]:.6g} s to {path.time[-1]:.6g} s: its change of "
-                    "velocity is told along the turning axes alone",
+                    "crash.event-not-within-path-change",
                     file=at_point.name,
                     quantity="window",
-                    remedy="choose a window that holds the whole event",
+                    start=start,
+                    end=end,
+                    time=path.time[0],
+                    time_2=path.time[-1],
                 )
             )
     # Of a roll that was assumed nothing can be told.
@@ -210,10 +211,7 @@ def _unseen(at_point: AtPoint, events: CrashEvents) -> list[Finding]:
         return []
     return [
         Finding(
-            f"an impact along {' or '.join(blind)} would not show: that axis is assumed",
-            file=at_point.name,
-            quantity="delta-V",
-            remedy="that no event was found says nothing of such an impact",
+            "crash.impact-along-would-not-show", file=at_point.name, quantity="delta-V", blind=blind
         )
     ]
 

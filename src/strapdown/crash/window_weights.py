@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.crash.acceleration import attitude_of_samples
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_time
 from strapdown.tables.imu import SAMPLINGS
 
@@ -50,9 +50,7 @@ def window_weights(
     check_time(stamps, None)
     if sampling not in SAMPLINGS:
         raise ConfigError(
-            f"'{sampling}' is no kind of sampling",
-            quantity="sampling",
-            remedy=f"use {' or '.join(SAMPLINGS)}",
+            "crash.no-kind-sampling", quantity="sampling", sampling=sampling, samplings=SAMPLINGS
         )
     check_within(stamps, start, end, None)
     return _upto(stamps, end, sampling) - _upto(stamps, start, sampling)
@@ -68,21 +66,23 @@ def check_within(time: Array, start: float, end: float, source: str | None) -> N
     """
     if len(time) < 2:
         raise DataError(
-            f"{len(time)} sample: a change of velocity needs at least two",
+            "crash.sample-change-velocity-needs-least",
             file=source,
             quantity="time",
-            remedy="record for longer, or check that the right file was given",
+            count=len(time),
         )
     # Instants that were computed from stamps may lie a rounding beyond the last.
     slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))
     for instant in (start, end):
         if not time[0] - slack <= instant <= time[-1] + slack:
             raise DataError(
-                f"the window from {start:.6g} to {end:.6g} s is not within the record, which has "
-                f"{time[0]:.6g} to {time[-1]:.6g} s",
+                "crash.window-not-within-record",
                 file=source,
                 quantity="time",
-                remedy="take a shorter or later window, or a record that holds it",
+                start=start,
+                end=end,
+                time=time[0],
+                time_2=time[-1],
             )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.samples import as_channels, positive_step
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
@@ -73,26 +73,31 @@ def cfc_coefficients(cfc: float, step: float, standard: str = "iso") -> CfcCoeff
     step = positive_step(step)
     if cfc not in CHANNEL_CLASSES:
         raise ConfigError(
-            f"{cfc!r} is no channel frequency class",
+            "dsp.no-channel-frequency-class",
             quantity="cfc",
-            remedy=nearest(str(cfc), [str(c) for c in CHANNEL_CLASSES]),
+            cfc=cfc,
+            word=str(cfc),
+            known=[str(c) for c in CHANNEL_CLASSES],
         )
     if standard not in DESIGN_FREQUENCY:
         raise ConfigError(
-            f"{standard!r} is no standard for channel frequency classes",
+            "dsp.no-standard-channel-frequency-classes",
             quantity="standard",
-            remedy=nearest(str(standard), DESIGN_FREQUENCY),
+            standard=standard,
+            word=str(standard),
+            known=DESIGN_FREQUENCY,
         )
     rate = 1.0 / step
     if rate < LEAST_RATE * cfc * (1.0 - 1e-9):
         fits = [c for c in CHANNEL_CLASSES if rate >= LEAST_RATE * c * (1.0 - 1e-9)]
         lower = f"use CFC {fits[-1]}, " if fits else ""
         raise ConfigError(
-            f"CFC {cfc:g} needs {LEAST_RATE * cfc:g} samples per second or more, and there are "
-            f"{rate:g}",
+            "dsp.cfc-needs-samples-per-second",
             quantity="cfc",
-            remedy=f"{lower}filter the record before it is brought to the lower rate, or leave "
-            "the class out",
+            cfc=cfc,
+            least_rate=LEAST_RATE * cfc,
+            rate=rate,
+            lower=lower,
         )
     wa = math.tan(math.pi * cfc * DESIGN_FREQUENCY[standard] * step)
     whole = 1.0 + math.sqrt(2.0) * wa + wa * wa
@@ -178,10 +183,13 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
     least = math.ceil(LEAST_PADDING / step - 1e-9)
     if len(channels) <= least:
         raise DataError(
-            f"{len(channels)} samples of {step:g} s are too few for CFC {cfc:g}: more than "
-            f"{LEAST_PADDING * 1e3:g} ms are mirrored at each end",
+            "dsp.samples-too-few-cfc-more",
             quantity="values",
-            remedy=f"pass {least + 1} samples or more",
+            count=len(channels),
+            step=step,
+            cfc=cfc,
+            least_padding=LEAST_PADDING * 1000.0,
+            least=least + 1,
         )
     # The pole's modulus squared is -b2.
     memory = math.log(FORGOTTEN) / (0.5 * math.log(-c.b2))

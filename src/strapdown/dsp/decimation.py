@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.local_weights import LocalWeights, mirrored
 from strapdown.dsp.samples import as_channels, positive_step
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -121,22 +121,14 @@ def low_pass_design(
     """
     step = positive_step(step)
     if not (math.isfinite(rate) and 0.0 < rate <= (1.0 + 1e-9) / step):
-        raise ConfigError(
-            f"from {1.0 / step:g} Hz there is no decimating to {rate:g} Hz",
-            quantity="rate",
-            remedy="give a positive rate below that of the samples, or interpolate",
-        )
+        raise ConfigError("dsp.hz-no-decimating-hz", quantity="rate", step=1.0 / step, rate=rate)
     if not 0.0 < passband < 1.0:
         raise ConfigError(
-            f"{passband:g} is no part of the output's Nyquist frequency",
-            quantity="passband",
-            remedy="give a number between 0 and 1, as 0.5",
+            "dsp.no-part-output-nyquist-frequency", quantity="passband", passband=passband
         )
     if not 40.0 <= attenuation <= 150.0:
         raise ConfigError(
-            f"{attenuation:g} dB are out of reach of a double or hardly a filter",
-            quantity="attenuation",
-            remedy="give 40 to 150 dB, as 80",
+            "dsp.db-out-reach-double-or", quantity="attenuation", attenuation=attenuation
         )
     from scipy.signal import kaiser_beta
 
@@ -190,11 +182,10 @@ def decimate(
     half = math.ceil(design.reach / step) + 1
     if half > n - 1:
         raise DataError(
-            f"the low-pass reaches {design.reach:.4g} s to either side, and the record is "
-            f"{(n - 1) * step:.4g} s long",
+            "dsp.low-pass-reaches-either-side",
             quantity="values",
-            remedy="use a longer record, a lower attenuation, a narrower passband, or means over "
-            "the output's step",
+            reach=design.reach,
+            n=(n - 1) * step,
         )
     place = (at - start) / step
 
@@ -254,16 +245,10 @@ def mean_samples(
     channels, at = as_channels(values), as_channels(stamps, "stamps")[:, 0]
     step = positive_step(step)
     if sampling not in ("instantaneous", "mean"):
-        raise ConfigError(
-            f"{sampling!r} is no kind of sampling",
-            quantity="sampling",
-            remedy="give 'instantaneous' or 'mean'",
-        )
+        raise ConfigError("dsp.no-kind-sampling", quantity="sampling", sampling=sampling)
     if not length >= step * (1.0 - SLACK):
         raise ConfigError(
-            f"means over {length:g} s of samples {step:g} s apart say nothing new",
-            quantity="length",
-            remedy="give the step of the output, no shorter than that of the samples",
+            "dsp.means-over-samples-apart-say", quantity="length", length=length, step=step
         )
     n = len(channels)
     before = step if sampling == "mean" else 0.0
@@ -323,7 +308,5 @@ def _check_within(at: Array, low: float, high: float, step: float) -> None:
     if off.max() > SLACK * step:
         worst = int(np.argmax(off))
         raise DataError(
-            f"{at[worst]:.9g} s lies outside the record, which goes from {low:.9g} to {high:.9g} s",
-            quantity="stamps",
-            remedy="ask only for stamps within the record",
+            "dsp.lies-outside-record-goes", quantity="stamps", at=at[worst], low=low, high=high
         )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.dsp.decimation import decimate, low_pass_design
 from strapdown.dsp.lag_correlation import lag_correlation, repeats, top_peaks
 from strapdown.dsp.samples import as_channels, positive_step
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -133,11 +133,7 @@ def find_delay(
     x, y = one.values, two.values
     for signal, name in ((x, "first"), (y, "second")):
         if not float(np.ptp(signal, axis=0).max()) > 1e-9 * float(np.abs(signal).max()):
-            raise DataError(
-                f"the {name} record does not vary, and constants show no delay",
-                quantity="values",
-                remedy="use records of the motion itself",
-            )
+            raise DataError("dsp.record-does-not-vary-constants", quantity="values", name=name)
     least = 0.5 * min(len(x), len(y)) if least_shared is None else least_shared / step
     lags, score = lag_correlation(
         x, y, np.ones(len(x), dtype=bool), np.ones(len(y), dtype=bool), max(least, LEAST_SAMPLES)
@@ -149,10 +145,9 @@ def find_delay(
     peaks = top_peaks(score, PEAKS) if score.size else np.empty(0, dtype=np.int64)
     if not peaks.size:
         raise DataError(
-            f"no delay leaves {max(least, LEAST_SAMPLES) * step:.3g} s in common in which both "
-            "records vary alike",
+            "dsp.no-delay-leaves-common-both",
             quantity="time",
-            remedy="use records that both cover the motion, or give a smaller least overlap",
+            least=max(least, LEAST_SAMPLES) * step,
         )
     best = int(peaks[0])
     rival = next((int(k) for k in peaks[1:] if _apart(score, best, int(k))), None)
@@ -170,17 +165,19 @@ def find_delay(
     )
     if result.correlation < LEAST_CORRELATION:
         raise DataError(
-            f"the records have little in common: {result.correlation:.2f} at best, and "
-            f"{LEAST_CORRELATION:g} are needed",
+            "dsp.records-little-common-best-needed",
             quantity="values",
-            remedy="check that both show one motion, and the units and the stretch",
+            correlation=result.correlation,
+            least_correlation=LEAST_CORRELATION,
         )
     if result.ambiguous and refuse_ambiguous:
         raise DataError(
-            f"delays of {result.delay:.4f} and {result.runner_up_delay:.4f} s do about as well "
-            f"({score[best]:.3f} and {runner_up:.3f}): the motion repeats itself",
+            "dsp.delays-do-about-well-motion",
             quantity="time",
-            remedy="use a stretch in which it does not, or say near which delay to look",
+            delay=result.delay,
+            runner_up_delay=result.runner_up_delay,
+            score=score[best],
+            runner_up=runner_up,
         )
     return result
 
@@ -193,9 +190,7 @@ def _at_common_rate(first: EvenSignal, second: EvenSignal) -> tuple[EvenSignal, 
     widths = [s.values.shape[1] for s in signals]
     if widths[0] != widths[1]:
         raise DataError(
-            f"the records have {widths[0]} and {widths[1]} channels",
-            quantity="values",
-            remedy="pass the same channels of both",
+            "dsp.records-channels", quantity="values", widths=widths[0], widths_2=widths[1]
         )
     step = max(*(s.step for s in signals), 1.0 / COMMON_RATE)
     return _slower(signals[0], step), _slower(signals[1], step)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.dsp.fitted_weights import bandwidth, fitted_weights, slope_response
 from strapdown.dsp.local_weights import LocalWeights
 from strapdown.dsp.samples import as_channels, positive_step
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
@@ -68,9 +68,10 @@ class SlidingFit:
         positive_step(self.step)
         if not (self.half >= 1 and 1 <= self.degree <= 2 * self.half):
             raise ConfigError(
-                f"{2 * self.half + 1} samples do not fix a polynomial of degree {self.degree}",
+                "dsp.samples-do-not-fix-polynomial",
                 quantity="degree",
-                remedy="give half >= 1 and a degree from 1 to 2 half",
+                half=2 * self.half + 1,
+                degree=self.degree,
             )
 
     def weights(self, at: int = 0) -> Array:
@@ -140,10 +141,12 @@ def widest_fit(step: float, duration: float, loss: float = 0.02, degree: int = 2
     fit = SlidingFit(step, half, degree)
     if abs(fit.pulse_loss(duration)) > loss:
         raise ConfigError(
-            f"a pulse of {duration:g} s loses {fit.pulse_loss(duration):.2%} of its peak even over "
-            f"{2 * half + 1} samples of {step:g} s",
+            "dsp.pulse-loses-peak-even-over",
             quantity="duration",
-            remedy="use faster samples, allow a larger loss, or take a higher degree",
+            duration=duration,
+            pulse_loss=fit.pulse_loss(duration),
+            half=2 * half + 1,
+            step=step,
         )
     while True:
         wider = SlidingFit(step, half + 1, degree)
@@ -178,11 +181,7 @@ def derivative(values: ArrayLike, fit: SlidingFit, *, causal: bool = False) -> D
     channels = as_channels(values)
     n, window = len(channels), 2 * fit.half + 1
     if n < window:
-        raise DataError(
-            f"{n} samples are fewer than the {window} of a window",
-            quantity="values",
-            remedy="pass a longer record, or a narrower fit",
-        )
+        raise DataError("dsp.samples-fewer-than-window", quantity="values", n=n, window=window)
     at = np.arange(n)
     if causal:
         first = at[window - 1 :] - (window - 1)

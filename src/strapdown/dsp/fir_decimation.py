@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.decimation import LowPassDesign, low_pass_design
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -159,11 +159,7 @@ def fir_decimation(
         An option is out of its range.
     """
     if factor != int(factor) or factor < 2:
-        raise ConfigError(
-            f"every {factor!r}th sample is no decimation",
-            quantity="factor",
-            remedy="give a whole number from 2 on, as 10 for 1 kHz to 100 Hz",
-        )
+        raise ConfigError("dsp.every-th-sample-no-decimation", quantity="factor", factor=factor)
     design = low_pass_design(
         step, 1.0 / (factor * step), passband=passband, attenuation=attenuation
     )

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.dsp.decimation import SLACK, Flags, Resampled, in_blocks
 from strapdown.dsp.local_weights import LocalWeights
 from strapdown.dsp.samples import as_channels
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -52,26 +52,30 @@ def interpolate(
     n = len(t)
     if n != len(channels) or n < POINTS:
         raise DataError(
-            f"{n} stamps and {len(channels)} samples cannot be interpolated",
+            "dsp.stamps-samples-cannot-interpolated",
             quantity="time",
-            remedy=f"pass {POINTS} samples or more, each with its stamp",
+            n=n,
+            count=len(channels),
+            points=POINTS,
         )
     if not np.diff(t).min() > 0.0:
         row = int(np.argmax(np.diff(t) <= 0.0)) + 1
         raise DataError(
-            f"time does not advance: {t[row - 1]:.9g} s is followed by {t[row]:.9g} s",
+            "dsp.time-does-not-advance-followed",
             row=row + 1,
             quantity="time",
-            remedy="sort the rows and drop repeated stamps",
+            t=t[row - 1],
+            t_2=t[row],
         )
     slack = SLACK * float(np.median(np.diff(t)))
     off = np.maximum(t[0] - at, at - t[-1])
     if off.max() > slack:
         raise DataError(
-            f"{at[int(np.argmax(off))]:.9g} s lies outside the record, which goes from "
-            f"{t[0]:.9g} to {t[-1]:.9g} s",
+            "dsp.lies-outside-record-goes-2",
             quantity="stamps",
-            remedy="ask only for stamps within the record",
+            at=at[int(np.argmax(off))],
+            t=t[0],
+            t_2=t[-1],
         )
     first = np.clip(np.searchsorted(t, at, side="right") - POINTS // 2, 0, n - POINTS)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.fitted_weights import bandwidth, fitted_weights, slope_response
 from strapdown.dsp.local_weights import LocalWeights
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -125,24 +125,16 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
     n = time.size
     if n < LEAST_SAMPLES:
         raise DataError(
-            f"{n} samples, too few for a derivative",
-            quantity="time",
-            remedy=f"give at least {LEAST_SAMPLES}",
+            "dsp.samples-too-few-derivative", quantity="time", n=n, least_samples=LEAST_SAMPLES
         )
     step = float(np.median(np.diff(time)))
     if window is not None and not window > 0.0:
-        raise ConfigError(
-            f"{window:g} s is no window",
-            quantity="window",
-            remedy="give the length over which the rates may be smoothed, as 0.02",
-        )
+        raise ConfigError("dsp.no-window", quantity="window", window=window)
     width = USUAL_SAMPLES if window is None else 2 * max(1, round(0.5 * window / step)) + 1
     width = min(width, n)
     if abs(delay) > 0.5 * width * step:
         raise ConfigError(
-            f"a delay of {delay:g} s is longer than half the window of {width * step:g} s",
-            quantity="delay",
-            remedy="take the delay off the stamps, or use a longer window",
+            "dsp.delay-longer-than-half-window", quantity="delay", delay=delay, width=width * step
         )
     degree = 4 if width >= USUAL_SAMPLES else min(2, width - 1)
     first = np.clip(np.arange(n) - width // 2, 0, n - width)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import check_segment
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
@@ -133,7 +133,10 @@ class OutlierDesign:
         ):
             if not good:
                 raise ConfigError(
-                    f"{getattr(self, name)!r} is out of range", quantity=name, remedy=remedy
+                    "dsp.message",
+                    quantity=name,
+                    message=f"{getattr(self, name)!r} is out of range",
+                    remedy_text=remedy,
                 )
 
     @cached_property

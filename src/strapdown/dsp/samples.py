@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 
@@ -36,21 +36,19 @@ def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
     except (TypeError, ValueError):
         array = np.empty((0, 0, 0))
     if array.ndim not in (1, 2) or array.size == 0:
-        raise DataError(
-            "these are no samples of shape (n,) or (n, k)",
-            quantity=quantity,
-            remedy="pass one row a sample, one column a channel",
-        )
+        raise DataError("dsp.these-no-samples-shape-n", quantity=quantity)
     array = array.reshape(len(array), -1)
     bad = ~np.isfinite(array)
     if bad.any():
         row, channel = (int(i) for i in np.argwhere(bad)[0])
         raise DataError(
-            f"channel {channel} has {array[row, channel]} at sample {row}, and {int(bad.sum())} "
-            "such in all; one would spread over the whole output",
+            "dsp.channel-sample-such-all-would",
             row=row + 1,
             quantity=quantity,
-            remedy="cut the record before it, or fill it with what is known",
+            channel=channel,
+            array=array[row, channel],
+            at_row=row,
+            bad=int(bad.sum()),
         )
     return array
 
@@ -76,10 +74,11 @@ def check_segment(values: Array, first: int) -> None:
         return
     row, channel = (int(i) for i in np.argwhere(~np.isfinite(values))[0])
     raise DataError(
-        f"channel {channel} has {values[row, channel]}",
+        "dsp.channel",
         row=first + row + 1,
         quantity="values",
-        remedy="end the record before it and begin another, or fill it with what is known",
+        channel=channel,
+        values=values[row, channel],
     )
 
 
@@ -92,11 +91,7 @@ def positive_step(step: float) -> float:
         It is not positive and finite.
     """
     if not (math.isfinite(step) and step > 0.0):
-        raise ConfigError(
-            f"{step!r} s is no distance of samples",
-            quantity="step",
-            remedy="give the sampling interval in s, as 1e-4 for 10 kHz",
-        )
+        raise ConfigError("dsp.no-distance-samples", quantity="step", step=step)
     return float(step)
 
 
@@ -122,27 +117,27 @@ def even_step(time: ArrayLike, quantity: str = "time") -> float:
     """
     stamps = as_channels(time, quantity)[:, 0]
     if len(stamps) < 2:
-        raise DataError(
-            f"{len(stamps)} stamp has no step", quantity=quantity, remedy="pass two or more samples"
-        )
+        raise DataError("dsp.stamp-no-step", quantity=quantity, count=len(stamps))
     steps = np.diff(stamps)
     if not steps.min() > 0.0:
         row = int(np.argmax(steps <= 0.0)) + 1
         raise DataError(
-            f"time does not advance: {stamps[row - 1]:.9g} s is followed by {stamps[row]:.9g} s",
+            "dsp.time-does-not-advance-followed-2",
             row=row + 1,
             quantity=quantity,
-            remedy="sort the rows and drop repeated stamps",
+            stamps=stamps[row - 1],
+            stamps_2=stamps[row],
         )
     step = float(stamps[-1] - stamps[0]) / (len(stamps) - 1)
     off = np.abs(stamps - stamps[0] - step * np.arange(len(stamps)))
     if off.max() > JITTER * step:
         row = int(np.argmax(np.abs(steps - np.median(steps)))) + 1
         raise DataError(
-            f"the samples are not evenly spaced: the usual step is {np.median(steps):.6g} s, and "
-            f"{stamps[row - 1]:.9g} s is followed by {stamps[row]:.9g} s",
+            "dsp.samples-not-evenly-spaced-usual",
             row=row + 1,
             quantity=quantity,
-            remedy="interpolate onto even stamps first, or cut the record at the gap",
+            median=np.median(steps),
+            stamps=stamps[row - 1],
+            stamps_2=stamps[row],
         )
     return step

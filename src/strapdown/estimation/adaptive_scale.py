@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.influence import Influence
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.exceptions import ConfigError
 
 HUBER = Huber()
 
@@ -84,17 +84,17 @@ class AdaptiveScale:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ConfigError(
-                    f"{name} = {value} of the adaptive scale is not above 0",
-                    quantity=name,
-                    remedy="give a finite number above 0",
+                    "estimation.adaptive-scale-not-above", quantity=name, name=name, value=value
                 )
         for below, above in (("prior", "memory"), ("lowest", "highest")):
             if getattr(self, below) > getattr(self, above):
                 raise ConfigError(
-                    f"{below} = {getattr(self, below):g} of the adaptive scale is above "
-                    f"{above} = {getattr(self, above):g}",
+                    "estimation.adaptive-scale-above",
                     quantity=below,
-                    remedy=f"give at most {above}",
+                    below=below,
+                    value=getattr(self, below),
+                    above=above,
+                    value_2=getattr(self, above),
                 )
 
     @cached_property

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -76,7 +76,9 @@ def indefinite(row: int) -> DataError:
 
 
 def _bad(what: str, remedy: str) -> DataError:
-    return DataError(f"the covariance {what}", quantity="P", remedy=remedy)
+    return DataError(
+        "estimation.message", quantity="P", message=f"the covariance {what}", remedy_text=remedy
+    )
 
 
 def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
@@ -84,9 +86,11 @@ def check_prediction(state: Array, Phi: Array, Q: Array) -> None:
     for name, given in (("Phi", Phi), ("Q", Q)):
         if given.shape != state.shape:
             raise DataError(
-                f"{name} has the shape {given.shape}, and the covariance {state.shape}",
+                "estimation.shape-covariance",
                 quantity=name,
-                remedy="give both for the same states",
+                name=name,
+                shape=given.shape,
+                shape_2=state.shape,
             )
 
 
@@ -96,14 +100,15 @@ def bad_prediction(row: int, Phi: Array, Q: Array) -> DataError:
         if not np.isfinite(given).all():
             i, j = np.argwhere(~np.isfinite(given))[0]
             return DataError(
-                f"{name} is {given[i, j]} in row {i + 1}, column {j + 1}",
+                "estimation.row-column",
                 quantity=name,
-                remedy="look at the step or the sample of which it was made",
+                name=name,
+                given=given[i, j],
+                i=i + 1,
+                j=j + 1,
             )
     return DataError(
-        f"the predicted variance of state {row + 1} is no variance",
-        quantity="Q",
-        remedy="give a Q that is symmetric and has no negative eigenvalue",
+        "estimation.predicted-variance-state-no-variance", quantity="Q", at_row=row + 1
     )
 
 
@@ -111,25 +116,20 @@ def check_observations(x: Array, z: Array, H: Array, R: Array) -> None:
     """Raise `DataError` where the shapes of an epoch's observations do not fit."""
     if H.ndim != 2 or H.shape[1] != len(x) or not H.shape[0] == len(z) == len(R):
         raise DataError(
-            f"z has the shape {z.shape}, H {H.shape}, R {R.shape}, and there are {len(x)} states",
+            "estimation.z-shape-h-r-states",
             quantity="H",
-            remedy="give z (l,), H (l, n) and R (l,), the variances",
+            shape=z.shape,
+            shape_2=H.shape,
+            shape_3=R.shape,
+            count=len(x),
         )
 
 
 def bad_observation(j: int, nu: float, s: float, R: Array) -> DataError:
     """Return what to raise where observation j cannot be used."""
     if not R[j] >= 0.0 or not np.isfinite(R[j]):
-        return DataError(
-            f"the variance of observation {j + 1} is {R[j]:.6g}",
-            quantity="R",
-            remedy="give a finite variance; leave out what was not observed",
-        )
+        return DataError("estimation.variance-observation", quantity="R", j=j + 1, r=R[j])
     which, number = (
         ("difference from its prediction", nu) if not np.isfinite(nu) else ("expected variance", s)
     )
-    return DataError(
-        f"the {which} is {number} in observation {j + 1}",
-        quantity="z",
-        remedy="leave out what was not observed; if z is finite, look at H and at the estimate",
-    )
+    return DataError("estimation.observation", quantity="z", which=which, number=number, j=j + 1)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown.ellipsoids import find_ellipsoid
+from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.error_model import PHYSICAL, ErrorModel, Segment
 from strapdown.estimation.filter_state import FilterState
@@ -18,7 +19,6 @@ from strapdown.estimation.observation import Observation
 from strapdown.estimation.observed_together import Rules, rules_of_components, split_innovations
 from strapdown.estimation.resting_body import biases_in_level, resting
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import DivergenceError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
 
@@ -379,12 +379,7 @@ class ErrorFilter:
 
 def diverged(time: float) -> DivergenceError:
     """A state left what its mechanization can do, with the sample at this time."""
-    return DivergenceError(
-        f"the state has diverged with the sample at {time:.9g} s",
-        quantity="state",
-        remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-        "gravity, a burst; or begin from a state that is nearer to the truth",
-    )
+    return DivergenceError("estimation.state-diverged-sample", quantity="state", time=time)
 
 
 def symmetric(P: Array) -> Array:

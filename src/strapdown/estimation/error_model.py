@@ -10,9 +10,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.sensor_states import SensorStates, Stacked, stack
 from strapdown.estimation.states import StateBlock, StateLayout
-from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.sensors.triad_errors import Triad
 
@@ -140,8 +140,4 @@ def refuse_damped_height(mechanization: Mechanization) -> None:
         Its height is damped.
     """
     if mechanization.height == "damped":
-        raise ConfigError(
-            "an error model has no states for the loop that damps the height",
-            quantity="height",
-            remedy="use height='held' or 'free', and give heights as measurements",
-        )
+        raise ConfigError("estimation.error-model-no-states-loop", quantity="height")

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 
 @dataclass(frozen=True)
@@ -57,9 +57,10 @@ def check_rising(name: str, **values: float) -> None:
         if not (math.isfinite(value) and value > before):
             limit = f"{known} = {before:g}" if known else "0"
             raise ConfigError(
-                f"{quantity} = {value} of the influence function '{name}' is not above {limit}",
+                "estimation.message",
                 quantity=quantity,
-                remedy="give finite numbers, in standard deviations, that rise in the order "
+                message=f"{quantity} = {value} of the influence function '{name}' is not above {limit}",
+                remedy_text="give finite numbers, in standard deviations, that rise in the order "
                 + ", ".join(values),
             )
         before, known = value, quantity

@@ -12,6 +12,7 @@ from strapdown._kernels import wander_errors as kernel
 from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import find_ellipsoid
+from strapdown.errors import ConfigError
 from strapdown.estimation.error_model import (
     PHYSICAL,
     Array,
@@ -20,7 +21,6 @@ from strapdown.estimation.error_model import (
     refuse_damped_height,
 )
 from strapdown.estimation.states import StateBlock
-from strapdown.exceptions import ConfigError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
 
@@ -201,10 +201,11 @@ def _columns(used: Mechanization, time: float, row: Array) -> tuple[Array, Array
 def _checked(mechanization: Mechanization) -> Mechanization:
     if not isinstance(mechanization, WanderAzimuth):
         raise ConfigError(
-            f"error model '{QuaternionModel.name}' is of a wander azimuth, and '"
-            f"{mechanization.name}' has none",
+            "estimation.error-model-wander-azimuth-none",
             quantity="mechanization",
-            remedy=f"use mechanization '{WanderAzimuth.name}', or error model 'rotation_vector'",
+            name=QuaternionModel.name,
+            name_2=mechanization.name,
+            name_3=WanderAzimuth.name,
         )
     refuse_damped_height(mechanization)
     return mechanization

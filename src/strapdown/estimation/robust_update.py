@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.influence import Influence
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.post_fit import post_fit
 from strapdown.estimation.update_rule import Step
-from strapdown.exceptions import ConfigError
 
 #: A weight below it is none: the variance R / w of the observation must stay a number.
 NO_WEIGHT = 1e-30
@@ -59,8 +59,4 @@ class RobustUpdate:
 def check_scale(scale: float) -> None:
     """Raise `ConfigError` where a scale is not finite and positive."""
     if not (math.isfinite(scale) and scale > 0.0):
-        raise ConfigError(
-            f"the scale of the update is {scale}",
-            quantity="scale",
-            remedy="give a finite number above 0: 1 where the stated variances are right",
-        )
+        raise ConfigError("estimation.scale-update", quantity="scale", scale=scale)

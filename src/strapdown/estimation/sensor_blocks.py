@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.sensor_states import COUPLING, SensorStates
 from strapdown.estimation.states import StateBlock
-from strapdown.exceptions import ConfigError, nearest
 from strapdown.sensors.triad_errors import TriadLike
 from strapdown.tables.checks import is_number
 
@@ -245,9 +245,10 @@ def gauss_markov(states: SensorStates, correlation_time: float) -> SensorStates:
     """
     if not is_number(correlation_time) or not 0.0 < correlation_time < math.inf:
         raise ConfigError(
-            f"{correlation_time!r} is no time over which {states.block.name} changes",
+            "estimation.no-time-over-changes",
             quantity="correlation_time",
-            remedy="give seconds above zero; what is constant needs no process",
+            correlation_time=correlation_time,
+            name=states.block.name,
         )
     time = float(correlation_time)
     return replace(states, correlation_time=time, drive=states.sd * math.sqrt(2.0 / time))
@@ -301,9 +302,11 @@ def _known(terms: Sequence[str]) -> tuple[str, ...]:
     wrong = [str(term) for term in terms if term not in CROSS_TERMS]
     if isinstance(terms, str) or wrong or not terms or len(set(terms)) != len(terms):
         raise ConfigError(
-            f"{terms!r} are no terms of a misalignment",
+            "estimation.no-terms-misalignment" if wrong else "estimation.no-terms-misalignment-2",
             quantity="terms",
-            remedy=nearest(wrong[0], CROSS_TERMS) if wrong else "give each of some once",
+            terms=terms,
+            word=wrong[0],
+            known=CROSS_TERMS,
         )
     return tuple(terms)
 
@@ -324,4 +327,9 @@ def _as_many(given: Any, k: int, name: str) -> Array:
 
 
 def _refused(name: str, given: object, remedy: str) -> ConfigError:
-    return ConfigError(f"{given!r} is no standard deviation", quantity=name, remedy=remedy)
+    return ConfigError(
+        "estimation.message",
+        quantity=name,
+        message=f"{given!r} is no standard deviation",
+        remedy_text=remedy,
+    )

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Innovations
 from strapdown.estimation.covariance_input import bad_observation
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -45,9 +45,7 @@ def take_by_rule(
     steps = [one.step for one in rule] if isinstance(rule, Sequence) else [rule.step] * len(z)
     if len(steps) != len(z):
         raise ConfigError(
-            f"there are {len(steps)} rules for {len(z)} observations",
-            quantity="rule",
-            remedy="give one rule for all, or one for each",
+            "estimation.rules-observations", quantity="rule", count=len(steps), count_2=len(z)
         )
     for j, (r, step) in enumerate(zip(R.tolist(), steps, strict=True)):
         nu, s = expect(matrix, diagonal, x, z, H, j, work)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.wd import Chernodarov
-from strapdown.exceptions import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -96,9 +96,7 @@ class SignalFilter:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.bandwidth) and self.bandwidth > 0.0):
             raise ConfigError(
-                f"{self.bandwidth!r} Hz is no bandwidth",
-                quantity="bandwidth",
-                remedy="give Hz, as 20: motion below a third of it passes unchanged",
+                "estimation.hz-no-bandwidth", quantity="bandwidth", bandwidth=self.bandwidth
             )
 
     @property

@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.sensor_blocks import ERRORS_OF_SENSORS, gauss_markov, random_walk
 from strapdown.estimation.sensor_states import SensorStates
-from strapdown.exceptions import ConfigError
 from strapdown.sensors.triad_errors import TriadLike
 
 __all__ = ["StateProcess", "with_processes"]
@@ -40,9 +40,7 @@ class StateProcess:
     def __post_init__(self) -> None:
         if self.correlation_time is not None and self.walk is not None:
             raise ConfigError(
-                "it cannot both walk and come back to zero",
-                quantity="states, correlation_time",
-                remedy="keep the correlation time, or the walk",
+                "estimation.cannot-both-walk-come-back", quantity="states, correlation_time"
             )
 
     def of(self, name: str, block: SensorStates | None) -> SensorStates:
@@ -76,9 +74,9 @@ class StateProcess:
                 time = block.correlation_time
             if drifts and time is None:
                 raise ConfigError(
-                    f"nothing states over which time '{name}' changes",
+                    "estimation.nothing-states-over-time-changes",
                     quantity=f"states.{name}",
-                    remedy="state correlation_time_s, or estimate a bias instead",
+                    name=name,
                 )
             made = ERRORS_OF_SENSORS[name]
             new = made(self.sd, time) if drifts else made(self.sd)
@@ -87,9 +85,7 @@ class StateProcess:
             block = new
         if block is None:
             raise ConfigError(
-                f"nothing states how large '{name}' may be",
-                quantity=f"states.{name}",
-                remedy="state its standard deviation, too",
+                "estimation.nothing-states-how-large-may", quantity=f"states.{name}", name=name
             )
         if self.correlation_time is not None:
             return gauss_markov(block, self.correlation_time)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.sensor_blocks import (
     accel_bias,
     accel_drift,
@@ -18,7 +19,6 @@ from strapdown.estimation.sensor_blocks import (
 )
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.estimation.standard_states import standard_states
-from strapdown.exceptions import ConfigError, nearest
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -76,12 +76,14 @@ def stated_states(
     for name in names:
         if name not in STATED_STATES:
             raise ConfigError(
-                f"'{name}' is no error of a sensor that a filter can estimate",
+                "estimation.no-error-sensor-filter-can",
                 quantity="states",
-                remedy=nearest(name, STATED_STATES),
+                name=name,
+                word=name,
+                known=STATED_STATES,
             )
         if list(names).count(name) > 1:
-            raise ConfigError(f"'{name}' stands there twice", quantity="states", remedy="keep one")
+            raise ConfigError("estimation.stands-twice", quantity="states", name=name)
         out.append(_block(name, sensors, bounds, names))
     return tuple(out)
 
@@ -117,18 +119,20 @@ def _block(
     drift, sd = getattr(sensors, f"{triad}_drift"), _size(name, sensors)
     if not any(sd):
         raise ConfigError(
-            f"nothing states how large '{name}' may be",
+            "estimation.nothing-states-how-large-may-2",
             quantity="states",
-            remedy=f"state {keys} in [sensors.{triad}], or leave it out",
+            name=name,
+            keys=keys,
+            triad=triad,
         )
     if attribute != "drift":
         return make(sd)
     if math.isinf(drift.correlation_time):
         raise ConfigError(
-            f"nothing states over which time '{name}' changes",
+            "estimation.nothing-states-over-time-changes-2",
             quantity="states",
-            remedy=f"state correlation_time_s in [sensors.{triad}], or leave it out: a drift "
-            "without end is a part of the bias",
+            name=name,
+            triad=triad,
         )
     return make(sd, drift.correlation_time)
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -57,9 +57,7 @@ class StateLayout:
         for name in names:
             if names.count(name) > 1:
                 raise ConfigError(
-                    f"'{name}' stands twice among the states",
-                    quantity="states",
-                    remedy="name each block once",
+                    "estimation.stands-twice-among-states", quantity="states", name=name
                 )
 
     @cached_property
@@ -84,9 +82,7 @@ class StateLayout:
         """Place of a block; a `ConfigError` names those that there are."""
         if name not in self.places:
             raise ConfigError(
-                f"there is no state '{name}'",
-                quantity="states",
-                remedy=nearest(name, self.places),
+                "estimation.no-state", quantity="states", name=name, word=name, known=self.places
             )
         return self.places[name]
 

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.lag_correlation import lag_correlation, repeats, top_peaks
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.increments import increments_from_imu
 from strapdown.tables import GYRO, THETA, find_gaps
 
@@ -95,10 +95,11 @@ def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
     n = int((time[-1] - origin) / step)
     if n < 8:
         raise DataError(
-            f"{time[-1] - origin:.3g} s are too short to be compared with another log",
+            "evaluation.too-short-compared-another-log",
             file=imu.attrs.get("source"),
             quantity="time",
-            remedy=f"use logs that share {LEAST_OVERLAP:g} s of motion",
+            time=time[-1] - origin,
+            least_overlap=LEAST_OVERLAP,
         )
     edges = step * np.arange(n + 1)
     even = steps.max() < 1.5 * np.median(steps)
@@ -170,18 +171,17 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
         spread = grid.rate[grid.known] if grid.known.any() else np.zeros((1, 3))
         if float(np.sqrt(spread.var(axis=0).sum())) < LEAST_RATE:
             raise DataError(
-                f"the {name} log hardly turns: its rates scatter by less than {LEAST_RATE:g} rad/s",
+                "evaluation.log-hardly-turns-rates-scatter",
                 quantity="gyro",
-                remedy="turn both sensors together about two axes or more, not at a steady beat",
+                name=name,
+                least_rate=LEAST_RATE,
             )
     x, y = (np.sqrt((g.rate**2).sum(axis=1)) for g in (a, b))
     least = min(LEAST_OVERLAP, 0.5 * _shorter(a, b)) / step
     lags, score = lag_correlation(x, y, a.known, b.known, least)
     if not score.size:
         raise DataError(
-            f"they share less than {LEAST_OVERLAP:g} s however they are laid",
-            quantity="time",
-            remedy="use logs that both cover the motion",
+            "evaluation.they-share-less-than-however", quantity="time", least_overlap=LEAST_OVERLAP
         )
     weighed = [(_vector_share(a, b, lag), lag) for lag in lags[top_peaks(score, PEAKS)].astype(int)]
     best, at = max(weighed, default=(0.0, 0))
@@ -191,18 +191,20 @@ def coarse_offset(first: pd.DataFrame, second: pd.DataFrame) -> CoarseOffset:
     found = CoarseOffset(b.start - a.start - at * step, best, max(rest, default=0.0))
     if best < LEAST_CORRELATION:
         raise DataError(
-            f"the rates of the two logs have little in common: {best:.2f} at best, and "
-            f"{LEAST_CORRELATION:g} are needed",
+            "evaluation.rates-two-logs-little-common",
             quantity="gyro",
-            remedy="check that both sensors sat on one rigid body, and the units and the window",
+            best=best,
+            least_correlation=LEAST_CORRELATION,
         )
     if repeats(best, found.runner_up):
         other = next(lag for share, lag in weighed if share == found.runner_up)
         raise DataError(
-            f"offsets of {found.offset:.2f} and {b.start - a.start - other * step:.2f} s do "
-            f"about as well ({best:.3f} and {found.runner_up:.3f}): the motion repeats itself",
+            "evaluation.offsets-do-about-well-motion",
             quantity="time",
-            remedy="use a stretch in which the motion does not repeat, or logs of one clock",
+            offset=found.offset,
+            start=b.start - a.start - other * step,
+            best=best,
+            runner_up=found.runner_up,
         )
     return found
 

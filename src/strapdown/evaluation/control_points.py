@@ -14,8 +14,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.errors import DataError
 from strapdown.evaluation.trajectory_at import trajectory_at
-from strapdown.exceptions import DataError
 from strapdown.frames import ned_from_geodetic
 from strapdown.tables import places_of
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -136,19 +136,22 @@ def score_control_points(
     places = values_of(points, ["north", "east"])[within]
     if len(places) < 2:
         raise DataError(
-            f"{len(places)} of {len(time)} control points lie within the run, from {own[0]:.9g} to "
-            f"{own[-1]:.9g} s; they go from {time[0]:.9g} to {time[-1]:.9g} s",
+            "evaluation.control-points-lie-within-run",
             file=source_of(points),
             quantity="time",
-            remedy="give their times on the clock of the log",
+            count=len(places),
+            count_2=len(time),
+            own=own[0],
+            own_2=own[-1],
+            time=time[0],
+            time_2=time[-1],
         )
     way = float(np.hypot(*np.diff(places, axis=0).T).sum())
     if not way > NO_WAY:
         raise DataError(
-            "all control points within the run are at one place, which no heading fits",
+            "evaluation.all-control-points-within-run",
             file=source_of(points),
             quantity="north, east",
-            remedy="give points of the way",
         )
     here = trajectory_at(trajectory, time[within], ellipsoid)
     origin = places_of(trajectory.iloc[:1])[0]

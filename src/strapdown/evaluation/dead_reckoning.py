@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import DataError
 from strapdown.evaluation.differences import attitude_at
-from strapdown.exceptions import DataError
 from strapdown.results.rests import RestStretch
 from strapdown.results.runs import AttitudeRun
 from strapdown.tables import ACCEL, QUATERNION
@@ -106,21 +106,21 @@ def dead_reckon(
     """
     if not set(ACCEL) <= set(imu.columns):
         raise DataError(
-            "position needs acceleration, and the log has none",
+            "evaluation.position-needs-acceleration-log-none",
             file=imu.attrs.get("source"),
             quantity="accel",
-            remedy="leave out the reference points of position",
         )
     stamps = imu.index.to_numpy(dtype=np.float64)
     a, b = (int(np.searchsorted(stamps, t)) for t in (first.end, second.start))
     begin = float(run.attitude.index[0])
     if b <= a or first.end < begin or second.start > float(run.attitude.index[-1]):
         raise DataError(
-            f"no stretch from the rest that ends at {first.end:.9g} s to one that starts at "
-            f"{second.start:.9g} s, within a run from {begin:.9g} s",
+            "evaluation.no-stretch-rest-ends-starts",
             file=imu.attrs.get("source"),
             quantity="rest",
-            remedy="name two rests in order of time, after the start of the run",
+            end=first.end,
+            start=second.start,
+            begin=begin,
         )
     time = stamps[a : b + 1]
     force = imu[ACCEL].to_numpy(dtype=np.float64)[a : b + 1]

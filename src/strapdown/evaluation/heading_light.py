@@ -20,7 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.record import NavigationRecord
 
 __all__ = [
@@ -190,9 +190,7 @@ def heading_light(
     """
     if not 0.0 < green <= red:
         raise ConfigError(
-            f"green below {green} deg and red beyond {red} deg are no limits of a heading",
-            quantity="trust",
-            remedy="give heading_limit_deg above 0, and heading_red_deg no less than that",
+            "evaluation.green-below-red-beyond-no", quantity="trust", green=green, red=red
         )
     seconds = seconds_of(record)
     count = len(seconds)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.chi_square import chi_square_exceeded, chi_square_quantile
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["SHARE", "band_of_mean", "bounds", "normalised_squares"]
 
@@ -68,8 +68,5 @@ def band_of_mean(freedom: int, runs: int, share: float = SHARE) -> tuple[float, 
 
 def _not_positive(at: NDArray[np.int_]) -> DataError:
     return DataError(
-        "a covariance is not positive definite",
-        row=int(at[0]) + 1,
-        quantity="covariance",
-        remedy="leave out what the filter has no states of, as a height that is held",
+        "evaluation.covariance-not-positive-definite", row=int(at[0]) + 1, quantity="covariance"
     )

@@ -15,8 +15,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import INSTANT, NUMBER, instant
-from strapdown.exceptions import ConfigError
 
 __all__ = ["PlaceReference", "is_place", "parse_place"]
 
@@ -98,7 +98,7 @@ def parse_place(text: str, start: float, end: float) -> PlaceReference:
     plain = re.sub(r"[:=,]", " ", plain).strip()
     match = _SAME.fullmatch(plain) or _MOVED.fullmatch(plain)
     if match is None:
-        raise ConfigError(f"'{text}' is not understood", quantity="reference", remedy=_HOW)
+        raise ConfigError("evaluation.not-understood", quantity="reference", text=text)
     said = match.groupdict()
     unit = _UNITS[(said.get("unit") or "m").lower()]
     x, y, z = (float(said.get(axis) or 0.0) * unit for axis in "xyz")
@@ -107,15 +107,11 @@ def parse_place(text: str, start: float, end: float) -> PlaceReference:
         sd = float(said["sd"]) * _UNITS[(said["sd_unit"] or "m").lower()]
         if not sd > 0.0:
             raise ConfigError(
-                f"'{text}' has a standard deviation that is not positive",
-                quantity="reference",
-                remedy="leave sd out, or give metres",
+                "evaluation.standard-deviation-not-positive", quantity="reference", text=text
             )
     at, since = (instant(said[key], start, end, text) for key in ("at", "since"))
     if since >= at:
         raise ConfigError(
-            f"'{text}' compares {at:g} s with {since:g} s, which is not before it",
-            quantity="reference",
-            remedy="name the earlier instant second",
+            "evaluation.compares-not-before", quantity="reference", text=text, at=at, since=since
         )
     return PlaceReference(at, since, (x, y, z), sd)

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.errors import DataError
 from strapdown.evaluation.dead_reckoning import dead_reckon
 from strapdown.evaluation.place_references import PlaceReference
-from strapdown.exceptions import DataError
 from strapdown.results.rests import RestStretch
 from strapdown.results.runs import AttitudeRun
 from strapdown.results.scores import PositionScore
@@ -100,18 +100,21 @@ def _between(place: PlaceReference, rests: Sequence[RestStretch]) -> tuple[int, 
         if not near or min(near) > NEAR_REST:
             known = ", ".join(f"{r.start:.2f}-{r.end:.2f}" for r in rests) or "none was found"
             raise DataError(
-                f"'{place}' names {at:.9g} s, which is at no rest (rests, s: {known})",
+                "evaluation.names-no-rest-rests",
                 quantity="reference",
-                remedy="name an instant at which the sensor lay still: elsewhere its velocity "
-                "is not known, and position cannot be reckoned from there",
+                place=place,
+                at=at,
+                known=known,
             )
         found.append(int(np.argmin(near)))
     if found[0] == found[1]:
         rest = rests[found[0]]
         raise DataError(
-            f"'{place}' names two instants of one rest, {rest.start:.2f}-{rest.end:.2f} s",
+            "evaluation.names-two-instants-rest",
             quantity="reference",
-            remedy="name two rests with a motion between them",
+            place=place,
+            start=rest.start,
+            end=rest.end,
         )
     return found[0], found[1] + 1
 

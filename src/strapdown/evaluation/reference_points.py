@@ -22,8 +22,8 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
-from strapdown.exceptions import ConfigError, DataError
 from strapdown.increments import increments_from_imu
 from strapdown.results.runs import AttitudeRun
 from strapdown.results.scores import Score
@@ -96,16 +96,14 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text.partition("#")[0])).strip()
     match = next((m for form in _FORMS if (m := form.fullmatch(plain))), None)
     if match is None:
-        raise ConfigError(f"'{text}' is not understood", quantity="reference", remedy=_HOW)
+        raise ConfigError("evaluation.not-understood-2", quantity="reference", text=text)
     said = match.groupdict()
     row: dict[str, object] = {"time": instant(said["at"], start, end, text)}
     if said.get("sd"):
         row["sd"] = float(said["sd"])
         if not float(said["sd"]) > 0.0:
             raise ConfigError(
-                f"'{text}' has a standard deviation that is not positive",
-                quantity="reference",
-                remedy="leave sd out, or give degrees",
+                "evaluation.standard-deviation-not-positive-2", quantity="reference", text=text
             )
     if "since" in said:
         row["since"] = instant(said["since"], start, end, text)
@@ -114,9 +112,11 @@ def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
         # An interval whose ends are words is as long as the log, which is not known here yet.
         if since >= at and np.isfinite([since, at]).all():
             raise ConfigError(
-                f"'{text}' compares {at:g} s with {since:g} s, which is not before it",
+                "evaluation.compares-not-before",
                 quantity="reference",
-                remedy="name the earlier instant second",
+                text=text,
+                at=at,
+                since=since,
             )
     if "turns" in said:
         axis, sign = _axis(said["axis"], text)
@@ -159,9 +159,12 @@ def instant(word: str, start: float, end: float, text: str) -> float:
     slack = 1e-3
     if not start - slack <= value <= end + slack:
         raise DataError(
-            f"'{text}' names {value:g} s, and the log runs from {start:.9g} to {end:.9g} s",
+            "evaluation.names-log-runs",
             quantity="reference",
-            remedy="name an instant within it, or the words start and end",
+            text=text,
+            value=value,
+            start=start,
+            end=end,
         )
     return min(max(value, start), end)
 
@@ -170,9 +173,11 @@ def _axis(word: str, text: str) -> tuple[str, float]:
     name = word.lower().lstrip("+-")
     if name not in _AXIS_NAMES:
         raise ConfigError(
-            f"'{text}' names the axis '{word}'",
+            "evaluation.names-axis",
             quantity="reference",
-            remedy=f"use one of {', '.join(_AXIS_NAMES)}, with a sign if need be",
+            text=text,
+            word=word,
+            axis_names=_AXIS_NAMES,
         )
     axis, sign = _AXIS_NAMES[name]
     return axis, -sign if word.startswith("-") else sign
@@ -279,10 +284,11 @@ def _compare(attitude: pd.DataFrame, row: pd.Series, number: int) -> tuple[list[
     instants = [float(row["time"])] + ([] if alone else [float(row["since"])])
     if min(instants) < begin:
         raise DataError(
-            f"{in_words(row)}, and the computed attitude begins at {begin:.9g} s",
+            "evaluation.computed-attitude-begins",
             row=number,
             quantity="reference",
-            remedy="name a later instant, or another --initial",
+            in_words=in_words(row),
+            begin=begin,
         )
     q_at = attitude_at(attitude, instants)
     if row["kind"] == "known":

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.levelling import level
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results.rests import RestStretch, SamePose
 from strapdown.tables import references_table
 
@@ -166,9 +166,7 @@ def _overlap(a: RestStretch, b: RestStretch) -> bool:
 def _force(rest: RestStretch) -> tuple[Array, Array]:
     if rest.accel_mean is None:
         raise DataError(
-            f"the rest from {rest.start:.9g} to {rest.end:.9g} s has no acceleration",
-            quantity="accel",
-            remedy="use a log with an accelerometer, or give roll and pitch yourself",
+            "evaluation.rest-no-acceleration", quantity="accel", start=rest.start, end=rest.end
         )
     level(rest.accel_mean)
     noise = rest.accel_mean_sd or rest.accel_sd or (0.0, 0.0, 0.0)

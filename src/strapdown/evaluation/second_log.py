@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown.errors import DataError
 from strapdown.evaluation.clock_alignment import (
     SMOOTH_CELLS,
     CoarseOffset,
@@ -18,7 +19,6 @@ from strapdown.evaluation.clock_alignment import (
     even_rates,
     proper_rotation,
 )
-from strapdown.exceptions import DataError
 from strapdown.results.second_log import SecondLog
 from strapdown.tables import check_imu
 
@@ -101,10 +101,7 @@ def align_second_log(
     covariance, residual, share = fit.spread(state, axis)
     if share < LEAST_SHARE:
         raise DataError(
-            f"one rotation and one clock leave {100 * (1 - share):.0f} % of the power of the "
-            "rates unexplained",
-            quantity="gyro",
-            remedy="check that both sensors sat on one rigid body, and the units and the window",
+            "evaluation.rotation-clock-leave-power-rates", quantity="gyro", share=100 * (1 - share)
         )
     return _result(fit, state, axis, covariance, residual, coarse)
 
@@ -130,9 +127,10 @@ class _Fit:
         inside &= b.known[cell.astype(np.int64)]
         if inside.sum() * a.step < 2.0:
             raise DataError(
-                f"at an offset of {offset:.3f} s the logs share {inside.sum() * a.step:.3g} s",
+                "evaluation.offset-logs-share",
                 quantity="time",
-                remedy="use logs that both cover the motion, or another offset",
+                offset=offset,
+                inside=inside.sum() * a.step,
             )
         self.time, self.rate = time[inside], a.rate[inside]
         self.middle = float(0.5 * (self.time[0] + self.time[-1]))

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.attitude import Quaternion, run_attitude
+from strapdown.errors import DataError
 from strapdown.evaluation.differences import attitude_at
-from strapdown.exceptions import DataError
 from strapdown.increments import increments_from_imu
 from strapdown.results.second_log import SecondLog
 from strapdown.tables import GYRO, attitude_table, check_imu, imu_table
@@ -99,12 +99,9 @@ def truth_from_second_log(
     """
     if aligned.axis is not None:
         raise DataError(
-            "the body turned about one axis only "
-            f"({', '.join(f'{v:.2f}' for v in aligned.axis)} in the first sensor's axes), and the "
-            "mounting of the second sensor about that axis is not known",
+            "evaluation.body-turned-about-axis-only",
             quantity="mounting",
-            remedy="turn both about a second axis in the log, or compare the rate about that "
-            "axis alone",
+            axis=[f"{v:.2f}" for v in aligned.axis],
         )
     check_imu(second)
     if attitude is None:
@@ -123,9 +120,7 @@ def truth_from_second_log(
     inside = (there >= table.index[0]) & (there <= table.index[-1])
     if inside.sum() < 2:
         raise DataError(
-            f"{int(inside.sum())} stamps of the first log lie within what the second one covers",
-            quantity="time",
-            remedy="use logs that both cover the motion",
+            "evaluation.stamps-first-log-lie-within", quantity="time", inside=int(inside.sum())
         )
     q_n2 = attitude_at(table, there[inside])
     q_21 = rotation.conjugate(aligned.mounting)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.tables import (
     EULER,
@@ -160,11 +160,13 @@ def trajectory_at(
     outside = np.flatnonzero(~beat & ~((t > stamps[0]) & (t < stamps[-1])))
     if outside.size:
         raise DataError(
-            f"{t[outside[0]]:.9g} s is outside of its span, {stamps[0]:.9g} to {stamps[-1]:.9g} s",
+            "evaluation.outside-span",
             file=trajectory.attrs.get("source"),
             row=int(outside[0]) + 1,
             quantity="time",
-            remedy="ask for instants within the span: nothing is extrapolated",
+            t=t[outside[0]],
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
         )
     out = trajectory[[*GEODETIC, *VELOCITY, *EULER]].to_numpy(dtype=np.float64)[nearest]
     if not same.all():

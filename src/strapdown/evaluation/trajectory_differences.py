@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.errors import DataError, Finding
 from strapdown.evaluation.trajectory_at import (
     SAME_BEAT,
     interpolation_cost,
     same_stamps,
     trajectory_at,
 )
-from strapdown.exceptions import DataError, Finding
 from strapdown.frames import ecef_from_geodetic, place_difference
 from strapdown.tables import (
     EULER,
@@ -112,18 +112,19 @@ def _within(estimate: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
     source = estimate.attrs.get("source")
     for time, name in ((stamps, source), (known, reference.attrs.get("source"))):
         if not time.size:
-            raise DataError("the trajectory has no rows", file=name, remedy="give one that has")
+            raise DataError("evaluation.trajectory-no-rows", file=name)
     _, same = same_stamps(known, stamps, SAME_BEAT)
     inside = same | ((stamps > known[0]) & (stamps < known[-1]))
     if not inside.any():
         spans = [f"{t[0]:.9g} to {t[-1]:.9g} s" for t in (stamps, known)]
         raise DataError(
-            f"the estimate ({spans[0]}) has no instant within the reference ({spans[1]})",
+            "evaluation.estimate-no-instant-within-reference"
+            if stamps[-1] < known[0] or stamps[0] > known[-1]
+            else "evaluation.estimate-no-instant-within-reference-2",
             file=source,
             quantity="time",
-            remedy="check that both count time from the same moment and in seconds"
-            if stamps[-1] < known[0] or stamps[0] > known[-1]
-            else "the reference lies between two rows of the estimate: exchange the two",
+            spans=spans[0],
+            spans_2=spans[1],
         )
     return estimate.iloc[np.flatnonzero(inside)]
 
@@ -162,19 +163,19 @@ def _far_apart(
         # A hundredth is no accident.
         if latitude <= 90.0 and longitude <= 360.0 and distance(a, b) < 0.01 * apart:
             raise DataError(
-                f"the trajectories begin {apart / 1000.0:.0f} km apart, and "
-                f"{distance(a, b) / 1000.0:.3g} km if {why}",
+                "evaluation.message",
                 file=names[0],
                 row=1,
                 quantity="lat, lon",
-                remedy=acts[act],
+                message=f"the trajectories begin {apart / 1000.0:.0f} km apart, and {distance(a, b) / 1000.0:.3g} km if {why}",
+                remedy_text=acts[act],
             )
     return [
         Finding(
-            f"the trajectories begin {apart / 1000.0:.0f} km apart",
+            "evaluation.trajectories-begin-km-apart",
             file=names[0],
             quantity="lat, lon",
-            remedy="check that they are of one vehicle and one clock",
+            apart=apart / 1000.0,
         )
     ]
 
@@ -191,12 +192,14 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
         count = sum(int(((time > g.start) & (time < g.end)).sum()) for g in gaps)
         findings.append(
             Finding(
-                f"{count} instants of the estimate lie in {len(gaps)} gaps of the reference, the "
-                f"longest {longest.length:.3g} s at {longest.start:.9g} s, where it usually has a "
-                f"row every {longest.usual:.3g} s",
+                "evaluation.instants-estimate-lie-gaps-reference",
                 file=source,
                 quantity="time",
-                remedy="judge the differences there with care, or leave those instants out",
+                count=count,
+                count_2=len(gaps),
+                length=longest.length,
+                start=longest.start,
+                usual=longest.usual,
             )
         )
     first, last = np.searchsorted(stamps, [time[0], time[-1]])
@@ -210,10 +213,10 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
     return [
         *findings,
         Finding(
-            f"the reference has no row at {time.size} instants of the estimate and was "
-            f"interpolated; {judged}",
+            "evaluation.reference-no-row-instants-estimate",
             file=source,
             quantity="time",
-            remedy="for smaller differences than that, use a reference with the same stamps",
+            size=time.size,
+            judged=judged,
         ),
     ]

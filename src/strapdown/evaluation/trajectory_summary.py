@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.errors import DataError, Finding
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
-from strapdown.exceptions import DataError, Finding, nearest
 from strapdown.tables import EULER, NED, VELOCITY, check_trajectory_error
 
 Array = NDArray[np.float64]
@@ -82,8 +82,10 @@ class DifferenceSummary:
             if error.quantity == quantity:
                 return error
         raise DataError(
-            f"there is no error of '{quantity}'",
-            remedy=nearest(quantity, [e.quantity for e in self.errors]),
+            "evaluation.no-error",
+            of_what=quantity,
+            word=quantity,
+            known=[e.quantity for e in self.errors],
         )
 
     def to_pandas(self) -> pd.DataFrame:
@@ -150,11 +152,7 @@ def summarise_differences(differences: pd.DataFrame) -> DifferenceSummary:
     """
     check_trajectory_error(differences)
     if differences.empty:
-        raise DataError(
-            "the table has no rows",
-            file=differences.attrs.get("source"),
-            remedy="summarise differences of at least one instant",
-        )
+        raise DataError("evaluation.table-no-rows", file=differences.attrs.get("source"))
     time = differences.index.to_numpy(dtype=np.float64)
     groups = [
         (NED, "m", {"horizontal": NED[:2], "position": NED}),

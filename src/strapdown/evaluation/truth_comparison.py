@@ -13,10 +13,10 @@ from strapdown import rotation
 from strapdown._kernels import geodetic as kernel
 from strapdown.dsp.chi_square import normal_quantile
 from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.errors import DataError, Finding
 from strapdown.evaluation.nees import SHARE, bounds, normalised_squares
 from strapdown.evaluation.trajectory_at import SAME_BEAT, same_stamps, trajectory_at
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.exceptions import DataError, Finding
 from strapdown.frames import q_ne
 from strapdown.rotation.euler_angles import euler_sd
 from strapdown.simulation.earth_motion import EarthMotion
@@ -343,9 +343,11 @@ def _rms(x: Array) -> float:
 def _nothing_in_common(trajectory: pd.DataFrame, span: tuple[float, float]) -> DataError:
     time = trajectory.index
     return DataError(
-        f"the run ({time[0]:.9g} to {time[-1]:.9g} s) and the truth ({span[0]:.9g} to "
-        f"{span[1]:.9g} s) have no instant in common",
+        "evaluation.run-truth-no-instant-common",
         file=trajectory.attrs.get("source"),
         quantity="time",
-        remedy="check that both count time from the same moment and in seconds",
+        time=time[0],
+        time_2=time[-1],
+        span=span[0],
+        span_2=span[1],
     )

@@ -15,9 +15,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
+from strapdown.errors import ConfigError
 from strapdown.estimation.update_rule import Step
 from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
-from strapdown.exceptions import ConfigError, nearest
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.piece import NavigationPiece, Seen
 from strapdown.navigation.record import Span
@@ -124,9 +124,11 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
     room = end - begin - length
     if room < 0.0 or places < 1 or not length > 0.0:
         raise ConfigError(
-            f"{places} spans of {length:g} s do not fit within {end - begin:g} s",
+            "evaluation.spans-do-not-fit-within",
             quantity="withhold",
-            remedy="withhold fewer seconds",
+            places=places,
+            length=length,
+            end=end - begin,
         )
     starts = begin + room * (np.linspace(0.0, 1.0, places) if places > 1 else np.array([0.5]))
     return tuple(Span(f"{length:g} s", float(at), float(at + length)) for at in starts)
@@ -157,19 +159,18 @@ def without_spans(table: pd.DataFrame, spans: Sequence[Span]) -> pd.DataFrame:
         within = (time > span.begin) & (time <= span.end)
         if not within.any():
             raise ConfigError(
-                f"there is nothing to withhold from {span.begin:g} to {span.end:g} s: the table "
-                f"goes from {time[0]:.9g} to {time[-1]:.9g} s",
+                "evaluation.nothing-withhold-table-goes",
                 file=source_of(table),
                 quantity="withhold",
-                remedy="give times on the clock of the table, in s",
+                begin=span.begin,
+                end=span.end,
+                time=time[0],
+                time_2=time[-1],
             )
         kept &= ~within
     if not kept.any():
         raise ConfigError(
-            "every row would be withheld",
-            file=source_of(table),
-            quantity="withhold",
-            remedy="withhold less",
+            "evaluation.every-row-would-withheld", file=source_of(table), quantity="withhold"
         )
     out = table[kept]
     out.attrs = dict(table.attrs)
@@ -224,9 +225,12 @@ def score_withheld(
         first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
         if first < at or first == last or span.end > time[-1]:
             raise ConfigError(
-                f"from {span.begin:.9g} to {span.end:.9g} s is not within the record",
+                "evaluation.not-within-record",
                 quantity="withhold",
-                remedy=f"withhold between {state.time:.9g} and {time[-1]:.9g} s",
+                begin=span.begin,
+                end=span.end,
+                time=state.time,
+                time_2=time[-1],
             )
         state, _ = navigator.advance(state, time[at:first], rows[at:first])
         at = first
@@ -283,9 +287,11 @@ def blinded(navigator: Navigator, name: str) -> Navigator:
     aid = navigator.by_name.get(name)
     if not isinstance(aid, TableAid):
         raise ConfigError(
-            f"there is no aid '{name}' with a table",
+            "evaluation.no-aid-table",
             quantity="withhold",
-            remedy=nearest(name, navigator.by_name),
+            name=name,
+            word=name,
+            known=navigator.by_name,
         )
     aids = navigator.aids
     blind = tuple(replace(one, rule=Withholding()) if one.name == name else one for one in aids)
@@ -346,9 +352,7 @@ def seen_of(pieces: Sequence[NavigationPiece], name: str, span: Span) -> list[Se
     seen = [one for piece in pieces for one in piece.seen if one.name == f"{name}.position"]
     if not seen:
         raise ConfigError(
-            f"there are no fixes from {span.begin:.9g} to {span.end:.9g} s to score by",
-            quantity="withhold",
-            remedy="withhold where the receiver has fixes",
+            "evaluation.no-fixes-score", quantity="withhold", begin=span.begin, end=span.end
         )
     return seen
 

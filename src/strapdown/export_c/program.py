@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from strapdown import rotation
 from strapdown.attitude import AttitudeAlgorithm
 from strapdown.attitude.cost import operation_count, step_kernel
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.export_c.interface import (
     CLEAR,
     ENDS,
@@ -105,25 +105,30 @@ def export_c(
 def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
     if interpolation not in INTERPOLATIONS:
         raise ConfigError(
-            f"'{interpolation}' is no interpolation",
+            "attitude.no-interpolation",
             quantity="interpolation",
-            remedy=nearest(interpolation, INTERPOLATIONS),
+            interpolation=interpolation,
+            word=interpolation,
+            known=INTERPOLATIONS,
         )
     if imu is not None:
         check_imu(imu)
         sampling = sampling or imu.attrs["sampling"]
         if sampling != imu.attrs["sampling"]:
             raise ConfigError(
-                f"'{sampling}' is asked for, and the log's samples are {imu.attrs['sampling']}",
+                "attitude.asked-log-samples",
                 quantity="sampling",
-                remedy="leave the sampling out: that of the log is taken",
+                sampling=sampling,
+                attrs=imu.attrs["sampling"],
             )
     sampling = sampling or KINDS[0]
     if sampling not in KINDS:
         raise ConfigError(
-            f"'{sampling}' is no kind of sampling",
+            "attitude.no-kind-sampling-2",
             quantity="sampling",
-            remedy=nearest(sampling, KINDS),
+            sampling=sampling,
+            word=sampling,
+            known=KINDS,
         )
     return "mean" if sampling == "mean" else interpolation
 

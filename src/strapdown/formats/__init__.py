@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapdown.exceptions import ConfigError, DataError, StrapdownError, nearest
+from strapdown.errors import ConfigError, DataError, StrapdownError, nearest
 from strapdown.formats import (
     asl,
     broad,
@@ -112,23 +112,13 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
         It is of no known format, or it is damaged.
     """
     if not path.exists():
-        raise ConfigError(
-            "there is no such file or folder",
-            file=str(path),
-            remedy="check the path; `strapdown modules` lists the built-in scenarios",
-        )
+        raise ConfigError("io.no-such-file-or-folder", file=str(path))
     if path.is_file() and path.stat().st_size == 0:
-        raise DataError(
-            "the file is empty",
-            file=path.name,
-            remedy="check that the recording was saved and copied whole",
-        )
+        raise DataError("io.file-empty", file=path.name)
     if form is not None:
         if form not in READERS:
             raise ConfigError(
-                f"'{form}' is no format of a log",
-                quantity="format",
-                remedy=nearest(form, READERS),
+                "io.no-format-log", quantity="format", form=form, word=form, known=READERS
             )
         return READERS[form].read(path)
     for reader in READERS.values():
@@ -137,11 +127,7 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
     kinds = "; ".join(r.title for r in READERS.values())
     if path.is_dir():
         raise _no_recording(path)
-    raise DataError(
-        f"the ending '{path.suffix}' is of no known format",
-        file=path.name,
-        remedy=f"give one of: {kinds}",
-    )
+    raise DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, kinds=kinds)
 
 
 #: Names of a folder that are looked through, and that a message has at most.
@@ -159,15 +145,14 @@ def _no_recording(path: Path) -> DataError:
     names = ", ".join(shown[:MOST_SHOWN]) + (" …" if len(shown) > MOST_SHOWN else "")
     if not logs:
         return DataError(
-            f"the folder is no known recording; it holds: {names or 'nothing'}",
-            file=path.resolve().name,
-            remedy="give one file of it, or the folder of a known recording (strapdown modules)",
+            "io.folder-no-known-recording-holds", file=path.resolve().name, names=names or "nothing"
         )
     return DataError(
-        "the folder is no recording by itself; "
-        + (f"it holds one: {names}" if len(logs) == 1 else f"it holds {len(logs)}: {names}"),
+        "io.message",
         file=path.resolve().name,
-        remedy=f"give {'it' if len(logs) == 1 else 'one of them'}: {path / logs[0]}",
+        message="the folder is no recording by itself; "
+        + (f"it holds one: {names}" if len(logs) == 1 else f"it holds {len(logs)}: {names}"),
+        remedy_text=f"give {('it' if len(logs) == 1 else 'one of them')}: {path / logs[0]}",
     )
 
 

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, parquet
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of_name, unrolled, with_clock
 from strapdown.formats.columns import CLOCKS, TIMES
@@ -102,10 +102,12 @@ def read_aid_table(
     if missing:
         needed = [q for q in ("time", *columns) if q not in optional]
         raise DataError(
-            f"missing columns: {', '.join(missing)}; it has {', '.join(raw.columns)}",
+            "io.missing-columns",
             file=raw.name,
-            remedy=f"it needs {', '.join(needed)}; name columns that are called otherwise with "
-            f'columns = {{{missing[0]} = "…"}}',
+            missing=missing,
+            columns=raw.columns,
+            needed=needed,
+            missing_2=missing[0],
         )
     findings = list(raw.findings)
     time, clock = _time(raw, found["time"])
@@ -114,7 +116,13 @@ def read_aid_table(
     for name, unit in columns.items():
         if name in values and UNITS[unit] and not found[name].stated:
             findings.append(
-                Finding(f"no unit is stated; {unit} is taken", file=raw.name, quantity=name)
+                Finding(
+                    "io.no-unit-stated-taken",
+                    file=raw.name,
+                    quantity=name,
+                    severity="note",
+                    unit=unit,
+                )
             )
     keep = _usable(raw, time, values, repair, findings)
     table = pd.DataFrame(
@@ -130,12 +138,13 @@ def read_aid_table(
 
 def _raw(path: Path) -> RawLog:
     if not path.exists():
-        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+        raise ConfigError("io.no-such-file", file=str(path))
     if path.is_dir() or not (csv.detect(path) or parquet.detect(path)):
         raise DataError(
-            "this is a folder" if path.is_dir() else f"the ending '{path.suffix}' is of no table",
+            "io.folder" if path.is_dir() else "io.ending-no-table",
             file=path.resolve().name,
-            remedy=f"give one file: {', '.join((*csv.SUFFIXES, *parquet.SUFFIXES))}",
+            suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
+            suffix=path.suffix,
         )
     return parquet.read(path) if parquet.detect(path) else csv.read(path)
 
@@ -182,7 +191,7 @@ def _usable(
     _refuse_or_say(raw, "time", late, "it is not later than every row before", repair, findings)
     keep &= ~late
     if not keep.any():
-        raise DataError("no row can be used", file=raw.name, remedy="look at the file")
+        raise DataError("io.no-row-can-used", file=raw.name)
     return keep
 
 
@@ -201,10 +210,13 @@ def _refuse_or_say(
     row = raw.row(int(rows[0]))
     if not repair:
         raise DataError(
-            more,
+            "io.message",
             file=raw.name,
             row=row,
             quantity=name,
-            remedy="correct or delete such rows, or leave them out with repair",
+            message=more,
+            remedy_text="correct or delete such rows, or leave them out with repair",
         )
-    findings.append(Finding(f"left out: {more}", file=raw.name, row=row, quantity=name))
+    findings.append(
+        Finding("io.left-out", file=raw.name, row=row, quantity=name, severity="note", more=more)
+    )

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import read_raw
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.named_columns import columns_of
@@ -104,5 +104,10 @@ def _made(raw: RawLog, units: Mapping[str, str], made: Made) -> pd.DataFrame:
         told = error.finding
         row = None if told.row is None else raw.row(told.row - 1)
         raise DataError(
-            told.what, file=raw.name, row=row, quantity=told.quantity, remedy=told.remedy
+            "io.message",
+            file=raw.name,
+            row=row,
+            quantity=told.quantity,
+            message=told.what,
+            remedy_text=told.remedy,
         ) from None

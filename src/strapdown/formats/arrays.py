@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog
 from strapdown.tables import SAMPLINGS
@@ -37,10 +37,7 @@ def refuse_lie(declared: int, stored: int, what: str, file: str) -> None:
     """
     if declared > SMALL and declared > LARGEST_RATIO * max(stored, 1):
         raise DataError(
-            f"it claims {declared} bytes, and {stored} are stored",
-            file=file,
-            quantity=what,
-            remedy="the archive is damaged or made to mislead; get it again from its source",
+            "io.claims-bytes-stored", file=file, quantity=what, declared=declared, stored=stored
         )
 
 
@@ -77,9 +74,9 @@ def raw_log(
         columns |= _columns(name, np.squeeze(array))
     if not columns:
         raise DataError(
-            f"no array of numbers in it; it holds: {', '.join([*arrays, *meta]) or 'nothing'}",
+            "io.no-array-numbers-holds",
             file=path.name,
-            remedy="export the log as arrays of one row a sample",
+            arrays=", ".join([*arrays, *meta]) or "nothing",
         )
     samples = _samples(columns)
     findings = _left_out(columns, samples, path.name)
@@ -103,15 +100,25 @@ def _left_out(columns: dict[str, NDArray[Any]], samples: int, file: str) -> list
     for name, size in other.items():
         if read_name(name).quantity == "time":
             raise DataError(
-                f"'{name}' has {size} values, and the gyro {samples} samples",
+                "io.values-gyro-samples",
                 file=file,
                 quantity="time",
-                remedy="give each sample its stamp",
+                name=name,
+                size=size,
+                samples=samples,
             )
     if not other:
         return []
     listed = ", ".join(f"{name} ({size} values)" for name, size in other.items())
-    return [Finding(f"left out, because the gyro has {samples} samples: {listed}", file=file)]
+    return [
+        Finding(
+            "io.left-out-because-gyro-samples",
+            file=file,
+            severity="note",
+            samples=samples,
+            listed=listed,
+        )
+    ]
 
 
 def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import Column
@@ -122,12 +122,7 @@ def _truth_table(path: Path, name: str) -> RawLog:
     good = np.abs(norm - 1.0) < 0.01
     q_ns = np.full(q.shape, np.nan)
     q_ns[good] = rotation.compose(Q_NR, q[good] / norm[good, None])
-    finding = Finding(
-        "attitude to its own world, z up, which is taken to be level; its x is taken for north: "
-        "headings are of that world",
-        file=name,
-        quantity="attitude",
-    )
+    finding = Finding("io.attitude-own-world-z-up", file=name, quantity="attitude", severity="note")
     return dataclasses.replace(
         raw,
         stated={c: said for c, said in raw.stated.items() if said[0] == "time"},
@@ -139,11 +134,7 @@ def _truth_table(path: Path, name: str) -> RawLog:
 def _folder(path: Path) -> RawLog:
     table = _imu_of(path)
     if table is None:
-        raise DataError(
-            f"there is no {IMU}/{DATA} in it",
-            file=path.resolve().name,
-            remedy="give the folder mav0 of a sequence, or a table data.csv",
-        )
+        raise DataError("io.no-imu-data-csv", file=path.resolve().name)
     whole = path.resolve().name
     raw = dataclasses.replace(_imu_table(table, f"{table.parent.name}/{DATA}"), name=whole)
     around = table.parent.parent
@@ -209,14 +200,19 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
             if at.any()
             else "none of its poses is near a sample"
         )
-        findings.append(Finding(f"left out: {why}", file=known.name, quantity="attitude"))
+        findings.append(
+            Finding("io.left-out-2", file=known.name, quantity="attitude", severity="note", why=why)
+        )
         return dataclasses.replace(raw, findings=findings)
     findings.append(
         Finding(
-            f"interpolated to {int(at.sum())} of {at.size} samples; there specific force, on "
-            f"average, leans by {tilt:.2g}° from the z of its world",
+            "io.interpolated-samples-specific-force-average",
             file=known.name,
             quantity="attitude",
+            severity="note",
+            at=int(at.sum()),
+            size=at.size,
+            tilt=tilt,
         )
     )
     return dataclasses.replace(

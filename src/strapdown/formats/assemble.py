@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.assemble_truth import truth_of_log
 from strapdown.formats.body_axes import Axes, body_axes
 from strapdown.formats.clocks import with_clock
@@ -64,11 +64,10 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     time = stamps.seconds[stamps.keep]
     if time.size < 2:
         raise DataError(
-            f"{time.size} usable sample: attitude is the integral of a rate, and needs at least "
-            "two",
+            "io.usable-sample-attitude-integral-rate",
             file=raw.name,
             quantity="time",
-            remedy="record for longer, or check that the right file was given",
+            size=time.size,
         )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
     body: dict[str, Array] = {}

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.body_axes import axes_matrix, mirrored
 from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
 from strapdown.formats.find_columns import Column, find_columns
@@ -140,11 +140,12 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
             raise
         # The options that would state it are those of the log.
         raise DataError(
-            error.finding.what,
+            "io.message",
             file=raw.name,
             row=error.finding.row,
             quantity="time",
-            remedy="name its column with the unit of time, as in time_ms",
+            message=error.finding.what,
+            remedy_text="name its column with the unit of time, as in time_ms",
         ) from None
     return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
 
@@ -178,12 +179,7 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     if units == {"rad"}:
         angles = np.degrees(angles)
     elif units != {"deg"}:
-        raise DataError(
-            "the unit of the angles is not stated",
-            file=raw.name,
-            quantity=", ".join(EULERS),
-            remedy="name them with it, as in roll_deg, pitch_deg, heading_deg",
-        )
+        raise DataError("io.unit-angles-not-stated", file=raw.name, quantity=", ".join(EULERS))
     finite = np.isfinite(angles).all(axis=1)
     q = np.full((len(angles), 4), np.nan)
     q[finite] = rotation.quaternion_from_euler(angles[finite])
@@ -194,25 +190,12 @@ def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> 
     """An attitude of unknown frames, as a phone computes one, is no truth unless it is said."""
     if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
         findings.append(
-            Finding(
-                "it also holds an attitude, which is not used: nothing says whose it is and in "
-                "which frames",
-                file=raw.name,
-                quantity="attitude",
-                remedy="if it is body to north-east-down and better than the gyro, give the file "
-                "as --reference too",
-            )
+            Finding("io.also-holds-attitude-not-used", file=raw.name, quantity="attitude")
         )
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
     """Quaternion ``q_sb`` from body axes to the axes in which the file has its truth."""
     if mirrored(*axes):
-        raise ConfigError(
-            "the axes stated are a mirror image of the sensor's, and its truth cannot be turned "
-            "into it",
-            file=raw.name,
-            quantity="--axes",
-            remedy="state a right-handed set, as in x,-y,-z",
-        )
+        raise ConfigError("io.axes-stated-mirror-image-sensor", file=raw.name, quantity="--axes")
     return rotation.quaternion_from_dcm(axes_matrix(*axes).T)

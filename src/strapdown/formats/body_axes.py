@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.find_columns import AXES
 from strapdown.formats.inference import Inference
@@ -61,11 +61,11 @@ def body_axes(
         )
         findings.append(
             Finding(
-                "the sensor's x, y, z are taken as the body's forward, right, down: nothing says "
-                f"otherwise{what}",
+                "io.message",
                 file=raw.name,
                 quantity="axes",
-                remedy=remedy,
+                message=f"the sensor's x, y, z are taken as the body's forward, right, down: nothing says otherwise{what}",
+                remedy_text=remedy,
             )
         )
         return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are")
@@ -76,10 +76,11 @@ def body_axes(
     if options.axes and mirrored(axis, sign):
         findings.append(
             Finding(
-                f"--axes {text} is a mirror image, which turns no right-handed sensor into "
-                "another; it is right only for a sensor whose own axes are left-handed",
+                "io.axes-mirror-image-turns-no",
                 file=raw.name,
                 quantity="axes",
+                severity="note",
+                text=text,
             )
         )
     why = f"{text} {'by --axes' if options.axes else 'of this kind of recording'}"

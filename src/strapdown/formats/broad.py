@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from strapdown import rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble_truth import LOST
@@ -54,10 +54,7 @@ def read(path: Path) -> RawLog:
     wanted = {"imu_gyr": (samples, 3), "imu_acc": (samples, 3), "opt_quat": (samples, 4)}
     if samples < 2 or shapes != wanted or movement.shape != (samples,):
         raise DataError(
-            f"imu_gyr, imu_acc, opt_quat have the shapes {', '.join(map(str, shapes.values()))} "
-            f"and movement {movement.shape}",
-            file=path.name,
-            remedy="get the trial again from its source",
+            "io.imu-gyr-imu-acc-opt", file=path.name, values=shapes.values(), shape=movement.shape
         )
     sensors = {"imu_gyr": ("gyro", "rad/s"), "imu_acc": ("accel", "m/s2")}
     # The magnetometer runs slower than the gyro in some exports; only one on its stamps is read.

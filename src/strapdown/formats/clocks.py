@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 
 __all__ = [
     "GPS",
@@ -242,13 +242,7 @@ def on_clock_of(
             week = other.week if other.week is not None else int(gps // WEEK)
             shift = float(gps - WEEK * week) - time[0] - other.origin
         elif own.week is None:
-            raise DataError(
-                "its time is seconds of a GPS week that is not stated, and the inertial sensors "
-                "count from 1970",
-                file=file,
-                quantity="time",
-                remedy="add a column with the GPS week, or give both on one clock",
-            )
+            raise DataError("io.time-seconds-gps-week-not", file=file, quantity="time")
         else:
             unix = unix_from_gps(absolute[:1] + WEEK * own.week)[0]
             shift = float(unix) - time[0] - other.origin
@@ -260,8 +254,10 @@ def on_clock_of(
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
     out.attrs["gps_week"] = other.week
     return out, Finding(
-        f"{shift:+.9g} s were added to its time, so that it counts as that of the inertial "
-        f"sensors: {why}",
+        "io.added-time-counts-inertial-sensors",
         file=file,
         quantity="time",
+        severity="note",
+        shift=shift,
+        why=why,
     )

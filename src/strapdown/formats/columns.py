@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats.unit_words import UNIT_OF, unit_of
 
 __all__ = [
@@ -265,16 +265,10 @@ def parse_column_option(items: list[str]) -> dict[str, str]:
     for item in (part for text in items for part in text.split(",") if part.strip()):
         quantity, equals, column = (piece.strip() for piece in item.partition("="))
         if not equals or not column:
-            raise ConfigError(
-                f"'{item}' has no form that is understood",
-                quantity="--columns",
-                remedy="write quantity=column, as in time=t,gyro_x=wx",
-            )
+            raise ConfigError("io.no-form-understood", quantity="--columns", item=item)
         if quantity not in known:
             raise ConfigError(
-                f"'{quantity}' is no quantity",
-                quantity="--columns",
-                remedy=nearest(quantity, known),
+                "io.no-quantity", quantity="--columns", of_what=quantity, word=quantity, known=known
             )
         out[quantity] = column
     return out
@@ -307,12 +301,7 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     if sorted(names) != ["x", "y", "z"] or any(
         len(p) - len(n) > 1 for p, n in zip(parts, names, strict=True)
     ):
-        raise ConfigError(
-            f"'{text}' does not name three axes",
-            quantity="--axes",
-            remedy="name the sensor axis that points forward, right and down, as in x,-y,-z for "
-            "a sensor whose own axes point forward, left and up; or say forward-left-up",
-        )
+        raise ConfigError("io.does-not-name-three-axes", quantity="--axes", text=text)
     return [_AXES.index(n) for n in names], [-1.0 if p.startswith("-") else 1.0 for p in parts]
 
 
@@ -323,10 +312,6 @@ def _directions(text: str) -> tuple[list[int], list[float]] | None:
         return None
     said = [_DIRECTIONS[w] for w in words]
     if sorted(body for body, _ in said) != [0, 1, 2]:
-        raise ConfigError(
-            f"'{text}' names one direction twice",
-            quantity="--axes",
-            remedy="say where x, y and z of the sensor point, as in right-forward-up",
-        )
+        raise ConfigError("io.names-direction-twice", quantity="--axes", text=text)
     axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
     return axis, [said[k][1] for k in axis]

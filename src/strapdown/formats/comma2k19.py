@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import frames, rotation
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import npy
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
@@ -66,12 +66,7 @@ def read(path: Path) -> RawLog:
             t, value = (_find(path, "IMU", kind, part) for part in ("t", "value"))
             if t is None or value is None:
                 if t is not None and triad == "gyro":
-                    raise DataError(
-                        "the values of the gyro are not there",
-                        file=name,
-                        quantity="gyro",
-                        remedy="copy the folder whole",
-                    )
+                    raise DataError("io.values-gyro-not", file=name, quantity="gyro")
                 continue
             files += [t, value]
             logs.append(_log(name, kind, triad, unit, t, value))
@@ -99,11 +94,12 @@ def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> R
     kinds = time.dtype.kind + values.dtype.kind
     if time.ndim != 1 or values.shape != (time.size, 3) or not set(kinds) <= set("iuf"):
         raise DataError(
-            f"stamps have the shape {time.shape} and values {values.shape} of {values.dtype}; "
-            "numbers of the shapes (n,) and (n, 3) were expected",
+            "io.stamps-shape-values-numbers-shapes",
             file=label,
             quantity=triad,
-            remedy="get the segment again from its source",
+            shape=time.shape,
+            shape_2=values.shape,
+            dtype=values.dtype,
         )
     stated: dict[str, tuple[str, str | None]] = {"t": ("time", "s")}
     return RawLog(
@@ -133,11 +129,10 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
         or not set(kinds) <= set("iuf")
     ):
         raise DataError(
-            f"times, positions, orientations have the shapes {', '.join(map(str, shapes))}, or are "
-            "no numbers",
+            "io.times-positions-orientations-shapes-or",
             file=f"{name}/{files[2].name}",
             quantity="attitude",
-            remedy="get the segment again from its source",
+            shapes=shapes,
         )
     # Squares of numbers that no unit quaternion holds need not be representable.
     norm = np.linalg.norm(np.where(np.abs(q_ed) < 2.0, q_ed, np.nan), axis=1)
@@ -149,7 +144,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     time = raw.columns[next(n for n, (q, _) in raw.stated.items() if q == "time")]
     if order.size < 2:
         raw.findings.append(
-            Finding("left out: the poses hold no attitude", file=name, quantity="attitude")
+            Finding("io.left-out-poses-hold-no", file=name, quantity="attitude", severity="note")
         )
         return None, files
     lat_deg, lon_deg, _ = frames.geodetic_from_ecef(positions[order]).T
@@ -161,11 +156,13 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
         off = np.abs(times[order][:, None] - time[sample]).min(axis=0).max()
         raw.findings.append(
             Finding(
-                f"the attitude of {order.size} frames was turned from ECEF to north-east-down and "
-                f"interpolated to the {sample.size} samples nearest to them, over at most "
-                f"{off:.2g} s",
+                "io.attitude-frames-turned-ecef-north",
                 file=name,
                 quantity="attitude",
+                severity="note",
+                size=order.size,
+                size_2=sample.size,
+                off=off,
             )
         )
     return TruthInSensorAxes(truth, np.isfinite(truth).all(axis=1)), files

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import foot_mounted
 from strapdown.formats.aid_table import read_aid_table
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
@@ -50,9 +50,5 @@ def read_control_points(path: str | Path, names: Mapping[str, str] | None = None
     else:
         table = read_aid_table(path, dict.fromkeys(POINT, "m"), names=names)
     if len(table) < 2:
-        raise DataError(
-            f"{len(table)} control point: an origin and a heading fit it whatever the path is",
-            file=path.name,
-            remedy="give two or more",
-        )
+        raise DataError("io.control-point-origin-heading-fit", file=path.name, count=len(table))
     return table

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from strapdown.exceptions import DataError, nearest
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel
 from strapdown.formats.crash_text import LONGEST_NAME, clean
 from strapdown.tables import SAMPLINGS
@@ -84,11 +84,14 @@ def check_attributes(said: object, file: str, row: int | None = None) -> dict[st
     for key, known in (("quantity", tuple(QUANTITIES)), ("axis", _AXES)):
         if texts[key] not in known:
             raise DataError(
-                f"'{texts[key]}' is no {key}",
+                "io.no",
                 file=file,
                 row=row,
                 quantity=key,
-                remedy=nearest(texts[key], known),
+                texts=texts[key],
+                key=key,
+                word=texts[key],
+                known=known,
             )
     remarks = said.get("remarks", [])
     if not isinstance(remarks, list) or not all(isinstance(r, str) for r in remarks):
@@ -105,10 +108,4 @@ def check_attributes(said: object, file: str, row: int | None = None) -> dict[st
 
 
 def _bad(key: str, what: str, file: str, row: int | None) -> DataError:
-    return DataError(
-        f"{key} {what}",
-        file=file,
-        row=row,
-        quantity=key,
-        remedy="write the record again with `strapdown`, or leave that line out",
-    )
+    return DataError("io.key-what", file=file, row=row, quantity=key, key=key, what=what)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_stamps import Clock, last_midnight, seconds_of
 from strapdown.formats.crash_units import state_unit
@@ -52,9 +52,7 @@ def triad_stamps(
         Nothing tells the stamps, or time does not advance.
     """
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
-        raise ConfigError(
-            f"{rate_hz} Hz is no rate", quantity="rate_hz", remedy="give a positive number"
-        )
+        raise ConfigError("io.hz-no-rate", quantity="rate_hz", rate_hz=rate_hz)
     if time is None and time_unit is None and rate_hz is None:
         stamps, values = channel.load()
         _check_advances(channel, stamps)
@@ -64,12 +62,12 @@ def triad_stamps(
         return stamps, values
     if time is None and not channel.clock and rate_hz is None:
         raise ConfigError(
-            f"time_unit = '{time_unit}' is stated, and the record has no column of stamps"
+            "io.time-unit-stated-record-no"
             if channel.samples is not None
-            else f"time_unit = '{time_unit}' is stated, and the record's stamps are in seconds",
+            else "io.time-unit-stated-record-stamps",
             file=record.path.name,
             quantity="time_unit",
-            remedy="leave it out, or name the column as `time`",
+            time_unit=time_unit,
         )
     name = time if time is not None else channel.clock
     values = channel.samples() if channel.samples is not None else channel.load()[1]
@@ -85,18 +83,19 @@ def _clock_of(record: CrashRecord, name: str, time_unit: str | None) -> Clock:
     recorded = held.unit if held.quantity == "time" else ""
     if held.quantity not in ("time", "other"):
         raise DataError(
-            f"it holds {held.quantity}, and stamps are needed",
+            "io.holds-stamps-needed",
             file=held.file or record.path.name,
             quantity=f"channel {name}",
-            remedy="name the column of the stamps as `time`",
+            of_what=held.quantity,
         )
     stated = state_unit(time_unit, "time", "time_unit") if time_unit else ""
     if stated and recorded and stated != recorded:
         raise ConfigError(
-            f"time_unit = '{time_unit}' is stated, and the record says {recorded}",
+            "io.time-unit-stated-record-says",
             file=record.path.name,
             quantity="time_unit",
-            remedy="leave it out; if the record is wrong, correct its header",
+            time_unit=time_unit,
+            recorded=recorded,
         )
     return Clock(name, read(), recorded or stated, held.file or record.path.name, held.row)
 
@@ -114,10 +113,12 @@ def _same_length(
 ) -> tuple[Array, Array]:
     if stamps.size != values.size:
         raise DataError(
-            f"it has {values.size} samples, and channel {name} has {stamps.size} stamps",
+            "io.samples-channel-stamps",
             file=channel.file or None,
             quantity=f"channel {channel.name}",
-            remedy="name a column of stamps of the same length",
+            size=values.size,
+            name=name,
+            size_2=stamps.size,
         )
     return stamps, values
 
@@ -149,18 +150,19 @@ def _even(
         recorded = (values.size - 1) / span if span > 0.0 else math.inf
         if not abs(recorded / rate_hz - 1.0) <= RATE_AGREES:
             raise ConfigError(
-                f"rate_hz = {rate_hz:g} is stated, and by its stamps the record has "
-                f"{recorded:.5g} Hz",
+                "io.rate-hz-stated-stamps-record",
                 file=record.path.name,
                 quantity="rate_hz",
-                remedy="leave rate_hz out, or correct it; if the column of stamps is useless, "
-                "delete it from the file",
+                rate_hz=rate_hz,
+                recorded=recorded,
             )
         findings.append(
             Finding(
-                f"its stamps are evenly spaced at {rate_hz:g} Hz from the first, as stated",
+                "io.stamps-evenly-spaced-hz-first",
                 file=record.path.name,
                 quantity="time",
+                severity="note",
+                rate_hz=rate_hz,
             )
         )
     return start + count / rate_hz
@@ -172,11 +174,10 @@ def _ends(clock: Clock, ends: Array, rate_hz: float, count: int) -> Array:
 
     if not np.isfinite(ends).all():
         raise DataError(
-            "the first or the last stamp is missing",
+            "io.first-or-last-stamp-missing",
             file=clock.file,
             row=clock.row(0 if not np.isfinite(ends[0]) else count - 1),
             quantity=f"time ({clock.name})",
-            remedy="correct or delete that row",
         )
     if clock.unit:
         return ends * TIME_UNITS[clock.unit]
@@ -192,9 +193,10 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
     if stamps.size == 0 or bad.size or not np.isfinite(stamps[0]):
         k = int(bad[0]) + 1 if bad.size else 0
         raise DataError(
-            f"time goes from {stamps[k - 1]:.9g} to {stamps[k]:.9g} s" if bad.size else "no stamps",
+            "io.time-goes" if bad.size else "io.no-stamps",
             file=channel.file or None,
             row=channel.row(k),
             quantity=f"time of channel {channel.name}",
-            remedy="sort or correct the rows",
+            stamps=stamps[k - 1],
+            stamps_2=stamps[k],
         )

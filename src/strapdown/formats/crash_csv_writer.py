@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_attributes import attributes_of
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import clean
@@ -55,9 +55,7 @@ def write_crash_csv(path: str | Path, record: CrashRecord) -> tuple[Path, ...]:
         stamps[key] = time
         groups.setdefault(key, []).append((attributes_of(channel), values))
     if not groups:
-        raise DataError(
-            "it has no channel", file=record.path.name, remedy="give a record with channels"
-        )
+        raise DataError("io.no-channel", file=record.path.name)
     first = Path(path)
     paths = []
     for k, (key, members) in enumerate(groups.items(), start=1):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_attributes import attributes_of, check_attributes
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
@@ -50,11 +50,11 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
         bad = np.flatnonzero(np.isinf(values) | ~np.isfinite(time))
         if bad.size:
             raise DataError(
-                f"not a finite number ({values[bad[0]]})",
+                "io.not-finite-number",
                 file=channel.file or None,
                 row=channel.row(int(bad[0])),
                 quantity=f"channel {channel.name}",
-                remedy="correct that row, or leave the channel out",
+                values=values[bad[0]],
             )
         key = time.tobytes()
         if key not in clocks:
@@ -105,7 +105,7 @@ def read(path: Path) -> CrashRecord:
     ]
     for k, clock in enumerate(stamps):
         if clock.size and not (np.isfinite(clock).all() and (np.diff(clock) > 0.0).all()):
-            raise _form(path, f"stamps_s {k}", "do not advance")
+            raise _form(path, f"stamps_s {k}", "io.do-not-advance")
     said = _list(whole, "channels", path)
     attributes = [check_attributes(s, path.name) for s in said]
     names = unique([a["name"] or f"channel {k + 1}" for k, a in enumerate(attributes)])
@@ -113,13 +113,15 @@ def read(path: Path) -> CrashRecord:
     for k, (one, raw) in enumerate(zip(attributes, said, strict=True)):
         at = raw.get("stamps")
         if not isinstance(at, int) or isinstance(at, bool) or not 0 <= at < len(stamps):
-            raise _form(
-                path, f"channel {names[k]}", f"names stamps that are not there ({at!r:.40})"
-            )
+            raise _form(path, f"channel {names[k]}", "io.names-stamps-not", at=at)
         values = _numbers(raw.get("values"), path, f"channel {names[k]}")
         if values.size != stamps[at].size or not values.size:
             raise _form(
-                path, f"channel {names[k]}", f"has {values.size} values, {stamps[at].size} stamps"
+                path,
+                f"channel {names[k]}",
+                "io.values-stamps",
+                size=values.size,
+                size_2=stamps[at].size,
             )
         kept = {key: one[key] for key in one if key != "name"}
         channels.append(
@@ -127,7 +129,7 @@ def read(path: Path) -> CrashRecord:
         )
     facts = whole.get("facts", {})
     if not isinstance(facts, dict):
-        raise _form(path, "facts", "are no table of keys")
+        raise _form(path, "facts", "io.no-table-keys")
     title = whole.get("title", "")
     return CrashRecord(
         path=path,
@@ -146,49 +148,51 @@ def _loader(time: Array, values: Array) -> Callable[[], tuple[Array, Array]]:
 def _parsed(path: Path) -> dict[str, Any]:
     size = path.stat().st_size
     if size > LARGEST:
-        raise _form(path, "the file", f"has {size} bytes, more than a record has")
+        raise _form(path, "the file", "io.bytes-more-than-record", size=size)
     try:
         whole = json.loads(path.read_bytes().decode("utf-8-sig"))
     except json.JSONDecodeError as error:
         raise DataError(
-            f"the JSON ends or breaks off at column {error.colno} ({error.msg})",
+            "io.json-ends-or-breaks-off",
             file=path.name,
             row=error.lineno,
-            remedy="the file is cut or was edited: write or copy it again",
+            colno=error.colno,
+            msg=error.msg,
         ) from None
     except (UnicodeDecodeError, RecursionError, ValueError):
-        raise _form(path, "the file", "is no JSON of a record") from None
+        raise _form(path, "the file", "io.no-json-record") from None
     if not isinstance(whole, dict) or whole.get("format") != FORMAT:
-        raise _form(path, "format", f"is not '{FORMAT}'")
+        raise _form(path, "format", "io.not-strapdown-crash-record")
     if whole.get("version") != VERSION:
-        raise _form(path, "version", f"is {str(whole.get('version'))[:40]}, and {VERSION} is read")
+        raise _form(path, "version", "io.read", get=str(whole.get("version"))[:40], version=VERSION)
     return whole
 
 
 def _list(whole: dict[str, Any], key: str, path: Path) -> list[Any]:
     found = whole.get(key)
     if not isinstance(found, list) or not found:
-        raise _form(path, key, "is no list, or an empty one")
+        raise _form(path, key, "io.no-list-or-empty")
     return found
 
 
 def _numbers(values: object, path: Path, quantity: str) -> Array:
     if not isinstance(values, list):
-        raise _form(path, quantity, "is no list of numbers")
+        raise _form(path, quantity, "io.no-list-numbers")
     plain = [float("nan") if v is None else v for v in values]
     for k, v in enumerate(plain):
         if isinstance(v, bool) or not isinstance(v, int | float) or abs(v) == float("inf"):
-            raise _form(path, quantity, f"has no number at sample {k + 1} ({str(v)[:40]})")
+            raise _form(path, quantity, "io.no-number-sample", k=k + 1, v=str(v)[:40])
     try:
         return np.array(plain, dtype=np.float64)
     except OverflowError:
-        raise _form(path, quantity, "has a number that is too large") from None
+        raise _form(path, quantity, "io.number-too-large") from None
 
 
 def _form(path: Path, quantity: str, what: str) -> DataError:
     return DataError(
-        f"it {what}" if not what.startswith("it ") else what,
+        "io.message",
         file=path.name,
         quantity=quantity,
-        remedy="write the record again, or give it as CSV or ISO MME",
+        message=f"it {what}" if not what.startswith("it ") else what,
+        remedy_text="write the record again, or give it as CSV or ISO MME",
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_table import record_of
 
@@ -52,8 +52,8 @@ def read(path: Path) -> CrashRecord:
         if READERS[key].detect(path):
             return record_of(READERS[key].read(path), path, "log")
     raise DataError(
-        "it is of none of these formats",
+        "io.none-these-formats",
         file=path.name,
         quantity="format",
-        remedy=f"give one of: {'; '.join(READERS[key].title for key in LOGS)}",
+        logs=[READERS[key].title for key in LOGS],
     )

@@ -6,7 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import LONGEST_NAME, clean, unique
 from strapdown.formats.mme_channel import channel_of, is_bad
@@ -56,19 +56,16 @@ def read(path: Path) -> CrashRecord:
         shown = ", ".join(f"{n:03d}" for n in absent[:12]) + (" …" if len(absent) > 12 else "")
         findings.append(
             Finding(
-                f"{len(absent)} of {len(listed)} listed channels are not in the folder: {shown}",
+                "io.listed-channels-not-folder",
                 file=index.name if index else head.name,
                 quantity="channels",
-                remedy="nothing, if they are not needed; else get them from the laboratory",
+                count=len(absent),
+                count_2=len(listed),
+                value_shown=shown,
             )
         )
     if not numbered:
-        raise DataError(
-            "the test has no channel files (.001, .002 …)",
-            file=head.name,
-            quantity="channels",
-            remedy="put them beside it or into its folder Channel",
-        )
+        raise DataError("io.test-no-channel-files", file=head.name, quantity="channels")
     files = [read_mme_file(p, listed.get(n, ""), objects) for n, p in sorted(numbered.items())]
     names = unique([f.code or f.path.name for f in files])
     others = {
@@ -94,9 +91,10 @@ def _head(path: Path) -> Path:
     if len(heads) != 1:
         held = ", ".join(clean(p.name, LONGEST_NAME) for p in heads[:6])
         raise DataError(
-            f"the folder holds {len(heads)} tests: {held}" if heads else "there is no .mme file",
+            "io.folder-holds-tests" if heads else "io.no-mme-file",
             file=path.resolve().name,
-            remedy="give the .mme file of one test",
+            count=len(heads),
+            held=held,
         )
     return heads[0]
 
@@ -114,11 +112,7 @@ def _inside(path: Path, head: Path) -> bool:
 
 
 def _left_out(path: Path) -> Finding:
-    return Finding(
-        "left out: it is a link to a file outside the folder of the test",
-        file=clean(path.name, LONGEST_NAME),
-        remedy="copy the file into the folder, if it belongs there",
-    )
+    return Finding("io.left-out-link-file-outside", file=clean(path.name, LONGEST_NAME))
 
 
 def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, str]]:
@@ -133,9 +127,10 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
     if not same:
         findings.append(
             Finding(
-                "there is no index of channels (.chn): the files tell their codes",
+                "io.no-index-channels-chn-files",
                 file=head.name,
                 quantity="channels",
+                severity="note",
             )
         )
         return None, {}
@@ -153,11 +148,12 @@ def _index(head: Path, findings: list[Finding]) -> tuple[Path | None, dict[int, 
     if promised is not None and promised != len(listed):
         findings.append(
             Finding(
-                f"it promises {promised:g} channels and lists {len(listed)}",
+                "io.promises-channels-lists",
                 file=index.name,
                 row=header.line("number of channels"),
                 quantity="number of channels",
-                remedy="if one is missing that is needed, get the test again",
+                promised=promised,
+                count=len(listed),
             )
         )
     return index, listed
@@ -173,10 +169,10 @@ def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
         if not same and (len(stems) > 1 or any(s.lower() in tests for s in stems)):
             shown = ", ".join(clean(s, 40) for s in stems[:6])
             raise DataError(
-                f"the channels there are of other tests, and none has its name: {shown}",
+                "io.channels-other-tests-none-name",
                 file=head.name,
                 quantity="channels",
-                remedy="put each test into a folder of its own",
+                value_shown=shown,
             )
         kept: dict[int, Path] = {}
         for path in (same or found)[:MOST_FILES]:
@@ -227,34 +223,33 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
     if file.known is None:
         told.append(
             Finding(
-                f"'{file.code}' is no channel code of sixteen letters and figures"
-                if file.code
-                else "it has no channel code",
+                "io.no-channel-code-sixteen-letters" if file.code else "io.no-channel-code",
                 file=name,
                 row=file.header.line("channel code"),
                 quantity="channel code",
-                remedy="nothing tells its axis: check which one it is",
+                word=file.code,
             )
         )
     if is_bad(file):
         told.append(
             Finding(
-                f"the laboratory gives its status as {file.header.text('data status')}",
+                "io.laboratory-gives-status",
                 file=name,
                 row=file.header.line("data status"),
                 quantity=f"channel {file.code or name}",
-                remedy="do not use it without looking at it",
+                text=file.header.text("data status"),
             )
         )
     indexed = listed.get(number, "")
     if indexed and file.code and indexed.upper() != file.code.upper():
         told.append(
             Finding(
-                f"the index has {indexed} for it, and the file says {file.code}, which is taken",
+                "io.index-file-says-taken",
                 file=name,
                 row=file.header.line("channel code"),
                 quantity="channel code",
-                remedy="ask the laboratory which one it is",
+                indexed=indexed,
+                word=file.code,
             )
         )
     return told

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_attributes import check_attributes
 from strapdown.formats.crash_csv_writer import NOTE
@@ -56,17 +56,11 @@ def read_text_table(
     """
     if path.stat().st_size > LARGEST:
         raise DataError(
-            f"it has {path.stat().st_size} bytes, more than a table of a crash has",
-            file=path.name,
-            remedy="give the part of the record around the crash",
+            "io.bytes-more-than-table-crash", file=path.name, st_size=path.stat().st_size
         )
     text, findings = csv.decoded(path.read_bytes(), path.name)
     if "\0" in text:
-        raise DataError(
-            "no text: it holds zero bytes",
-            file=path.name,
-            remedy="give the record as CSV, ISO MME or in the form of the NHTSA database",
-        )
+        raise DataError("io.no-text-holds-zero-bytes", file=path.name)
     lines = text.splitlines()
     header, units_at, units = _header(lines)
     remarks = _remarks(lines, header)
@@ -132,7 +126,9 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
             told = (
                 error.finding.what if isinstance(error, DataError) else "no channel is read in it"
             )
-            raw.findings.append(Finding(f"comment left out: {told}", file=raw.name, row=row))
+            raw.findings.append(
+                Finding("io.comment-left-out", file=raw.name, row=row, severity="note", told=told)
+            )
     return notes
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding, nearest
+from strapdown.errors import DataError, Finding
 
 Array = NDArray[np.float64]
 
@@ -138,8 +138,10 @@ class CrashRecord:
             if channel.name == name:
                 return channel
         raise DataError(
-            f"there is no channel '{name}'",
+            "io.no-channel-2",
             file=self.path.name,
             quantity="channel",
-            remedy=nearest(name, [c.name for c in self.channels]),
+            name=name,
+            word=name,
+            known=[c.name for c in self.channels],
         )

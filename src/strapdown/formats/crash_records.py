@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import crash_json, crash_log, crash_mme, crash_nhtsa, crash_table
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_text import clean
@@ -87,9 +87,7 @@ def read_crash_record(
     file = Path(path)
     if format is not None and format not in CRASH_READERS:
         raise ConfigError(
-            f"there is no reader '{format}'",
-            quantity="format",
-            remedy=nearest(format, CRASH_READERS),
+            "io.no-reader", quantity="format", format=format, word=format, known=CRASH_READERS
         )
     try:
         # Messages name a record by the last part of its path, which "." does not have.
@@ -98,28 +96,31 @@ def read_crash_record(
         found = error.finding
         if found.remedy == CORRECT:
             raise DataError(
-                found.what,
+                "io.message",
                 file=found.file,
                 row=found.row,
                 quantity=found.quantity,
-                remedy=f"{CORRECT} in a copy, and name the copy; the record itself stays as it is",
+                message=found.what,
+                remedy_text=f"{CORRECT} in a copy, and name the copy; the record itself stays as it is",
             ) from error
         # Options of the command that reads logs for their attitude.
         if "--" not in f"{found.remedy}{found.quantity}":
             raise
         raise DataError(
-            found.what,
+            "io.message",
             file=found.file,
             row=found.row,
             quantity=None if "--" in str(found.quantity) else found.quantity,
-            remedy="correct a copy of it, or give the record as CSV with a column a channel",
+            message=found.what,
+            remedy_text="correct a copy of it, or give the record as CSV with a column a channel",
         ) from error
     except (OSError, ValueError) as error:
         # A name that no file can have, a file that may not be read, a link that leads in a ring.
         raise DataError(
-            f"it cannot be read: {type(error).__name__}: {clean(str(error), 200)}",
+            "io.cannot-read",
             file=clean(file.name),
-            remedy="check that it is a file of yours, and copied whole",
+            name=type(error).__name__,
+            clean=clean(str(error), 200),
         ) from error
 
 
@@ -134,24 +135,14 @@ def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
         near = difflib.get_close_matches(file.name, _names_beside(file), n=1)
         raise ConfigError(
-            "there is no such file or folder",
+            "io.no-such-file-or-folder-2" if near else "io.no-such-file-or-folder-3",
             file=clean(str(file)),
-            remedy=f"did you mean '{clean(near[0])}'? Else check the path"
-            if near
-            else "check the path",
+            clean=clean(near[0]),
         )
     if file.suffix.lower() in SPREADSHEETS and file.is_file():
-        raise DataError(
-            "it is a spreadsheet",
-            file=file.name,
-            remedy="open it in the spreadsheet program, and save the sheet as CSV, as a copy",
-        )
+        raise DataError("io.spreadsheet", file=file.name)
     if file.is_file() and file.stat().st_size == 0:
-        raise DataError(
-            "the file is empty",
-            file=file.name,
-            remedy="check that the recording was saved and copied whole",
-        )
+        raise DataError("io.file-empty", file=file.name)
     if form is not None:
         return CRASH_READERS[form].read(file)
     for reader in CRASH_READERS.values():
@@ -161,7 +152,8 @@ def _read(file: Path, form: str | None) -> CrashRecord:
     shown = ", ".join(inside[:6]) + (" …" if len(inside) > 6 else "")
     kinds = "; ".join(r.title for r in CRASH_READERS.values())
     raise DataError(
-        f"the folder is no known crash record; it holds: {shown or 'nothing'}",
+        "io.folder-no-known-crash-record",
         file=file.resolve().name,
-        remedy=f"give one file of it, or one of: {kinds}",
+        value_shown=shown or "nothing",
+        kinds=kinds,
     )

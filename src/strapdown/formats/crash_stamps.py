@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.inference.clock import infer_time_unit
 from strapdown.formats.judge import not_told
 from strapdown.formats.stamps import EPOCH
@@ -73,11 +73,12 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     if missing.size:
         k = int(missing[0])
         raise DataError(
-            f"no stamp ({clock.stamps[k]}; {missing.size} such)",
+            "io.no-stamp-such",
             file=clock.file,
             row=clock.row(k),
             quantity=f"time ({clock.name})",
-            remedy="correct or delete that row",
+            stamps=clock.stamps[k],
+            size=missing.size,
         )
     ticks = (stamps - stamps[0]).astype(np.float64)
     back = np.flatnonzero(np.diff(ticks) <= 0.0)
@@ -85,15 +86,12 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
         k = int(back[0])
         same = ticks[k] == ticks[k + 1]
         raise DataError(
-            f"the stamp {stamps[k + 1]} repeats that of the row before"
-            if same
-            else f"time goes back from {stamps[k]} to {stamps[k + 1]}",
+            "io.stamp-repeats-row-before" if same else "io.time-goes-back",
             file=clock.file,
             row=clock.row(k + 1),
             quantity=f"time ({clock.name})",
-            remedy="if the samples are evenly spaced, state their rate: rate_hz = 1000"
-            if same
-            else "sort or correct the rows; if two records were joined, split them",
+            stamps=stamps[k + 1],
+            stamps_2=stamps[k],
         )
     unit = clock.unit or _evident(clock, stamps, findings)
     factor = TIME_UNITS[unit]
@@ -102,10 +100,12 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     midnight = last_midnight(stamps[0].item(), factor)
     findings.append(
         Finding(
-            "stamps count from a distant origin; time here counts from the midnight of that clock "
-            f"before the first, {midnight} {unit}",
+            "io.stamps-count-distant-origin-time",
             file=clock.file,
             quantity=f"time ({clock.name})",
+            severity="note",
+            midnight=midnight,
+            unit=unit,
         )
     )
     return (stamps - midnight).astype(np.float64) * factor, findings
@@ -130,16 +130,18 @@ def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str
     if said.settled:
         findings.append(
             Finding(
-                str(said),
+                "io.message",
                 file=clock.file,
                 quantity=f"time ({clock.name})",
-                remedy='if not, state it, as in time_unit = "ms"',
+                message=str(said),
+                remedy_text='if not, state it, as in time_unit = "ms"',
             )
         )
         return str(said.value)
     raise DataError(
-        not_told(said),
+        "io.message",
         file=clock.file,
         quantity=f"time ({clock.name})",
-        remedy='state it, as in time_unit = "ms"',
+        message=not_told(said),
+        remedy_text='state it, as in time_unit = "ms"',
     )

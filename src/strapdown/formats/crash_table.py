@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_names import ChannelName, read_channel_name
 from strapdown.formats.crash_preamble import read_text_table
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
@@ -101,13 +101,11 @@ def record_of(
         (kept if _is_numeric(raw, source) else texts).append(source)
     if texts:
         shown = ", ".join(clean(t, 40) for t in texts[:6]) + (" …" if len(texts) > 6 else "")
-        findings.append(Finding(f"columns of text, left out: {shown}", file=raw.name))
-    if not kept:
-        raise DataError(
-            "no column holds numbers",
-            file=raw.name,
-            remedy="give the record as CSV with one sample a row",
+        findings.append(
+            Finding("io.columns-text-left-out", file=raw.name, severity="note", value_shown=shown)
         )
+    if not kept:
+        raise DataError("io.no-column-holds-numbers", file=raw.name)
     notes = notes or {}
     names = unique(
         [
@@ -189,10 +187,12 @@ def _clock(
         others = ", ".join(names[s] for s in stated[1:])
         findings.append(
             Finding(
-                f"{names[stated[0]]} is taken for the time, and {others} could be it, too",
+                "io.taken-time-could-too",
                 file=raw.name,
                 quantity="time",
-                remedy=f'if not, name it, as in time = "{names[stated[1]]}"',
+                names=names[stated[0]],
+                others=others,
+                names_2=names[stated[1]],
             )
         )
     if stated:
@@ -201,10 +201,7 @@ def _clock(
     if _advances(raw.columns[first]) and said[first].quantity == "other" and len(said) > 1:
         findings.append(
             Finding(
-                f"{names[first]} advances evenly and is taken for the time",
-                file=raw.name,
-                quantity="time",
-                remedy='if not, state the rate, as in rate_hz = 1000, or time = "a column"',
+                "io.advances-evenly-taken-time", file=raw.name, quantity="time", names=names[first]
             )
         )
         return first
@@ -299,11 +296,12 @@ def _retold(read: Callable[[], T]) -> T:
     except DataError as error:
         found = error.finding
         raise DataError(
-            found.what,
+            "io.message",
             file=found.file,
             row=found.row,
             quantity=found.quantity,
-            remedy="correct or delete that row, or name another channel",
+            message=found.what,
+            remedy_text="correct or delete that row, or name another channel",
         ) from None
 
 
@@ -313,12 +311,7 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
             if raw.rate:
                 count = len(next(iter(raw.columns.values())))
                 return np.arange(count, dtype=np.float64) / raw.rate
-            raise DataError(
-                "no column is known to hold the time",
-                file=raw.name,
-                quantity="time",
-                remedy='name it, as in time = "column 1", or state the rate: rate_hz = 1000',
-            )
+            raise DataError("io.no-column-known-hold-time", file=raw.name, quantity="time")
         stamps, dated = _ticks(raw, clock)
         unit = "ns" if dated else stated
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]

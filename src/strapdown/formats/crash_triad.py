@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_clock import triad_stamps
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_triad_unit import triad_factor
@@ -91,7 +91,7 @@ def triad_of_channels(
     """
     if quantity not in _COLUMNS:
         raise ConfigError(
-            f"'{quantity}' is no triad", quantity="quantity", remedy=nearest(quantity, _COLUMNS)
+            "io.no-triad", quantity="quantity", of_what=quantity, word=quantity, known=_COLUMNS
         )
     findings: list[Finding] = []
     chosen = _chosen(record, channels, findings)
@@ -129,10 +129,10 @@ def _chosen(
     wrong = [a for a in channels if a not in _AXES]
     if wrong or not channels:
         raise ConfigError(
-            f"'{wrong[0]}' is no axis" if wrong else "no axis is named",
+            "io.no-axis" if wrong else "io.no-axis-named",
             file=record.path.name,
             quantity="channels",
-            remedy='name the channels of x, y and z, as in channels = {x = "ax", y = "-ay"}',
+            wrong=wrong[0],
         )
     out: dict[str, tuple[CrashChannel, float]] = {}
     for axis in _AXES:
@@ -147,10 +147,12 @@ def _chosen(
         twin = [a for a, (c, _) in out.items() if c is channel]
         if twin:
             raise ConfigError(
-                f"channel '{name}' is named for {twin[0]} and for {axis}",
+                "io.channel-named",
                 file=record.path.name,
                 quantity="channels",
-                remedy="name each channel once",
+                name=name,
+                twin=twin[0],
+                axis=axis,
             )
         out[axis] = channel, sign
         _tell_axis(channel, axis, sign, findings)
@@ -164,10 +166,11 @@ def _tell_axis(channel: CrashChannel, axis: str, sign: float, findings: list[Fin
     if channel.axis != taken:
         findings.append(
             Finding(
-                f"the record has it along {channel.axis}, and it is taken along {taken}",
+                "io.record-along-taken-along",
                 file=channel.file or None,
                 quantity=f"channel {channel.name}",
-                remedy="check `channels` and the angles of the mounting",
+                axis=channel.axis,
+                taken=taken,
             )
         )
 
@@ -181,14 +184,14 @@ def _check_quantity(
     unit = f" in {channel.unit}" if channel.unit else ""
     others = [c.name for c in record.channels if c.quantity in fits]
     raise DataError(
-        f"it holds {channel.quantity if channel.quantity != 'other' else 'something'}{unit}, and "
-        f"{' or '.join(fits)} is needed",
+        "io.holds-needed" if others else "io.holds-needed-2",
         file=channel.file or record.path.name,
         quantity=f"channel {channel.name}",
-        remedy=f"channels of that kind: {', '.join(others[:12])}"
-        if others
-        else f"the record has no channel that says it holds {quantity}; if this one does, state "
-        "its unit",
+        of_what=channel.quantity if channel.quantity != "other" else "something",
+        unit=unit,
+        fits=fits,
+        others=others[:12],
+        of_what_2=quantity,
     )
 
 
@@ -199,20 +202,21 @@ def _as_mean(
 
     if stamps.size < 2:
         raise DataError(
-            f"{stamps.size} sample is no change of velocity",
+            "io.sample-no-change-velocity",
             file=channel.file or None,
             quantity=f"channel {channel.name}",
-            remedy="give a table of at least two rows",
+            size=stamps.size,
         )
     _check_finite(channel, stamps, values)
     from_zero = starts_at_zero(stamps, channel)
     findings.append(
         Finding(
-            "changes of velocity are turned into mean accelerations over each interval"
-            + (", the first from time zero" if from_zero else ""),
+            "io.message",
             file=channel.file or None,
             quantity=f"channel {channel.name}",
-            remedy="if it holds the change of each sample alone, add them up first",
+            message="changes of velocity are turned into mean accelerations over each interval"
+            + (", the first from time zero" if from_zero else ""),
+            remedy_text="if it holds the change of each sample alone, add them up first",
         )
     )
     return mean_accelerations_of(stamps, values, from_zero=from_zero)
@@ -221,10 +225,7 @@ def _as_mean(
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     if not values.size:
         raise DataError(
-            "it has no samples",
-            file=channel.file or None,
-            quantity=f"channel {channel.name}",
-            remedy="get the record again, or leave the channel out",
+            "io.no-samples", file=channel.file or None, quantity=f"channel {channel.name}"
         )
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
@@ -242,11 +243,13 @@ def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
         return
     count = int((~np.isfinite(values)).sum())
     raise DataError(
-        f"not a finite number ({values[hole]} at {stamps[hole]:.9g} s; {count} such)",
+        "io.not-finite-number-such",
         file=channel.file or None,
         row=channel.row(hole),
         quantity=f"channel {channel.name}",
-        remedy="correct that row, or give the record before it or after it alone",
+        values=values[hole],
+        stamps=stamps[hole],
+        count=count,
     )
 
 
@@ -255,27 +258,21 @@ def _sampling(
 ) -> str:
     if stated is not None and stated not in SAMPLINGS:
         raise ConfigError(
-            f"'{stated}' is no kind of sampling",
-            quantity="sampling",
-            remedy=nearest(stated, SAMPLINGS),
+            "io.no-kind-sampling", quantity="sampling", stated=stated, word=stated, known=SAMPLINGS
         )
     kinds = {"mean" if p.mean else p.channel.sampling for p in parts} - {None}
     if len(kinds) > 1 or (stated and kinds and stated not in kinds):
         said = " and ".join(sorted(str(k) for k in kinds))
         raise ConfigError(
-            f"the record's samples are {said}, and {stated or 'one kind'} is asked",
+            "io.record-samples-asked" if stated else "io.record-samples-asked-2",
             file=record.path.name,
             quantity="sampling",
-            remedy="leave `sampling` out" if stated else "make a triad of each kind",
+            said=said,
+            stated=stated or "one kind",
         )
     if not kinds and stated is None:
         findings.append(
-            Finding(
-                "nothing says that a sample is a mean over its interval: taken as instantaneous",
-                file=record.path.name,
-                quantity="sampling",
-                remedy='if it is a mean, state sampling = "mean"',
-            )
+            Finding("io.nothing-says-sample-mean-over", file=record.path.name, quantity="sampling")
         )
     return stated or (str(kinds.pop()) if kinds else "instantaneous")
 

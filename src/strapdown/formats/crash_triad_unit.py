@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_units import FACTORS, factor_of, state_unit
 from strapdown.formats.inference import Signals, infer_signals
@@ -65,10 +65,12 @@ def triad_factor(
         if wanted and unit != wanted:
             channel = axes[axis][0]
             raise ConfigError(
-                f"unit = '{stated}' is stated, and the record says {unit} of {channel.name}",
+                "io.unit-stated-record-says",
                 file=record.path.name,
                 quantity="unit",
-                remedy="leave it out; if the record is wrong, correct its header",
+                stated=stated,
+                unit=unit,
+                name=channel.name,
             )
     open_axes = [a for a in axes if a not in own]
     if not open_axes:
@@ -81,10 +83,12 @@ def triad_factor(
             other = axes[next(iter(own))][0].name
             findings.append(
                 Finding(
-                    f"no unit of {without}: taken as {wanted}, as that of {other}",
+                    "io.no-unit-taken",
                     file=record.path.name,
                     quantity="unit",
-                    remedy=f'if not, write it in the header; state unit = "{wanted}" if so',
+                    without=without,
+                    wanted=wanted,
+                    other=other,
                 )
             )
         else:
@@ -94,10 +98,12 @@ def triad_factor(
         if channel.unit:
             findings.append(
                 Finding(
-                    f"the record says '{channel.unit}', which is not known; read as {wanted}, as "
-                    "stated",
+                    "io.record-says-not-known-read",
                     file=channel.file or None,
                     quantity=f"channel {channel.name}",
+                    severity="note",
+                    unit=channel.unit,
+                    wanted=wanted,
                 )
             )
     return {a: 1.0 if a in own else FACTORS[kind][wanted] for a in axes}, wanted
@@ -132,18 +138,20 @@ def _evident(
         if unit is not None and unit.settled and (form is None or form.value == "rate"):
             findings.append(
                 Finding(
-                    str(unit),
+                    "io.message",
                     file=record.path.name,
                     quantity=f"unit of {names}",
-                    remedy=f'if not, state it, as in unit = "{unit.value}"',
+                    message=str(unit),
+                    remedy_text=f'if not, state it, as in unit = "{unit.value}"',
                 )
             )
             return str(unit.value)
     raise DataError(
-        not_told(unit),
+        "io.message",
         file=record.path.name,
         quantity=names,
-        remedy=_choices(block, quantity),
+        message=not_told(unit),
+        remedy_text=_choices(block, quantity),
     )
 
 

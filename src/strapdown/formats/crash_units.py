@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats.unit_words import UNIT_OF
 from strapdown.formats.unit_words import unit_of as plain_unit_of
 
@@ -98,8 +98,12 @@ def state_unit(text: str, quantity: str, key: str = "unit") -> str:
     if found is None or found[0] != quantity:
         what = f"is a unit of {found[0]}" if found else "is no unit that is known"
         raise ConfigError(
-            f"'{text}' {what}, and one of {quantity} is needed",
+            "io.needed",
             quantity=key,
-            remedy=nearest(text, known),
+            text=text,
+            what=what,
+            of_what=quantity,
+            word=text,
+            known=known,
         )
     return found[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import CrashChannel
 
 Array = NDArray[np.float64]
@@ -39,21 +39,21 @@ def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
     """
     if channel.quantity != "velocity":
         raise DataError(
-            f"it holds {channel.quantity}, and a change of velocity is needed",
+            "io.holds-change-velocity-needed",
             file=channel.file or None,
             quantity=channel.name,
-            remedy="give a column of delta-V",
+            of_what=channel.quantity,
         )
     time, velocity = channel.load()
     bad = np.flatnonzero(~np.isfinite(velocity))
     if bad.size or velocity.size < 2:
         k = int(bad[0]) if bad.size else None
         raise DataError(
-            f"not a finite number ({velocity[k]})" if k is not None else "fewer than two samples",
+            "io.not-finite-number-2" if k is not None else "io.fewer-than-two-samples",
             file=channel.file or None,
             row=channel.row(k) if k is not None else None,
             quantity=channel.name,
-            remedy="correct that row, or cut the table before it",
+            velocity=velocity[k],
         )
     return mean_accelerations_of(time, velocity, from_zero=starts_at_zero(time, channel))
 

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.csv_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.formats.day_time import is_day_time
 from strapdown.formats.recording import RawLog
@@ -115,19 +115,10 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     text, findings = decoded(data, name)
     numbered, comments = _numbered(text)
     if not numbered:
-        raise DataError(
-            "the file holds comments alone" if comments else "the file is empty",
-            file=name,
-            remedy="check that the recording was saved and copied whole",
-        )
+        raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
     top = _top(numbered, comments)
     if not top.data:
-        raise DataError(
-            "a header, and no data under it",
-            file=name,
-            row=numbered[0][0],
-            remedy="check that the recording was saved and copied whole",
-        )
+        raise DataError("io.header-no-data-under", file=name, row=numbered[0][0])
     rows, lines = _whole_lines(top.data, len(top.names), top.separator, text, name, findings)
     columns = _parse(lines, len(top.names), top.separator, name)
     return _log(name, files, top, columns, np.array(rows), comments, findings)
@@ -197,16 +188,14 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace"), []
     if b"\0" in data[:4096]:
-        raise DataError(
-            "no text: it holds zero bytes",
-            file=name,
-            remedy="give the file its own ending (.mat, .h5, .npz)",
-        )
+        raise DataError("io.no-text-holds-zero-bytes-2", file=name)
     try:
         return data.decode("utf-8-sig"), []
     except UnicodeDecodeError as error:
         what = f"byte {error.start} is not UTF-8; read as Windows-1252"
-        return data.decode("cp1252", "replace"), [Finding(what, file=name)]
+        return data.decode("cp1252", "replace"), [
+            Finding("io.message-2", file=name, severity="note", message=what)
+        ]
 
 
 def is_comment(line: str) -> bool:
@@ -284,14 +273,7 @@ def _whole_lines(
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
         if last and k and _was_cut(line, numbered[max(0, k - 20) : k], width, separator, ended):
-            findings.append(
-                Finding(
-                    "the last line is cut; it was left out",
-                    file=name,
-                    row=row,
-                    remedy="if more is missing, copy the file again",
-                )
-            )
+            findings.append(Finding("io.last-line-cut-left-out", file=name, row=row))
             break
         count = _count(line, separator)
         if count == width + 1 and separator and line.rstrip().endswith(separator):
@@ -302,20 +284,18 @@ def _whole_lines(
                 continue
             doubled = separator == "," and count >= 2 * width - 1 > 1
             raise DataError(
-                f"{count} fields, where the first line has {width}",
+                "io.fields-first-line" if doubled else "io.fields-first-line-2",
                 file=name,
                 row=row,
-                remedy="if the comma is the decimal sign, too, export it with semicolons or tabs "
-                "between the fields, or with decimal points"
-                if doubled
-                else "correct or delete that row",
+                count=count,
+                width=width,
             )
         rows.append(row)
         lines.append(line)
     if amid:
         row, line = amid[0]
         what = f"comments among the rows, {len(amid)} in all, are not read: '{line.strip()[:60]}'"
-        findings.append(Finding(what, file=name, row=row))
+        findings.append(Finding("io.message-2", file=name, row=row, severity="note", message=what))
     return rows, lines
 
 
@@ -360,9 +340,7 @@ def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Co
         return parsed(body, count, between, decimal=decimal, quote=quote, text=hexadecimal)
     except ValueError as error:
         raise DataError(
-            f"the rows cannot be taken apart: {str(error).splitlines()[0]}",
-            file=name,
-            remedy="look for a quote without its other, and correct that row",
+            "io.rows-cannot-taken-apart", file=name, splitlines=str(error).splitlines()[0]
         ) from None
 
 

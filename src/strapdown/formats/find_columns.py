@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NoReturn
 
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.columns import (
     INDEXED,
     QUANTITIES,
@@ -57,17 +57,19 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     for quantity, source in options.columns.items():
         if quantity not in QUANTITIES and quantity not in TRIADS:
             raise ConfigError(
-                f"'{quantity}' is no quantity",
+                "io.no-quantity",
                 quantity="--columns",
-                remedy=nearest(quantity, [*QUANTITIES, *TRIADS]),
+                of_what=quantity,
+                word=quantity,
+                known=[*QUANTITIES, *TRIADS],
             )
         for q, name in _asked(raw, quantity, source):
             if name in asked.values():
                 raise ConfigError(
-                    f"column '{name}' is named for two quantities",
+                    "io.column-named-two-quantities",
                     file=raw.name,
                     quantity=f"--columns {q}",
-                    remedy="name each column once",
+                    name=name,
                 )
             asked[q] = name
             stated = found[q].unit if q in found and found[q].source == name else None
@@ -89,11 +91,11 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     if raw.columns and all(name == f"column {k}" for k, name in enumerate(raw.columns, 1)):
         _refuse_nameless(raw, left_out)
     raise DataError(
-        f"no column was recognised as {', '.join(missing)}; it has: "
-        f"{', '.join(raw.columns) or 'none'}{left_out}",
+        "io.no-column-recognised",
         file=raw.name,
-        remedy="name them, as in --columns time=t,gyro_x=wx,gyro_y=wy,gyro_z=wz (a number "
-        "counts columns from 1)",
+        missing=missing,
+        columns=", ".join(raw.columns) or "none",
+        left_out=left_out,
     )
 
 
@@ -104,13 +106,11 @@ def _refuse_nameless(raw: RawLog, left_out: str) -> NoReturn:
     seven = len(raw.columns) == 7
     force = ",accel_x=5,accel_y=6,accel_z=7" if len(raw.columns) >= 7 else ""
     raise DataError(
-        f"no column was recognised as gyro_x, gyro_y, gyro_z, for its {len(raw.columns)} columns "
-        f"have no names; the first row holds {first}{left_out}",
+        "io.message",
         file=raw.name,
         row=raw.row(0),
-        remedy="say which is which by these numbers, as in --columns time=1,gyro_x=2,gyro_y=3,"
-        f"gyro_z=4{force}, with their units (--gyro-unit, --accel-unit, "
-        "--time-unit) where the numbers do not tell them"
+        message=f"no column was recognised as gyro_x, gyro_y, gyro_z, for its {len(raw.columns)} columns have no names; the first row holds {first}{left_out}",
+        remedy_text=f"say which is which by these numbers, as in --columns time=1,gyro_x=2,gyro_y=3,gyro_z=4{force}, with their units (--gyro-unit, --accel-unit, --time-unit) where the numbers do not tell them"
         + ("; or state the format, as in kf-gins for increments" if seven else ""),
     )
 
@@ -138,10 +138,13 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
             names = [n for n in names if not says_increment(n)] or names
         if len(names) > 1:
             raise ConfigError(
-                f"{len(names)} columns could be it: {', '.join(names)}",
+                "io.columns-could",
                 file=raw.name,
                 quantity=quantity,
-                remedy=f"choose one with --columns {quantity}={names[0]}",
+                count=len(names),
+                names=names,
+                of_what=quantity,
+                names_2=names[0],
             )
         found[quantity] = Column(names[0], _unit_of(raw, names[0]), "by its name")
     return found
@@ -168,10 +171,12 @@ def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
     elif source.isdecimal() and 1 <= int(source) <= len(names):
         return [(quantity, names[int(source) - 1])]
     raise ConfigError(
-        f"there is no column '{source}'",
+        "io.no-column",
         file=raw.name,
         quantity=f"--columns {quantity}",
-        remedy=nearest(source, names),
+        source=source,
+        word=source,
+        known=names,
     )
 
 
@@ -185,10 +190,13 @@ def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
     width = _width(raw, base)
     if width > 3 and not index:
         raise ConfigError(
-            f"'{source}' has {width} columns",
+            "io.columns",
             file=raw.name,
             quantity=f"--columns {quantity}",
-            remedy=f"say with which of them it begins, as in {quantity}={source}[{width - 3}]",
+            source=source,
+            width=width,
+            of_what=quantity,
+            width_2=width - 3,
         )
     if width >= 3 and (not index or index.rstrip("]").isdecimal()):
         first = int(index.rstrip("]")) if index else 0

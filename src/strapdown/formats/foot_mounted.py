@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import matlab
 from strapdown.formats.recording import RawLog
 
@@ -51,10 +51,11 @@ def _arrays(path: Path, *names: str) -> dict[str, Any]:
     for name in names:
         if name not in arrays:
             raise DataError(
-                f"there is no array of numbers '{name}' in it; it holds: {', '.join(arrays)}",
+                "io.no-array-numbers-holds-2",
                 file=path.name,
                 quantity=name,
-                remedy="save the log with all of its arrays",
+                name=name,
+                arrays=arrays,
             )
     return {name: arrays[name].astype(np.float64) for name in names}
 
@@ -64,11 +65,11 @@ def _log(path: Path) -> tuple[Array, Array]:
     time, imu = arrays["timestamps"].reshape(-1), arrays["imu_data"]
     if imu.shape != (time.size, len(COLUMNS)):
         raise DataError(
-            f"shapes {arrays['timestamps'].shape} and {imu.shape}, where n stamps and (n, 6) "
-            "belong",
+            "io.shapes-n-stamps-n-belong",
             file=path.name,
             quantity="timestamps, imu_data",
-            remedy="save six numbers a stamp",
+            shape=arrays["timestamps"].shape,
+            shape_2=imu.shape,
         )
     return time, imu
 
@@ -126,19 +127,21 @@ def read_points(path: Path) -> tuple[Array, Array]:
     at, places = arrays["strideIndex"].reshape(-1), arrays["GCP"]
     if places.shape != (at.size, 2):
         raise DataError(
-            f"{at.size} samples, and control points of shape {places.shape}",
+            "io.samples-control-points-shape",
             file=path.name,
             quantity="strideIndex, GCP",
-            remedy="save north and east of each",
+            size=at.size,
+            shape=places.shape,
         )
     within = (at >= 0) & (at < time.size) & (at == np.floor(at))
     if not within.all():
         k = int(np.argmin(within))
         raise DataError(
-            f"{at[k]:g} is no sample of the {time.size} there are, counted from zero",
+            "io.no-sample-counted-zero",
             file=path.name,
             row=k + 1,
             quantity="strideIndex",
-            remedy="save the sample of each control point",
+            at=at[k],
+            size=time.size,
         )
     return time[at.astype(np.intp)], places

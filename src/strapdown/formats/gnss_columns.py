@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv, parquet
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
 from strapdown.formats.columns import CLOCKS, TIMES
@@ -118,18 +118,18 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
     if missing:
         raise DataError(
-            f"missing columns: {', '.join(missing)}; it has {', '.join(raw.columns)}",
+            "io.missing-columns-2",
             file=raw.name,
-            remedy="fixes need time, lat, lon and alt; name columns that are called otherwise with "
-            f'columns = {{{missing[0]} = "…"}}',
+            missing=missing,
+            columns=raw.columns,
+            missing_2=missing[0],
         )
     if over_sea and "geoid" not in found:
         raise DataError(
-            f"the height is over the sea (column '{found['alt_msl'].source}')",
+            "io.height-over-sea-column",
             file=raw.name,
             quantity="alt",
-            remedy="give the height over the ellipsoid, or add a column geoid_m with that of "
-            "the geoid over the ellipsoid",
+            source=found["alt_msl"].source,
         )
 
     def values(quantity: str) -> Array:
@@ -142,10 +142,11 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         if there and len(there) < len(names):
             missing = next(name for name in names if name not in found)
             raise DataError(
-                f"it is missing, while {there[0]} is there (column '{found[there[0]].source}')",
+                "io.missing-while-column",
                 file=raw.name,
                 quantity=missing,
-                remedy="give all three components, or none",
+                there=there[0],
+                source=found[there[0]].source,
             )
         return np.column_stack([values(name) for name in names]) if there else None
 
@@ -176,11 +177,12 @@ def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog
         return values("alt")
     raw.findings.append(
         Finding(
-            "height over the ellipsoid is that over the sea (column "
-            f"'{found['alt_msl'].source}') with that of the geoid added (column "
-            f"'{found['geoid'].source}')",
+            "io.height-over-ellipsoid-over-sea",
             file=raw.name,
             quantity="alt",
+            severity="note",
+            source=found["alt_msl"].source,
+            source_2=found["geoid"].source,
         )
     )
     return np.asarray(values("alt_msl") + values("geoid"))
@@ -191,12 +193,7 @@ def _velocity(raw: RawLog, velocity: Array | None) -> Array | None:
     words = [w for name in raw.columns for w in re.split(r"[^a-z]+", name.lower())]
     if velocity is None and {"speed", "sog"} & set(words) and {"course", "cog"} & set(words):
         raw.findings.append(
-            Finding(
-                "speed and course are not used: nothing says the velocity down",
-                file=raw.name,
-                quantity=", ".join(VELOCITY),
-                remedy="give velocity north, east and down, as in vN_m_s, vE_m_s, vD_m_s",
-            )
+            Finding("io.speed-course-not-used-nothing", file=raw.name, quantity=", ".join(VELOCITY))
         )
     return velocity
 
@@ -208,11 +205,12 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
     name = clock_of_name(found.source, first, dated=dated)
     if name == UNIX and not dated and not found.stated and first > 1e11:
         raise DataError(
-            f"a stamp of {first:.12g} s is no date that a clock of 1970 tells",
+            "io.stamp-no-date-clock-tells",
             file=raw.name,
             row=raw.row(0),
             quantity="time",
-            remedy=f"name its column with the unit, as in {found.source}_ms",
+            first=first,
+            source=found.source,
         )
     return time, Clock(name)
 
@@ -227,19 +225,14 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     if not known.all():
         k = int(np.argmin(known))
         raise DataError(
-            f"a solution of kind {codes[k]:g} is unknown",
-            file=raw.name,
-            row=raw.row(k),
-            quantity="Q",
-            remedy="Q has the codes of RTKLIB, 1 to 7; call a column with those of NMEA quality",
+            "io.solution-kind-unknown", file=raw.name, row=raw.row(k), quantity="Q", codes=codes[k]
         )
     raw.findings.append(
         Finding(
-            f"column '{found['Q'].source}' is taken for the codes of RTKLIB: 1 fix, 2 float, 5 "
-            "single",
+            "io.column-taken-codes-rtklib-fix",
             file=raw.name,
             quantity="quality",
-            remedy="if it is that of NMEA (4 fix, 5 float, 1 single), call it quality",
+            source=found["Q"].source,
         )
     )
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)

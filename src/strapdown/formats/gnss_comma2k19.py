@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import npy
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
@@ -104,14 +104,16 @@ def read(path: Path, options: GnssOptions) -> Fixes:
         or not set(t.dtype.kind + value.dtype.kind) <= set("iuf")
     ):
         raise DataError(
-            f"stamps have the shape {t.shape} and values {value.shape} of {value.dtype}; numbers "
-            f"of the shapes (n,) and (n, {COLUMNS}) were expected",
+            "io.stamps-shape-values-numbers-shapes-2",
             file=f"{name}/{value_file.name}",
             quantity="fixes",
-            remedy=AGAIN,
+            shape=t.shape,
+            shape_2=value.shape,
+            dtype=value.dtype,
+            columns=COLUMNS,
         )
     if not t.size:
-        raise DataError("no fix is in it", file=f"{name}/{value_file.name}", remedy=AGAIN)
+        raise DataError("io.no-fix", file=f"{name}/{value_file.name}")
     lat, lon, speed, utc, alt, bearing = np.asarray(value, dtype=np.float64).T
     findings: list[Finding] = []
     course = np.radians(bearing)
@@ -132,12 +134,7 @@ def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
     """When each fix was measured, on the clock of the stamps."""
     if not (np.isfinite(utc).all() and np.isfinite(t).all() and (np.diff(utc) > 0.0).all()):
         findings.append(
-            Finding(
-                "not every fix has a UTC that is later than the one before; they are dated by when "
-                "they were written, some hundredths of a second late",
-                file=name,
-                quantity="time",
-            )
+            Finding("io.not-every-fix-utc-later", file=name, quantity="time", severity="note")
         )
         return t
     seconds = utc * 1e-3 if utc.max() > IN_MS else utc
@@ -145,13 +142,11 @@ def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
     late -= late.min()
     findings.append(
         Finding(
-            "each fix is dated by its UTC, which lies before the stamp at which it was written: "
-            f"by up to {late.max():.3f} s, {np.median(late):.3f} s in the middle, more than that "
-            "of the fix that came soonest",
+            "io.each-fix-dated-utc-lies",
             file=name,
             quantity="time",
-            remedy="what all of them are late by is not known; time_offset_sd_s of the aid lets it "
-            "be found",
+            late=late.max(),
+            median=np.median(late),
         )
     )
     return np.asarray(t - late)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import (
     gnss_columns,
     gnss_comma2k19,
@@ -96,38 +96,26 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     """
     path, asked = Path(path), options or GnssOptions()
     if not path.exists():
-        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+        raise ConfigError("io.no-such-file", file=str(path))
     if path.is_file() and gnss_comma2k19.belongs(path):
-        raise DataError(
-            "fixes of a comma2k19 segment are two arrays, stamps and values",
-            file=path.name,
-            remedy=f"give the folder that has both: {path.parent}",
-        )
+        raise DataError("io.fixes-comma-k-segment-two", file=path.name, parent=path.parent)
     if path.is_file() and path.stat().st_size == 0:
-        raise DataError(
-            "the file is empty",
-            file=path.name,
-            remedy="check that the recording was saved and copied whole",
-        )
+        raise DataError("io.file-empty", file=path.name)
     if asked.format is not None and asked.format not in GNSS_READERS:
         raise ConfigError(
-            f"'{asked.format}' is no format of fixes",
+            "io.no-format-fixes",
             quantity="format",
-            remedy=nearest(asked.format, GNSS_READERS),
+            format=asked.format,
+            word=asked.format,
+            known=GNSS_READERS,
         )
     readers = [GNSS_READERS[asked.format]] if asked.format else GNSS_READERS.values()
     for reader in readers:
         if asked.format or reader.detect(path):
             return table_of_fixes(reader.read(path, asked), asked)
     if path.is_dir():
-        raise DataError(
-            "this is a folder, and fixes are read from one file",
-            file=path.resolve().name,
-            remedy="give one file of it",
-        )
+        raise DataError("io.folder-fixes-read-file", file=path.resolve().name)
     kinds = "; ".join(r.title for r in GNSS_READERS.values())
     raise DataError(
-        f"the ending '{path.suffix}' is of no known format of fixes",
-        file=path.name,
-        remedy=f"give one of: {kinds}",
+        "io.ending-no-known-format-fixes", file=path.name, suffix=path.suffix, kinds=kinds
     )

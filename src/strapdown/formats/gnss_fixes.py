@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.table_rows import told_by_file_rows
 from strapdown.tables import gnss_table
@@ -65,11 +65,7 @@ class GnssOptions:
             if value is not None and not (
                 np.shape(value) in ((), (3,)) and np.all(np.asarray(value) > 0.0)
             ):
-                raise ConfigError(
-                    f"{value!r} is no standard deviation",
-                    quantity=name,
-                    remedy="give one positive number, or three: north, east, down",
-                )
+                raise ConfigError("io.no-standard-deviation", quantity=name, value=value)
 
 
 @dataclass
@@ -141,12 +137,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     time, keep = _time(fixes, options)
     keep &= _placed(fixes, quality, options)
     if not keep.any():
-        raise DataError(
-            "no fix in it can be used",
-            file=fixes.name,
-            quantity="lat, lon",
-            remedy="look at the file: every row is without a place or a later stamp",
-        )
+        raise DataError("io.no-fix-can-used", file=fixes.name, quantity="lat, lon")
     at = np.flatnonzero(keep)
     with told_by_file_rows(fixes.name, lambda row: int(fixes.rows[at[row]])):
         table = gnss_table(
@@ -179,11 +170,12 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size and not options.repair:
         raise DataError(
-            f"its stamp is no number ({bad.size} such row{'s' if bad.size > 1 else ''} in all)",
+            "io.stamp-no-number-such-row",
             file=fixes.name,
             row=int(fixes.rows[bad[0]]),
             quantity="time",
-            remedy="correct or delete that row, or leave such rows out with repair",
+            size=bad.size,
+            value="s" if bad.size > 1 else "",
         )
     keep: NDArray[np.bool_] = np.isfinite(time)
     if fixes.clock.name in (GPS, RELATIVE):
@@ -194,10 +186,11 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
             row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
             fixes.findings.append(
                 Finding(
-                    "the seconds of week begin again; they are counted on",
+                    "io.seconds-week-begin-again-they",
                     file=fixes.name,
                     row=row,
                     quantity="time",
+                    severity="note",
                 )
             )
     there = np.where(keep, time, -np.inf)
@@ -207,13 +200,14 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
         k = int(late[0])
         same = there[k] == before[k]
         raise DataError(
-            f"the stamp {time[k]:.12g} s "
-            + ("is that of a row before" if same else f"comes after {before[k]:.12g} s")
-            + f" ({late.size} such row{'s' if late.size > 1 else ''} in all)",
+            "io.message",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity="time",
-            remedy="sort the rows by time, each instant once; repair leaves such rows out",
+            message=f"the stamp {time[k]:.12g} s "
+            + ("is that of a row before" if same else f"comes after {before[k]:.12g} s")
+            + f" ({late.size} such row{('s' if late.size > 1 else '')} in all)",
+            remedy_text="sort the rows by time, each instant once; repair leaves such rows out",
         )
     keep = np.asarray(keep & (there > before))
     _say_left_out(fixes, keep, "whose stamp is no number, or not later than every one before")
@@ -228,11 +222,12 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
         k = int(bad[0])
         which = GEODETIC[int(np.argmin(np.isfinite(fixes.place[k])))]
         raise DataError(
-            f"it is no number ({bad.size} such row{'s' if bad.size > 1 else ''} in all)",
+            "io.no-number-such-row-all",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=which,
-            remedy="correct or delete that row, or leave such rows out with repair",
+            size=bad.size,
+            value="s" if bad.size > 1 else "",
         )
     _say_left_out(fixes, there, "without a place")
     return there
@@ -243,9 +238,13 @@ def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], why: str) -> None:
     if out.size:
         fixes.findings.append(
             Finding(
-                f"{out.size} row{'s' if out.size > 1 else ''} left out {why}",
+                "io.row-left-out",
                 file=fixes.name,
                 row=int(fixes.rows[out[0]]),
+                severity="note",
+                size=out.size,
+                value="s" if out.size > 1 else "",
+                why=why,
             )
         )
 
@@ -271,18 +270,14 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         if what == "velocity":
             fixes.findings.append(
                 Finding(
-                    "velocities without standard deviations; they are not used",
+                    "io.velocities-without-standard-deviations-they",
                     file=fixes.name,
                     quantity=", ".join(VELOCITY),
-                    remedy=f"state velocity_sd, in m/s: {VELOCITY_SDS}",
                 )
             )
             return np.full((count, 3), np.inf)
         raise DataError(
-            "no standard deviations of the places are in it",
-            file=fixes.name,
-            quantity=", ".join(names),
-            remedy=f"state position_sd, in m: {POSITION_SDS}",
+            "io.no-standard-deviations-places", file=fixes.name, quantity=", ".join(names)
         )
     sd = np.where(np.isnan(stated), np.inf, stated)
     zero = sd == 0.0
@@ -290,12 +285,13 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         rows = np.flatnonzero(zero.any(axis=1))
         fixes.findings.append(
             Finding(
-                f"{rows.size} row{'s' if rows.size > 1 else ''} with a standard deviation of zero, "
-                f"which stands for one that is not known: that {what} is not used",
+                "io.row-standard-deviation-zero-stands",
                 file=fixes.name,
                 row=int(fixes.rows[rows[0]]),
                 quantity=names[int(np.argmax(zero[rows[0]]))],
-                remedy=f"state {what}_sd for all of them",
+                size=rows.size,
+                value="s" if rows.size > 1 else "",
+                what=what,
             )
         )
         sd = np.where(zero, np.inf, sd)
@@ -303,12 +299,12 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
     if bad.size:
         k, j = (int(v) for v in bad[0])
         raise DataError(
-            f"{stated[k, j]:.9g} is no standard deviation ({len(np.unique(bad[:, 0]))} such "
-            "rows in all)",
+            "io.no-standard-deviation-such-rows",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=names[j],
-            remedy=f"give what the receiver states, leave it empty where it does not measure, or "
-            f"state {what}_sd for all rows",
+            stated=stated[k, j],
+            count=len(np.unique(bad[:, 0])),
+            what=what,
         )
     return np.asarray(sd)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv, kf_gins
 from strapdown.formats.clocks import GPS, Clock
 from strapdown.formats.find_columns import Column
@@ -58,18 +58,16 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     """
     if kf_gins.detect(path):
         raise DataError(
-            f"these are increments of inertial sensors ({kf_gins.LAYOUT}), not fixes",
-            file=path.name,
-            remedy="give it as the log, and the file with the places here",
+            "io.these-increments-inertial-sensors-not", file=path.name, layout=kf_gins.LAYOUT
         )
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):
         raise DataError(
-            f"it has {len(raw.columns)} columns, and this layout seven, or thirteen with velocity",
+            "io.columns-layout-seven-or-thirteen",
             file=raw.name,
             row=raw.row(0),
-            remedy=f"give {LAYOUT}; a table with a header is read by its names",
+            count=len(raw.columns),
         )
     return fixes_of(raw, names)
 
@@ -86,10 +84,11 @@ def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
 
     raw.findings.append(
         Finding(
-            f"{len(names)} columns without a header: taken for the layout of KF-GINS, {LAYOUT}"
-            + (", velocity and its standard deviations" if len(names) > len(NAMES) else ""),
+            "io.message",
             file=raw.name,
-            remedy="if not, name the columns in a header",
+            message=f"{len(names)} columns without a header: taken for the layout of KF-GINS, {LAYOUT}"
+            + (", velocity and its standard deviations" if len(names) > len(NAMES) else ""),
+            remedy_text="if not, name the columns in a header",
         )
     )
     return Fixes(

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import UNIX, Clock
 from strapdown.formats.csv_columns import parsed
@@ -124,7 +124,11 @@ def read(path: Path) -> RawLog:
             continue
         if kind == "UncalGyro":
             what = "UncalGyro is read, from which the phone has taken no bias"
-            findings.append(Finding(what, file=path.name, quantity=triad))
+            findings.append(
+                Finding(
+                    "io.message-2", file=path.name, quantity=triad, severity="note", message=what
+                )
+            )
         table, rows = _table(path, lines[kind], SENSOR)
         table["time"] = _whole(table["elapsedRealtimeNanos"], path, rows) + ahead
         log = sensor_log(
@@ -139,10 +143,10 @@ def read(path: Path) -> RawLog:
         logs.append(log)
     if not lines.get("UncalGyro") and not lines.get("Gyro"):
         raise DataError(
-            f"no line of a gyroscope in it; it holds: {', '.join(lines) or 'nothing'}",
+            "io.no-line-gyroscope-holds",
             file=path.name,
             quantity="gyro",
-            remedy="record with Sensors switched on in the settings of GnssLogger",
+            lines=", ".join(lines) or "nothing",
         )
     raw = join(logs, path.name, (path,))
     return dataclasses.replace(raw, findings=[*findings, *raw.findings], clock=UNIX)
@@ -172,21 +176,16 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     names = _fix_names(path)
     if not lines.get(FIX):
         raise DataError(
-            f"no line of a fix in it; it holds: {', '.join(lines) or 'nothing'}",
+            "io.no-line-fix-holds",
             file=path.name,
             quantity="lat, lon",
-            remedy="record with Location switched on in the settings of GnssLogger",
+            lines=", ".join(lines) or "nothing",
         )
     table, rows = _table(path, lines[FIX], names)
     at = {q: next((n for n in known if n in table), None) for q, known in FIX_FIELDS.items()}
     missing = [FIX_FIELDS[q][0] for q in ("provider", "lat", "lon", "alt", "utc") if not at[q]]
     if missing:
-        raise DataError(
-            f"fixes have no field {', '.join(missing)}",
-            file=path.name,
-            row=int(rows[0]),
-            remedy="export the log again",
-        )
+        raise DataError("io.fixes-no-field", file=path.name, row=int(rows[0]), missing=missing)
     keep = _of_one_provider(path, table[str(at["provider"])], findings)
 
     def values(quantity: str) -> Array:
@@ -201,17 +200,20 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
         elapsed = _whole(table[str(at["elapsed"])], path, rows)[keep]
         time = np.asarray((elapsed + _ahead(path, lines, findings)) * 1e-9, dtype=np.float64)
         what = "stamps of the fixes are those since the phone was started, as those of the sensors"
-        findings.append(Finding(what, file=path.name, quantity="time"))
+        findings.append(
+            Finding("io.message-2", file=path.name, quantity="time", severity="note", message=what)
+        )
     horizontal = values("radius") / RADIUS
     vertical = values("vertical")
     if np.isnan(vertical).any() and np.isfinite(horizontal).any():
         vertical = np.where(np.isnan(vertical), UNSTATED_VERTICAL * horizontal, vertical)
         findings.append(
             Finding(
-                "how well heights are known is not stated for all fixes: "
-                f"{UNSTATED_VERTICAL:g} times the standard deviation of north and east is taken",
+                "io.how-well-heights-known-not",
                 file=path.name,
                 quantity="down_sd",
+                severity="note",
+                unstated_vertical=UNSTATED_VERTICAL,
             )
         )
     # Of a velocity whose speed or bearing is not stated, nothing is used; down nothing is known.
@@ -264,10 +266,11 @@ def _table(
     if odd is not None or width < min(len(known), len(SENSOR)):
         row, line = odd or lines[0]
         raise DataError(
-            f"{line.count(',') + 1} fields, where {max(width, len(SENSOR))} were expected",
+            "io.fields-expected",
             file=path.name,
             row=row,
-            remedy="correct or delete that row",
+            count=line.count(",") + 1,
+            width=max(width, len(SENSOR)),
         )
     columns = parsed("\n".join(line for _, line in lines).encode(), width, ",")
     return dict(zip(known, columns, strict=False)), np.array([row for row, _ in lines])
@@ -278,11 +281,11 @@ def _whole(stamps: NDArray[Any], path: Path, rows: NDArray[np.int64]) -> NDArray
         return stamps.astype(np.int64)
     bad = np.flatnonzero([not str(s).strip().isdecimal() for s in stamps])
     raise DataError(
-        f"'{stamps[bad[0]]}' is no whole number of nanoseconds",
+        "io.no-whole-number-nanoseconds",
         file=path.name,
         row=int(rows[bad[0]]),
         quantity="elapsedRealtimeNanos",
-        remedy="correct or delete that row",
+        stamps=stamps[bad[0]],
     )
 
 
@@ -298,10 +301,11 @@ def _ahead(path: Path, lines: dict[str, list[tuple[int, str]]], findings: list[F
     if (drift := float(np.ptp(ahead)) * 1e-9) > MOST_DRIFT:
         findings.append(
             Finding(
-                f"the phone's clock of the day moves by {drift:.3g} s against that since its "
-                "start, which is used",
+                "io.phone-clock-day-moves-against",
                 file=path.name,
                 quantity="time",
+                severity="note",
+                drift=drift,
             )
         )
     return middle
@@ -323,14 +327,18 @@ def _of_one_provider(
     chosen = next((p for p in PROVIDERS if (said == p).any()), None)
     if chosen is None:
         raise DataError(
-            f"no fix of a satellite receiver; fixes are of {', '.join(sorted(set(said)))}",
+            "io.no-fix-satellite-receiver-fixes",
             file=path.name,
             quantity="Provider",
-            remedy="record with GPS switched on",
+            said=sorted(set(said)),
         )
     keep: NDArray[np.bool_] = np.asarray(said == chosen)
     if not keep.all():
         others = ", ".join(sorted(set(said[~keep])))
         what = f"{int(keep.sum())} of {keep.size} fixes are used, of {chosen}; not of {others}"
-        findings.append(Finding(what, file=path.name, quantity="Provider"))
+        findings.append(
+            Finding(
+                "io.message-2", file=path.name, quantity="Provider", severity="note", message=what
+            )
+        )
     return keep

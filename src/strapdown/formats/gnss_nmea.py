@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
@@ -85,18 +85,16 @@ def read(path: Path, options: GnssOptions) -> Fixes:
         _take(epochs, match[2], match[3].split(","), row, path.name)
     fixed = [e for e in epochs if np.isfinite(e.quality)]
     if not fixed:
-        raise DataError(
-            "it holds no GGA sentence that is whole",
-            file=path.name,
-            remedy="let the receiver write GGA, and RMC or ZDA for the date, GST for its precision",
-        )
+        raise DataError("io.holds-no-gga-sentence-whole", file=path.name)
     if wrong:
         findings.append(
             Finding(
-                f"{len(wrong)} line{'s' if len(wrong) > 1 else ''} left out: no sentence with a "
-                "right checksum",
+                "io.line-left-out-no-sentence",
                 file=path.name,
                 row=wrong[0],
+                severity="note",
+                count=len(wrong),
+                value="s" if len(wrong) > 1 else "",
             )
         )
     time, clock = _times(fixed)
@@ -127,11 +125,13 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
         return
     if len(fields) < needed:
         raise DataError(
-            f"a {kind} of {len(fields)} fields, where it has {needed} or more",
+            "io.fields-or-more",
             file=file,
             row=row,
             quantity=kind,
-            remedy="correct or delete that line",
+            kind=kind,
+            count=len(fields),
+            needed=needed,
         )
     if not fields[0] and kind != "VTG":
         return
@@ -141,11 +141,7 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
             return float(fields[k]) if fields[k] else np.nan
         except ValueError:
             raise DataError(
-                f"'{fields[k]}' is not a number",
-                file=file,
-                row=row,
-                quantity=f"{kind} {what}",
-                remedy="correct or delete that line",
+                "io.not-number", file=file, row=row, quantity=f"{kind} {what}", fields=fields[k]
             ) from None
 
     if kind == "VTG":
@@ -168,11 +164,10 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
             )
             if np.isnan(epoch.place[2]) and fields[8]:
                 raise DataError(
-                    "its height is over the sea, and that of the geoid is not in it",
+                    "io.height-over-sea-geoid-not",
                     file=file,
                     row=row,
                     quantity="GGA height of the geoid",
-                    remedy="let the receiver write field 11, or give heights over the ellipsoid",
                 )
     elif kind == "GST":
         epoch.sd = (number(5, "latitude"), number(6, "longitude"), number(7, "height"))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
 from strapdown.formats.csv_columns import columns_at_once
@@ -99,11 +99,11 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     if not known.all():
         k = int(np.argmin(known))
         raise DataError(
-            f"a solution of kind {quality[k]:g} is unknown",
+            "io.solution-kind-unknown-2",
             file=path.name,
             row=int(rows[k]),
             quantity="Q",
-            remedy="1 to 7 stand for fix, float, SBAS, DGPS, single, PPP, dead reckoning",
+            quality=quality[k],
         )
     return Fixes(
         name=path.name,
@@ -123,11 +123,7 @@ def read(path: Path, options: GnssOptions) -> Fixes:
 def _decoded(path: Path) -> tuple[str, list[Finding]]:
     data = path.read_bytes()
     if not data:
-        raise DataError(
-            "the file is empty",
-            file=path.name,
-            remedy="check that the solution was saved and copied whole",
-        )
+        raise DataError("io.file-empty-2", file=path.name)
     if data.startswith(codecs.BOM_UTF8):
         data = data[3:]
     return csv.decoded(data, path.name)
@@ -141,35 +137,15 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
     )
     row, match = next(headers, (0, None))
     if match is None:
-        raise DataError(
-            "no line names its columns, as '%  GPST  latitude(deg) …' does",
-            file=file,
-            remedy="write it again with RTKLIB with 'output header' on, or give a table with names",
-        )
+        raise DataError("io.no-line-names-columns-gpst", file=file)
     top = " ".join(line for line in lines[:row] if line.startswith("%"))
     told = re.search(r"lat/lon/height=(\w+)/(\w+)", top)
     if told and told[1] != "WGS84":
-        raise DataError(
-            f"the places refer to the datum {told[1]}",
-            file=file,
-            quantity="lat, lon",
-            remedy="write it again with RTKLIB, with the datum WGS84",
-        )
+        raise DataError("io.places-refer-datum", file=file, quantity="lat, lon", told=told[1])
     if told and told[2] == "geodetic":
-        raise DataError(
-            "its heights are over the geoid, as the header says (geodetic)",
-            file=file,
-            quantity="alt",
-            remedy="write it again with RTKLIB, with heights ellipsoidal",
-        )
+        raise DataError("io.heights-over-geoid-header-says", file=file, quantity="alt")
     if "e-baseline(" in match[2]:
-        raise DataError(
-            "it holds the way from the base station, and no place (e/n/u-baseline)",
-            file=file,
-            row=row,
-            quantity="lat, lon",
-            remedy=_AGAIN,
-        )
+        raise DataError("io.holds-way-base-station-no", file=file, row=row, quantity="lat, lon")
     separator = next((s for s in ",;\t" if s in match[2]), " ")
     names = [n for n in re.split(r"[\s,;]+", match[2].strip()) if n]
     form = next((f for f in ("(deg)", "(d'\")") if f"latitude{f}" in names), "")
@@ -177,11 +153,11 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
     missing = [p for p in (*places, "Q") if p not in names]
     if missing or len(set(names)) < len(names):
         raise DataError(
-            f"the line that names the columns is damaged: it names {', '.join(names)}",
+            "io.line-names-columns-damaged-names",
             file=file,
             row=row,
             quantity=", ".join(missing) or None,
-            remedy=_AGAIN,
+            names=names,
         )
     return _Layout(match[1].upper(), names, separator, row)
 
@@ -192,12 +168,7 @@ def _columns(
     """Numbers by name; a date is six of them, degrees with minutes and seconds three."""
     held = [(k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] != "%"]
     if not held:
-        raise DataError(
-            "a header, and no solution under it",
-            file=file,
-            row=layout.row,
-            remedy="look at what RTKLIB told: it found no solution, or the copy is cut",
-        )
+        raise DataError("io.header-no-solution-under", file=file, row=layout.row)
     dated = "/" in held[0][1].split()[0]
     names = ["year", "month", "day", "hour", "minute", "second"] if dated else ["week", "tow"]
     for name in layout.names:
@@ -209,29 +180,14 @@ def _columns(
     plain = [(row, line.translate(table)) for row, line in held]
     widths = [len(line.split()) for _, line in plain]
     if widths[-1] < len(names) and (not ended or len(plain) > 1):
-        findings.append(
-            Finding(
-                "the last line is cut; it was left out",
-                file=file,
-                row=plain[-1][0],
-                remedy="if more is missing, copy the file again",
-            )
-        )
+        findings.append(Finding("io.last-line-cut-left-out", file=file, row=plain[-1][0]))
         plain, widths = plain[:-1], widths[:-1]
     if not plain:
-        raise DataError(
-            "its only line under the header is cut",
-            file=file,
-            row=held[0][0],
-            remedy="copy the file again",
-        )
+        raise DataError("io.only-line-under-header-cut", file=file, row=held[0][0])
     for (row, _), width in zip(plain, widths, strict=True):
         if width != len(names):
             raise DataError(
-                f"{width} numbers, where the header names {len(names)}",
-                file=file,
-                row=row,
-                remedy="correct or delete that row; if the file changes its columns, split it",
+                "io.numbers-header-names", file=file, row=row, width=width, count=len(names)
             )
     rows = np.array([row for row, _ in plain], dtype=np.int64)
     text = "".join(f"{' '.join(line.split())}\n" for _, line in plain)
@@ -251,11 +207,12 @@ def _refuse_words(plain: list[tuple[int, str]], names: list[str], file: str) -> 
                 float(text)
             except ValueError:
                 raise DataError(
-                    f"'{text}' is not a number",
+                    "io.message",
                     file=file,
                     row=row,
                     quantity=name,
-                    remedy="correct or delete that row"
+                    message=f"'{text}' is not a number",
+                    remedy_text="correct or delete that row"
                     + ("; decimals need a point" if "," in text else ""),
                 ) from None
 
@@ -280,11 +237,7 @@ def _time(
     bad = np.flatnonzero(~np.isfinite(weeks + seconds) | (weeks < 0.0))
     if bad.size:
         raise DataError(
-            "its time is no date since 1980 and no GPS week",
-            file=file,
-            row=int(rows[bad[0]]),
-            quantity="time",
-            remedy="correct or delete that row",
+            "io.time-no-date-since-no", file=file, row=int(rows[bad[0]]), quantity="time"
         )
     first = weeks[0] + np.floor(seconds[0] / WEEK)
     return np.asarray(WEEK * (weeks - first) + seconds), int(first)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.recording import RawLog
 
@@ -98,11 +98,7 @@ def read_arrays(
     except DataError:
         raise
     except Exception as error:  # a damaged file can break the library anywhere
-        raise DataError(
-            f"it cannot be read as HDF5: {error}",
-            file=path.name,
-            remedy="copy it again, or export it from its source once more",
-        ) from None
+        raise DataError("io.cannot-read-hdf", file=path.name, error=error) from None
     return arrays, units, meta
 
 

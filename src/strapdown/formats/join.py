@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.columns import QUANTITIES
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.numbers import numbers, ticks_of
@@ -93,10 +93,7 @@ def join(
                 continue
             if triad in given:
                 raise ConfigError(
-                    f"it is in {given[triad]} and in {log.name}",
-                    file=name,
-                    quantity=triad,
-                    remedy="give one of them",
+                    "io.given-name", file=name, quantity=triad, given=given[triad], name=log.name
                 )
             given[triad] = log.name
             values, inside = _onto(gyro, own, log, theirs, triad, findings)
@@ -112,10 +109,12 @@ def join(
     if lost := int((~keep).sum()):
         findings.append(
             Finding(
-                f"{lost} of {keep.size} rows left out, for which another sensor has no value: "
-                "nothing is extrapolated",
+                "io.rows-left-out-another-sensor",
                 file=gyro.name,
                 row=gyro.row(int(np.argmin(keep))),
+                severity="note",
+                lost=lost,
+                size=keep.size,
             )
         )
     everything = tuple(dict.fromkeys(f for log in logs for f in log.files))
@@ -149,11 +148,7 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
     """
     if "time" not in found:
         raise DataError(
-            "no column was recognised as time, and logs are joined on it; it has: "
-            f"{', '.join(log.columns)}",
-            file=log.name,
-            quantity="time",
-            remedy="name the column with its unit, as in time_s",
+            "io.no-column-recognised-time-logs", file=log.name, quantity="time", columns=log.columns
         )
     ticks, dated = ticks_of(log, found["time"])
     return Clock(ticks, "ns" if dated else found["time"].unit)
@@ -204,18 +199,13 @@ def _with_gyro(logs: Sequence[RawLog], found: Sequence[dict[str, Column]], name:
     if len(have) == 1:
         return have[0]
     if have:
-        raise ConfigError(
-            f"{' and '.join(logs[k].name for k in have)} have one each",
-            file=name,
-            quantity="gyro",
-            remedy="give one of them",
-        )
+        raise ConfigError("io.each", file=name, quantity="gyro", have=[logs[k].name for k in have])
     held = "; ".join(f"{_short(log)} ({', '.join(log.columns)})" for log in logs)
     raise DataError(
-        f"no gyroscope in it; it holds: {held or 'no sensor that is read here'}",
+        "io.no-gyroscope-holds",
         file=name,
         quantity="gyro",
-        remedy="record with the gyroscope switched on, and export it with the rest",
+        held=held or "no sensor that is read here",
     )
 
 
@@ -234,12 +224,7 @@ def _onto(
     origin, clock = clock_of(gyro, own), clock_of(log, theirs)
     if (origin.unit is None) != (clock.unit is None):
         mute = gyro if origin.unit is None else log
-        raise DataError(
-            "its stamps have no unit, and those of the other sensors have",
-            file=mute.name,
-            quantity="time",
-            remedy="name its column of stamps with the unit, as in time_s",
-        )
+        raise DataError("io.stamps-no-unit-those-other", file=mute.name, quantity="time")
     time, stamps = in_seconds(origin, origin), in_seconds(clock, origin)
     known = np.isfinite(time)
     stamps, values = _in_order(stamps, values, log.name, triad, findings)
@@ -252,12 +237,12 @@ def _onto(
     if not inside.any():
         start = np.nanmin(time)
         raise DataError(
-            f"its stamps run from {stamps[0] - start:.6g} to {stamps[-1] - start:.6g} s after the "
-            f"first of the gyro, whose log is {np.nanmax(time) - start:.6g} s long: the clocks do "
-            "not count from the same moment",
+            "io.stamps-run-after-first-gyro",
             file=log.name,
             quantity="time",
-            remedy="export all sensors on one clock, or give the gyro's file alone",
+            stamps=stamps[0] - start,
+            stamps_2=stamps[-1] - start,
+            nanmax=np.nanmax(time) - start,
         )
     covered = int(inside.sum())
     if covered < COVERED * known.sum():
@@ -267,21 +252,26 @@ def _onto(
     if distance > 0:
         findings.append(
             Finding(
-                f"interpolated to {covered} stamps of the gyro, which are not its own; the "
-                f"farthest is {distance:.3g} s from the sample nearest to it",
+                "io.interpolated-stamps-gyro-not-own",
                 file=log.name,
                 quantity=triad,
+                severity="note",
+                covered=covered,
+                distance=distance,
             )
         )
     if gaps := find_gaps(stamps):
         longest = max(gaps, key=lambda g: g.length)
         findings.append(
             Finding(
-                f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in it, the longest "
-                f"{longest.length:.3g} s; its values in them are straight lines",
+                "io.gap-longest-values-them-straight"
+                if triad == "accel"
+                else "io.gap-longest-values-them-straight-2",
                 file=log.name,
                 quantity=triad,
-                remedy="do not level on them" if triad == "accel" else None,
+                count=len(gaps),
+                value="s" if len(gaps) > 1 else "",
+                length=longest.length,
             )
         )
     # A stamp of the gyro that is no number is refused, or repaired, with the gyro's own.
@@ -289,7 +279,7 @@ def _onto(
 
 
 def _leave_out(name: str, triad: str, what: str, findings: list[Finding]) -> None:
-    findings.append(Finding(f"left out: {what}", file=name, quantity=triad))
+    findings.append(Finding("io.left-out-3", file=name, quantity=triad, severity="note", what=what))
 
 
 def _in_order(
@@ -302,10 +292,12 @@ def _in_order(
     if lost := stamps.size - order.size:
         findings.append(
             Finding(
-                f"{lost} of {stamps.size} samples not used: no number in them, or a stamp that "
-                "another has",
+                "io.samples-not-used-no-number",
                 file=name,
                 quantity=triad,
+                severity="note",
+                lost=lost,
+                size=stamps.size,
             )
         )
     return stamps[order], values[order]
@@ -315,10 +307,11 @@ def _one_of(what: str, logs: Sequence[RawLog], name: str) -> str | None:
     said = {log.axes: log.name for log in logs if log.axes}
     if len(said) > 1:
         raise DataError(
-            "; ".join(f"{file} says {axes}" for axes, file in said.items()),
+            "io.message",
             file=name,
             quantity=what,
-            remedy="turn one of them into the axes of the other",
+            message="; ".join((f"{file} says {axes}" for axes, file in said.items())),
+            remedy_text="turn one of them into the axes of the other",
         )
     return next(iter(said), None)
 
@@ -359,10 +352,11 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
                 its[quantity] = plain
         if not any(quantity in its for its in asked):
             raise ConfigError(
-                f"no log has a column '{source}'",
+                "io.no-log-column",
                 file=", ".join(log.name for log in logs),
                 quantity=f"--columns {quantity}",
-                remedy=f"they have: {'; '.join(', '.join(log.columns) for log in logs)}",
+                source=source,
+                logs=[", ".join(log.columns) for log in logs],
             )
     out = []
     for log, its in zip(logs, asked, strict=True):

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.inference import THRESHOLD, Inference
 from strapdown.formats.summed import SUMS, sum_of
 
@@ -50,24 +50,32 @@ def inferred_unit(
     form = said.get(f"{triad}_form")
     if form is not None and form.value == "increment" and form.confidence > 0.5:
         raise DataError(
-            f"the unit is not stated, and these look like increments of each sample, not rates "
-            f"({'; '.join(form.evidence)}; confidence {form.confidence:.3g})",
+            "io.unit-not-stated-these-look",
             file=file,
             quantity=triad,
-            remedy=f"if they are, state it with {_flag(triad)}: "
-            f"{sum_of(_likely(unit), triad)}, the unit of the increment of each sample",
+            evidence=form.evidence,
+            confidence=form.confidence,
+            flag=_flag(triad),
+            sum_of=sum_of(_likely(unit), triad),
         )
     if unit is not None and unit.settled and (form is None or form.value == "rate"):
         findings.append(
             Finding(
-                str(unit),
+                "io.message",
                 file=file,
                 quantity=f"unit of {triad}",
-                remedy=f"if not, state it with {_flag(triad)}",
+                message=str(unit),
+                remedy_text=f"if not, state it with {_flag(triad)}",
             )
         )
         return str(unit.value), str(unit)
-    raise DataError(not_told(unit), file=file, quantity=triad, remedy=_choices(triad, values))
+    raise DataError(
+        "io.message",
+        file=file,
+        quantity=triad,
+        message=not_told(unit),
+        remedy_text=_choices(triad, values),
+    )
 
 
 def _likely(unit: Inference | None) -> str | None:
@@ -154,17 +162,12 @@ def report_contradictions(
         else:
             continue
         remedy = f"if the statement is wrong, say {_flag(triad)} {value}"
-        findings.append(Finding(what, file=file, quantity=triad, remedy=remedy))
+        findings.append(
+            Finding("io.message", file=file, quantity=triad, message=what, remedy_text=remedy)
+        )
     gravity = said.get("gravity")
     if "accel" in units and gravity is not None and gravity.settled and gravity.value == "removed":
-        findings.append(
-            Finding(
-                f"gravity is not in it; {gravity}",
-                file=file,
-                quantity="accel",
-                remedy="it cannot level; log the accelerometer itself, not linear acceleration",
-            )
-        )
+        findings.append(Finding("io.gravity-not", file=file, quantity="accel", gravity=gravity))
     axes = said.get("gyro_axes")
     if axes is None or not axes.settled or axes.value == "x,y,z":
         return
@@ -177,7 +180,11 @@ def report_contradictions(
     else:
         what = f"its {axes.value} stand along x,y,z of the accelerometer"
         remedy = "correct the columns that are reversed or exchanged (--columns exchanges them)"
-    findings.append(Finding(f"{what}; {axes}", file=file, quantity="gyro", remedy=remedy))
+    findings.append(
+        Finding(
+            "io.message", file=file, quantity="gyro", message=f"{what}; {axes}", remedy_text=remedy
+        )
+    )
 
 
 def _settled(said: dict[str, Inference], quantity: str) -> bool:
@@ -237,10 +244,10 @@ def report_upside_down(
         return
     findings.append(
         Finding(
-            f"by --axes {axis} points down, and {up.evidence[0]}, as of a sensor upside down",
+            "io.axes-points-down-sensor-upside",
             file=file,
             quantity="axes",
-            remedy="if it was not, the axes are others, or it reports gravity with the other sign "
-            "(iOS does): --accel-unit -m/s2 or -g",
+            axis=axis,
+            evidence=up.evidence[0],
         )
     )

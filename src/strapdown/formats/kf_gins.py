@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK
 from strapdown.formats.recording import RawLog
@@ -88,11 +88,11 @@ def read(path: Path) -> RawLog:
     names = list(raw.columns)
     if len(names) != len(COLUMNS) or any(n.startswith("column ") is False for n in names):
         raise DataError(
-            f"it has {len(names)} columns ({', '.join(names[:8])}), and this layout seven without "
-            "a header",
+            "io.columns-layout-seven-without-header",
             file=raw.name,
             row=raw.row(0),
-            remedy=f"give {LAYOUT}; a table with a header is read by its names",
+            count=len(names),
+            names=names[:8],
         )
     columns = dict(zip(COLUMNS, raw.columns.values(), strict=True))
     axes = raw.axes
@@ -120,16 +120,15 @@ def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
     told = down < -0.5 * _GRAVITY[0]
     raw.findings.append(
         Finding(
-            f"seven columns without a header, the first a clock of {1.0 / step:.4g} Hz: taken for "
-            "the layout of KF-GINS, increments in rad and m/s"
+            "io.message",
+            file=raw.name,
+            message=f"seven columns without a header, the first a clock of {1.0 / step:.4g} Hz: taken for the layout of KF-GINS, increments in rad and m/s"
             + (
                 ", axes forward, right, down"
                 if told
-                else f"; the third axis feels {down:.3g} m/s², which is not level with forward, "
-                "right, down"
+                else f"; the third axis feels {down:.3g} m/s², which is not level with forward, right, down"
             ),
-            file=raw.name,
-            remedy="if not, name the columns (--columns time=1,gyro_x=2 …)",
+            remedy_text="if not, name the columns (--columns time=1,gyro_x=2 …)",
         )
     )
     return "x,y,z" if told else None

@@ -20,7 +20,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX, Clock, with_clock
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
@@ -82,7 +82,11 @@ def read(path: Path) -> RawLog:
         stated=stated,
         axes=AXES,
         truth=TruthInSensorAxes(q_ns, np.ones(len(values), dtype=bool)),
-        findings=[Finding(f"the truth is {OWN} truth", file=name, quantity="attitude")],
+        findings=[
+            Finding(
+                "io.truth-own-solution-oxts-unit", file=name, quantity="attitude", severity="note"
+            )
+        ],
         clock=UNIX,
     )
 
@@ -121,7 +125,9 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
         position_sd=np.repeat(accuracy[:, :1], 3, axis=1),
         velocity_sd=np.repeat(accuracy[:, 1:], 3, axis=1),
         zero_is_unknown=True,
-        findings=[Finding(what, file=name, quantity="lat, lon")],
+        findings=[
+            Finding("io.message-2", file=name, quantity="lat, lon", severity="note", message=what)
+        ],
     )
 
 
@@ -149,7 +155,11 @@ def read_trajectory(path: Path) -> pd.DataFrame:
         time * 1e-9, values[:, PLACE], _velocity(values), _euler(values), source=name
     )
     table.attrs["ellipsoid"] = "wgs84"
-    table.attrs["findings"] = (Finding(f"it is {OWN} truth", file=name, quantity="trajectory"),)
+    table.attrs["findings"] = (
+        Finding(
+            "io.own-solution-oxts-unit-these", file=name, quantity="trajectory", severity="note"
+        ),
+    )
     return with_clock(table, Clock(UNIX))
 
 
@@ -174,11 +184,7 @@ def _files(path: Path) -> tuple[Path, ...]:
     """The stamps, and what belongs to them in order."""
     folder = _oxts(path)
     if folder is None:
-        raise DataError(
-            "there is no timestamps.txt in it",
-            file=path.resolve().name,
-            remedy="give the folder oxts of a raw recording, or that of its drive",
-        )
+        raise DataError("io.no-timestamps-txt", file=path.resolve().name)
     data = sorted(f for f in (folder / "data").glob("*") if _NAME.fullmatch(f.name))
     return (folder / "timestamps.txt", *data)
 
@@ -191,20 +197,17 @@ def _values(path: Path) -> tuple[NDArray[np.int64], Array, tuple[Path, ...]]:
     if dates.isna().any():
         row = int(np.argmax(dates.isna().to_numpy()))
         raise DataError(
-            f"'{lines[row]}' is no date",
-            file=f"oxts/{stamps.name}",
-            row=row + 1,
-            quantity="time",
-            remedy="get the recording again from its source",
+            "io.no-date", file=f"oxts/{stamps.name}", row=row + 1, quantity="time", lines=lines[row]
         )
     # Of some recordings a few files are missing: each belongs to the stamp of its number.
     numbers = np.array([int(f.stem) for f in files])
     if not files or numbers[-1] >= len(lines):
         raise DataError(
-            f"{len(files)} files of data, the last {files[-1].name if files else '-'}, and "
-            f"{len(lines)} stamps",
+            "io.files-data-last-stamps",
             file="oxts/data",
-            remedy="copy the folder whole",
+            count=len(files),
+            name=files[-1].name if files else "-",
+            count_2=len(lines),
         )
     values = np.array([_numbers(f) for f in files])
     time = dates.to_numpy().astype("datetime64[ns]").astype(np.int64)[numbers]
@@ -219,9 +222,10 @@ def _numbers(file: Path) -> Array:
         values = np.empty(0)
     if values.size != FIELDS or not np.isfinite(values).all():
         raise DataError(
-            f"{len(fields)} fields, where {FIELDS} numbers were expected",
+            "io.fields-numbers-expected",
             file=f"oxts/data/{file.name}",
-            remedy="get the recording again from its source",
+            count=len(fields),
+            fields=FIELDS,
         )
     return values
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.clocks import RELATIVE, Clock, clock_of_name
 from strapdown.formats.find_columns import Column
 from strapdown.formats.inference import Inference
@@ -58,17 +58,10 @@ def stamps_of_log(
     rows = np.flatnonzero(finite)
     rate = options.rate or raw.rate
     if options.rate is not None and not (np.isfinite(options.rate) and options.rate > 0):
-        raise ConfigError(
-            f"{options.rate:g} Hz is no rate", quantity="--rate", remedy="use a positive number"
-        )
+        raise ConfigError("io.hz-no-rate-2", quantity="--rate", rate=options.rate)
     if ticks is None:
         if rate is None:
-            raise DataError(
-                "no column was recognised as time",
-                file=raw.name,
-                quantity="time",
-                remedy="name it with --columns time=NAME, or state the rate with --rate HZ",
-            )
+            raise DataError("io.no-column-recognised-time", file=raw.name, quantity="time")
         everything = np.ones(rows.size, dtype=bool)
         why = f"no time column: {rate:g} Hz as stated"
         return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
@@ -76,10 +69,12 @@ def stamps_of_log(
     if options.rate is not None:
         findings.append(
             Finding(
-                f"--rate {options.rate:g} is not used: the log has stamps (column "
-                f"'{column.source}')",
+                "io.rate-not-used-log-stamps",
                 file=raw.name,
                 quantity="time",
+                severity="note",
+                rate=options.rate,
+                source=column.source,
             )
         )
     unit, why = column.unit, "in its name"
@@ -93,7 +88,13 @@ def stamps_of_log(
         unit, why = str(said["time_unit"].value), str(said["time_unit"])
         if unit != "s":
             findings.append(
-                Finding(why, file=raw.name, quantity="time", remedy="if not, say --time-unit")
+                Finding(
+                    "io.message",
+                    file=raw.name,
+                    quantity="time",
+                    message=why,
+                    remedy_text="if not, say --time-unit",
+                )
             )
     stamps = read_stamps(
         ticks[rows],

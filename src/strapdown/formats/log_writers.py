@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats import csv, hdf5, matlab, npz
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
 
@@ -102,9 +102,11 @@ def log_formats(names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         if name not in (*LOG_WRITERS, "all"):
             raise ConfigError(
-                f"there is no writer for '{name}'",
+                "io.no-writer",
                 quantity="--format",
-                remedy=nearest(name, [*LOG_WRITERS, "all"]),
+                name=name,
+                word=name,
+                known=[*LOG_WRITERS, "all"],
             )
     return tuple(LOG_WRITERS) if "all" in names else tuple(names)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.recording import RawLog
@@ -72,9 +72,7 @@ def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         raise
     except Exception as error:  # a damaged file can break the parser anywhere
         raise DataError(
-            f"it cannot be read as a MATLAB file: {error or type(error).__name__}",
-            file=path.name,
-            remedy="copy it again, or save it from MATLAB with -v7 or -v7.3",
+            "io.cannot-read-matlab-file", file=path.name, error=error or type(error).__name__
         ) from None
     named: dict[str, NDArray[Any]] = {}
     for name, value in content.items():

@@ -7,7 +7,7 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.arrays import refuse_lie
 
 __all__ = ["Member", "is_container", "members_of", "peek"]
@@ -82,9 +82,7 @@ class Member:
             raise
         except Exception as error:  # a damaged archive can break any of the decoders
             raise DataError(
-                f"it cannot be read: {error or type(error).__name__}",
-                file=self.label,
-                remedy="export the recording again, or copy it again",
+                "io.cannot-read-2", file=self.label, error=error or type(error).__name__
             ) from None
 
 
@@ -123,9 +121,7 @@ def members_of(path: Path) -> list[Member]:
             names = sorted({i.filename for i in archive.infolist() if not i.is_dir()})
     except Exception as error:  # zipfile raises more than BadZipFile on damaged archives
         raise DataError(
-            f"the archive cannot be read: {error or type(error).__name__}",
-            file=whole,
-            remedy="export the recording again, or copy it again",
+            "io.archive-cannot-read", file=whole, error=error or type(error).__name__
         ) from None
     return [
         Member(n, f"{whole}/{n}", path, True)

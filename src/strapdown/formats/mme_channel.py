@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.crash_text import LONGEST_NAME, clean
 from strapdown.formats.crash_units import factor_of, unit_of

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_text import LONGEST_NAME, clean
 from strapdown.formats.crash_units import unit_of
 from strapdown.formats.mme_codes import MmeCode, decode_mme
@@ -83,14 +83,11 @@ def clock_of(file: MmeFile, others: Mapping[str, tuple[str, MmeFile]]) -> str:
     code = named.split("/")[0].strip()
     if code.upper() not in others:
         raise DataError(
-            f"its stamps are those of channel '{code}', which the test does not have"
-            if code
-            else "its stamps are those of another channel, which is not named",
+            "io.stamps-those-channel-test-does" if code else "io.stamps-those-another-channel-not",
             file=file.path.name,
             row=file.header.line("reference channel name") or file.header.line("reference channel"),
             quantity="reference channel name",
-            remedy="add that channel from the laboratory, or state an even sampling: "
-            "`Reference channel :implicit` with `Time of first sample` and `Sampling interval`",
+            word=code,
         )
     return code
 
@@ -108,30 +105,32 @@ def stamps_of(
             unit = unit_of(text) if text else ("time", "s")
             if unit is None or unit[0] != "time":
                 raise DataError(
-                    f"it holds stamps, and its unit is '{text[:40]}'",
+                    "io.holds-stamps-unit",
                     file=held.path.name,
                     row=held.header.line("unit"),
                     quantity="unit",
-                    remedy="write s or ms",
+                    text=text[:40],
                 )
             stamps = read_samples(held.path, held.header, f"channel {clock}")
             if stamps.size != count:
                 raise DataError(
-                    f"it has {count} samples, and its stamps, in {held.path.name}, are "
-                    f"{stamps.size}",
+                    "io.samples-stamps",
                     file=file.path.name,
                     quantity="number of samples",
-                    remedy="get both files of the test again",
+                    count=count,
+                    name=held.path.name,
+                    size=stamps.size,
                 )
             bad = np.flatnonzero(~(np.diff(stamps) > 0.0))
             if bad.size or not np.isfinite(stamps[:1]).all():
                 k = int(bad[0]) + 1 if bad.size else 0
                 raise DataError(
-                    f"time goes from {stamps[k - 1]:.9g} to {stamps[k]:.9g}",
+                    "io.time-goes-2",
                     file=held.path.name,
                     row=held.header.end + k + 1,
                     quantity="time",
-                    remedy="correct the stamps, or get the file of the test again",
+                    stamps=stamps[k - 1],
+                    stamps_2=stamps[k],
                 )
             return stamps * TIME_UNITS[unit[1]]
 
@@ -141,13 +140,13 @@ def stamps_of(
         interval = header.number("sampling interval")
         if interval is None or not interval > 0.0:
             raise DataError(
-                "its sampling interval is not stated"
+                "io.sampling-interval-not-stated"
                 if interval is None
-                else f"a sampling interval of {interval:g} s is none",
+                else "io.sampling-interval-none",
                 file=file.path.name,
                 row=header.line("sampling interval"),
                 quantity="sampling interval",
-                remedy="write it in the header, in s; or state rate_hz = 10000",
+                interval=interval,
             )
         first = "0"
         if header.number("time of first sample") is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import csv
 from strapdown.formats.crash_text import clean
 
@@ -80,11 +80,7 @@ class MmeHeader:
         value = read_number(text.split()[0])
         if value is None or not np.isfinite(value):
             raise DataError(
-                f"'{text[:60]}' is no number",
-                file=self.file,
-                row=self.line(key),
-                quantity=key,
-                remedy="correct the header, or write NOVALUE",
+                "io.no-number", file=self.file, row=self.line(key), quantity=key, text=text[:60]
             )
         return value
 
@@ -98,22 +94,14 @@ def text_of(path: Path, longest: int = LARGEST) -> str:
         It is no text, or far too large.
     """
     if path.stat().st_size > LARGEST:
-        raise DataError(
-            f"it has {path.stat().st_size} bytes, more than a channel has",
-            file=path.name,
-            remedy="check that it is a channel of the test",
-        )
+        raise DataError("io.bytes-more-than-channel", file=path.name, st_size=path.stat().st_size)
     with path.open("rb") as stream:
         data = stream.read(longest)
     if len(data) == longest:
         data = data[: data.rfind(b"\n") + 1]
     text = csv.decoded(data, path.name)[0]
     if "\0" in text:
-        raise DataError(
-            "no text: it holds zero bytes",
-            file=path.name,
-            remedy="get the file of the test again",
-        )
+        raise DataError("io.no-text-holds-zero-bytes-3", file=path.name)
     return text
 
 
@@ -147,20 +135,16 @@ def read_header(path: Path) -> MmeHeader:
         match = _KEY.fullmatch(text)
         if match is None:
             raise DataError(
-                f"'{clean(text, 60)}' is neither `key :value` nor a number",
-                file=path.name,
-                row=row,
-                remedy="correct that line, or get the file of the test again",
+                "io.neither-key-value-nor-number", file=path.name, row=row, clean=clean(text, 60)
             )
         key = " ".join(match[1].lower().split())
         values.setdefault(key, (match[2].strip(), row))
         more.setdefault(key, []).append(match[2].strip())
     if not values:
         raise DataError(
-            "it has no header" if end == 0 and path.stat().st_size else "the file is empty",
+            "io.no-header" if end == 0 and path.stat().st_size else "io.file-empty-3",
             file=path.name,
             row=1,
-            remedy="get the file of the test again",
         )
     return MmeHeader(path.name, values, more, end)
 
@@ -204,19 +188,16 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
     if promised is not None and promised != len(lines):
         cut = len(lines) < promised
         raise DataError(
-            f"it has {len(lines)} samples, and its header says {promised:.15g}",
+            "io.samples-header-says" if cut else "io.samples-header-says-2",
             file=path.name,
             row=header.end + (len(lines) if cut else int(promised) + 1),
             quantity=quantity,
-            remedy="the file is cut: get it again" if cut else "get the file of the test again",
+            count=len(lines),
+            promised=promised,
         )
     if not lines:
         raise DataError(
-            "a header, and no samples under it",
-            file=path.name,
-            row=header.end,
-            quantity=quantity,
-            remedy="the file is cut: get it again",
+            "io.header-no-samples-under", file=path.name, row=header.end, quantity=quantity
         )
     if not _UNUSUAL.search("\n".join(lines)):
         # Most files have points alone and nothing missing.
@@ -230,11 +211,11 @@ def read_samples(path: Path, header: MmeHeader, quantity: str) -> Array:
         value = float("nan") if text.lower() in _MISSING else read_number(text)
         if value is None:
             raise DataError(
-                f"'{clean(text, 60)}' is no number",
+                "io.no-number-2",
                 file=path.name,
                 row=header.end + k + 1,
                 quantity=quantity,
-                remedy="correct that row, or write NOVALUE for a sample that is missing",
+                clean=clean(text, 60),
             )
         out[k] = value
     return out

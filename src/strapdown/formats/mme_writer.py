@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_text import clean
 from strapdown.formats.mme_channel import (
@@ -91,10 +91,11 @@ def write_mme(
     channels = [c for c in record.channels if c.quantity != "time"]
     if not channels or len(channels) > MOST_CHANNELS:
         raise DataError(
-            f"it has {len(channels)} channels, and ISO MME holds 1 to {MOST_CHANNELS}",
+            "io.channels-iso-mme-holds",
             file=record.path.name,
             quantity="channels",
-            remedy="write a part of them",
+            count=len(channels),
+            most_channels=MOST_CHANNELS,
         )
     stem = _FILE_NAME.sub("_", name if name is not None else record.path.stem).strip("_")
     stem = stem[:LONGEST_FILE_NAME] or _SHORTEST
@@ -162,11 +163,11 @@ def _check(channel: CrashChannel, time: Array, values: Array) -> None:
     bad = np.flatnonzero(np.isinf(values) | ~np.isfinite(time))
     if bad.size or not values.size:
         raise DataError(
-            f"not a finite number ({values[bad[0]]})" if bad.size else "it has no samples",
+            "io.not-finite-number" if bad.size else "io.no-samples-2",
             file=channel.file or None,
             row=channel.row(int(bad[0])) if bad.size else None,
             quantity=f"channel {channel.name}",
-            remedy="correct that row, or leave the channel out",
+            values=values[bad[0]],
         )
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import hdf5, matlab
 from strapdown.formats.recording import RawLog
 
@@ -85,9 +85,10 @@ def _accel_columns(
         )
         findings.append(
             Finding(
-                "interpolated to the stamps of the gyro, which are not its own",
+                "io.interpolated-stamps-gyro-not-own-2",
                 file=ACCEL_FILE,
                 quantity="accel",
+                severity="note",
             )
         )
     return {f"accel[{k}]": accel[:, k + 1] for k in range(3)}
@@ -97,9 +98,10 @@ def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
     arrays = (hdf5.read_arrays(path) if hdf5.detect(path) else matlab.read_arrays(path))[0]
     if name not in arrays or 4 not in arrays[name].shape or arrays[name].ndim != 2:
         raise DataError(
-            f"no {name} of four rows in it; it holds: {', '.join(arrays) or 'nothing'}",
+            "io.no-four-rows-holds",
             file=path.name,
-            remedy="name its columns with --columns and give the file instead of the folder",
+            name=name,
+            arrays=", ".join(arrays) or "nothing",
         )
     buffer = arrays[name]
     rows = buffer.T if buffer.shape[0] == 4 else buffer
@@ -108,10 +110,12 @@ def _buffer(path: Path, name: str, findings: list[Finding]) -> NDArray[Any]:
     if end < len(rows):
         findings.append(
             Finding(
-                f"the last {len(rows) - end} of {len(rows)} rows are all zero, the tail of a "
-                "buffer that was not filled; left out",
+                "io.last-rows-all-zero-tail",
                 file=path.name,
                 row=end + 1,
+                severity="note",
+                count=len(rows) - end,
+                count_2=len(rows),
             )
         )
     return np.asarray(rows[:end], dtype=np.float64)

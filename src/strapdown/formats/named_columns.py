@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, nearest
+from strapdown.errors import DataError
 from strapdown.formats import read_raw
 from strapdown.formats.recording import RawLog
 from strapdown.tables import NED, POSITION_SD
@@ -67,10 +67,7 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
     if has_sd and len(has_sd) < len(POSITION_SD):
         missing = next(name for name in POSITION_SD if name not in found)
         raise DataError(
-            "it is missing, while another standard deviation is there",
-            file=raw.name,
-            quantity=missing,
-            remedy="give the standard deviations of all three components, or of none",
+            "io.missing-while-another-standard-deviation", file=raw.name, quantity=missing
         )
     time = found.pop("time")
     _check_advances(raw, time)
@@ -112,19 +109,24 @@ def columns_of(raw: RawLog, units: Mapping[str, str], wanted: Sequence[str]) -> 
             if of != units[name]:
                 known = ", ".join(u for u in UNITS if UNITS[u][0] == units[name])
                 raise DataError(
-                    f"its unit is '{unit}', and {units[name] or 'none'} is needed",
+                    "io.unit-needed",
                     file=raw.name,
                     quantity=head,
-                    remedy=f"use one of {known}",
+                    unit=unit,
+                    units=units[name] or "none",
+                    known=known,
                 )
         found[name] = _numbers(raw, head, values) * factor
     for name in wanted:
         if name not in found:
             raise DataError(
-                f"there is no column '{name}'",
+                "io.no-column-2",
                 file=raw.name,
                 quantity="columns",
-                remedy=f"it needs {', '.join(wanted)}; {nearest(name, raw.columns)}",
+                name=name,
+                wanted=wanted,
+                word=name,
+                known=raw.columns,
             )
     return found
 
@@ -144,16 +146,16 @@ def _name_and_unit(head: str, names: Mapping[str, str]) -> tuple[str | None, str
 
 def _numbers(raw: RawLog, name: str, values: NDArray[np.generic]) -> Array:
     if values.dtype.kind not in "iuf":
-        raise DataError("it holds text", file=raw.name, quantity=name, remedy="give numbers alone")
+        raise DataError("io.holds-text", file=raw.name, quantity=name)
     numbers = values.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(numbers))
     if bad.size:
         raise DataError(
-            f"{numbers[bad[0]]} is no number",
+            "io.no-number-3",
             file=raw.name,
             row=raw.row(int(bad[0])),
             quantity=name,
-            remedy="give a finite number in every row, or take the row out",
+            numbers=numbers[bad[0]],
         )
     return numbers
 
@@ -163,9 +165,10 @@ def _check_advances(raw: RawLog, time: Array) -> None:
     if back.size:
         k = int(back[0]) + 1
         raise DataError(
-            f"time goes from {time[k - 1]:.6g} s to {time[k]:.6g} s",
+            "io.time-goes-3",
             file=raw.name,
             row=raw.row(k),
             quantity="time",
-            remedy="sort the rows by time, each instant once",
+            time=time[k - 1],
+            time_2=time[k],
         )

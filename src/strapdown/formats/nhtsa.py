@@ -11,7 +11,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.nhtsa_channel import KMH, Channel
 from strapdown.formats.nhtsa_header import only, row_error, sections, to_number, to_whole
 
@@ -104,12 +104,12 @@ class CrashTest:
                 return channel
         numbers = [c.number for c in self.channels]
         raise DataError(
-            f"there is no channel {number}",
+            "io.no-channel-3" if numbers else "io.no-channel-4",
             file=self.path.name,
             quantity="channel",
-            remedy=f"its channels are {min(numbers)} to {max(numbers)}"
-            if numbers
-            else "it has none",
+            number=number,
+            numbers=min(numbers),
+            numbers_2=max(numbers),
         )
 
 
@@ -141,11 +141,12 @@ def read_nhtsa(path: str | Path) -> CrashTest:
     listed = rows["INSTRUMENTATION"]
     if promised != len(listed):
         raise DataError(
-            f"it promises {promised} curves and lists {len(listed)}",
+            "io.promises-curves-lists",
             file=file.name,
             row=line,
             quantity="count of curves",
-            remedy="the header is cut or was edited: get it from the database again",
+            promised=promised,
+            count=len(listed),
         )
     present = {p.name.lower(): p for p in file.parent.iterdir()}
     channels = tuple(_channel(fields, file, at, present) for fields, at in listed)
@@ -183,11 +184,10 @@ def header_of(path: Path) -> Path:
     if len(headers) != 1:
         held = ", ".join(p.name for p in headers[:6])
         raise DataError(
-            f"the folder holds {len(headers)} headers: {held}"
-            if headers
-            else "the folder holds no .EV5 header",
+            "io.folder-holds-headers" if headers else "io.folder-holds-no-ev-header",
             file=path.resolve().name,
-            remedy="give the .EV5 file of one test",
+            count=len(headers),
+            held=held,
         )
     return headers[0]
 
@@ -210,11 +210,13 @@ def _channel(fields: list[str], file: Path, line: int, present: dict[str, Path])
     )
     if last < first or not interval > 0.0:
         raise DataError(
-            f"samples {first} to {last}, every {interval:g} µs, are no record",
+            "io.samples-every-no-record",
             file=file.name,
             row=line,
             quantity=f"channel {curve}",
-            remedy="get the header from the database again",
+            first=first,
+            last=last,
+            interval=interval,
         )
     return Channel(
         vehicle=whole(0, "vehicle"),
@@ -270,11 +272,11 @@ def _refuse_twins(channels: tuple[Channel, ...], file: Path, lines: list[int]) -
     for channel, line in zip(channels, lines, strict=True):
         if channel.number in seen:
             raise DataError(
-                f"channel {channel.number} is listed twice",
+                "io.channel-listed-twice",
                 file=file.name,
                 row=line,
                 quantity="channel",
-                remedy="get the header from the database again",
+                number=channel.number,
             )
         seen.add(channel.number)
 
@@ -285,19 +287,21 @@ def _findings(channels: tuple[Channel, ...], file: Path) -> list[Finding]:
     if absent:
         findings.append(
             Finding(
-                f"{len(absent)} of {len(channels)} listed channels are not in the folder: "
-                f"{_ranges(absent)}",
+                "io.listed-channels-not-folder-2",
                 file=file.name,
                 quantity="channels",
-                remedy="nothing, if they are not needed; else get them from the database",
+                count=len(absent),
+                count_2=len(channels),
+                ranges=_ranges(absent),
             )
         )
     findings += [
         Finding(
-            f"the laboratory gives its status as {c.status}: {c.comment}",
+            "io.laboratory-gives-status-2",
             file=file.name,
             quantity=f"channel {c.number}",
-            remedy="do not use it without looking at it",
+            status=c.status,
+            comment=c.comment,
         )
         for c in channels
         if c.present and c.status != "AM"

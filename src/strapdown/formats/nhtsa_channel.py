@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
-from strapdown.exceptions import DataError, nearest
+from strapdown.errors import DataError
 
 KMH = 1.0 / 3.6
 #: Units as the database writes them: what they are in SI, and the factor. Only units whose
@@ -167,16 +167,18 @@ class Channel:
         """
         if self.path is None:
             raise DataError(
-                f"{self.name} is listed in the header, and its file is not in the folder",
+                "io.listed-header-file-not-folder",
                 quantity=f"channel {self.number}",
-                remedy="add the file from the database, or use a channel with `present`",
+                name=self.name,
             )
         if self.time_unit not in TIMES:
             raise DataError(
-                f"the time unit '{self.time_unit}' is not known",
+                "io.time-unit-not-known",
                 file=self.path.name,
                 quantity="time",
-                remedy=nearest(self.time_unit, TIMES),
+                time_unit=self.time_unit,
+                word=self.time_unit,
+                known=TIMES,
             )
         pairs = _read_pairs(self)
         time = pairs[:, 0] * TIMES[self.time_unit]
@@ -186,11 +188,13 @@ class Channel:
     def _si(self) -> tuple[str, float]:
         if self.unit.upper() not in UNITS:
             raise DataError(
-                f"the unit '{self.unit}' of {self.name} is not known",
+                "io.unit-not-known",
                 file=self.path.name if self.path else None,
                 quantity=f"channel {self.number}",
-                remedy=f"{nearest(self.unit.upper(), UNITS)} Convert the file, and write its "
-                "unit in the header",
+                unit=self.unit,
+                name=self.name,
+                word=self.unit.upper(),
+                known=UNITS,
             )
         return UNITS[self.unit.upper()]
 
@@ -200,18 +204,14 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
     assert path is not None
     size = path.stat().st_size
     if size == 0:
-        raise DataError(
-            "the file is empty",
-            file=path.name,
-            quantity=f"channel {channel.number}",
-            remedy="get it from the database again",
-        )
+        raise DataError("io.file-empty-4", file=path.name, quantity=f"channel {channel.number}")
     if size > LONGEST_ROW * (channel.samples + 1):
         raise DataError(
-            f"it has {size} bytes, too many for the {channel.samples} samples of the header",
+            "io.bytes-too-many-samples-header",
             file=path.name,
             quantity=f"channel {channel.number}",
-            remedy="header and channel are not of one test; get both again",
+            size=size,
+            samples=channel.samples,
         )
     lines = path.read_bytes().decode("ascii", "replace").splitlines()
     out = np.empty((len(lines), 2))
@@ -221,30 +221,32 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
             time, value = (float(text) for text in fields)
         except ValueError:
             raise DataError(
-                f"'{line[:60]}' is not a time and a value",
+                "io.not-time-value",
                 file=path.name,
                 row=k + 1,
                 quantity=f"channel {channel.number}",
-                remedy="correct that row, or get the file from the database again",
+                at_line=line[:60],
             ) from None
         if not (math.isfinite(time) and math.isfinite(value)):
             raise DataError(
-                f"not a finite number ('{line.strip()[:60]}')",
+                "io.not-finite-number-3",
                 file=path.name,
                 row=k + 1,
                 quantity="time" if not math.isfinite(time) else f"channel {channel.number}",
-                remedy="correct that row, or get the file from the database again",
+                strip=line.strip()[:60],
             )
         out[k] = time, value
     if len(lines) != channel.samples:
         cut = len(lines) < channel.samples
         raise DataError(
-            f"it has {len(lines)} samples, and its header row says {channel.samples} "
-            f"({channel.first} to {channel.last})",
+            "io.samples-header-row-says" if cut else "io.samples-header-row-says-2",
             file=path.name,
             row=len(lines) if cut else channel.samples + 1,
             quantity=f"channel {channel.number}",
-            remedy="the file is cut: get it again" if cut else "get file and header again",
+            count=len(lines),
+            samples=channel.samples,
+            first=channel.first,
+            last=channel.last,
         )
     return out
 
@@ -256,21 +258,24 @@ def _check_time(channel: Channel, time: np.ndarray[tuple[int], np.dtype[np.float
     if back.size:
         k = int(back[0]) + 1
         raise DataError(
-            f"time goes from {time[k - 1]:.6f} to {time[k]:.6f} s",
+            "io.time-goes-4",
             file=channel.path.name,
             row=k + 1,
             quantity="time",
-            remedy="sort or correct the rows, or get the file from the database again",
+            time=time[k - 1],
+            time_2=time[k],
         )
     expected = channel.interval * (channel.first + np.arange(time.size))
     off = np.flatnonzero(np.abs(time - expected) > STAMP_ROUNDING)
     if off.size:
         k = int(off[0])
         raise DataError(
-            f"the stamp is {time[k]:.6f} s, and by the header (sample {channel.first + k}, every "
-            f"{channel.interval * 1e6:g} µs) it is {expected[k]:.6f} s",
+            "io.stamp-header-sample-every",
             file=channel.path.name,
             row=k + 1,
             quantity="time",
-            remedy="header and channel are not of one test, or rows are missing; get both again",
+            time=time[k],
+            first=channel.first + k,
+            interval=channel.interval * 1000000.0,
+            expected=expected[k],
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from strapdown.exceptions import DataError, nearest
+from strapdown.errors import DataError
 
 SECTIONS = ("EV5", "TEST", "VEHICLE", "BARRIER", "OCCUPANT", "RESTRAINT", "INSTRUMENTATION", "END")
 # Headers are text of some hundred bytes a channel, of which no test has a hundred thousand.
@@ -21,13 +21,11 @@ def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
         The file is missing, empty, far too large, cut, or in another form.
     """
     if not file.is_file():
-        raise DataError("there is no such file", file=str(file), remedy="check the path")
+        raise DataError("io.no-such-file", file=str(file))
     size = file.stat().st_size
     if size == 0 or size > LARGEST_HEADER:
         raise DataError(
-            "the file is empty" if not size else f"{size} bytes are no EV5 header",
-            file=file.name,
-            remedy="give the .EV5 file of the test, or get it from the database again",
+            "io.file-empty-5" if not size else "io.bytes-no-ev-header", file=file.name, size=size
         )
     rows: dict[str, list[tuple[list[str], int]]] = {name: [] for name in SECTIONS}
     section = ""
@@ -40,30 +38,22 @@ def sections(file: Path) -> dict[str, list[tuple[list[str], int]]]:
             section = text.strip("- ").upper()
             if section not in rows:
                 raise DataError(
-                    f"there is no section '{section}' in EV5",
+                    "io.no-section-ev",
                     file=file.name,
                     row=k,
                     quantity="section",
-                    remedy=nearest(section, SECTIONS),
+                    section=section,
+                    word=section,
+                    known=SECTIONS,
                 )
             seen.add(section)
         elif section in ("", "EV5", "END"):
-            raise DataError(
-                f"'{text[:40]}' stands in no section",
-                file=file.name,
-                row=k,
-                remedy="give the .EV5 file of a test of the NHTSA vehicle database",
-            )
+            raise DataError("io.stands-no-section", file=file.name, row=k, text=text[:40])
         else:
             rows[section].append(([f.strip() for f in line.split("|")], k))
     missing = [name for name in ("EV5", "TEST", "INSTRUMENTATION", "END") if name not in seen]
     if missing:
-        raise DataError(
-            f"no section {', '.join(missing)}",
-            file=file.name,
-            quantity="section",
-            remedy="the file is cut, or no EV5 header: get it from the database again",
-        )
+        raise DataError("io.no-section", file=file.name, quantity="section", missing=missing)
     return rows
 
 
@@ -73,10 +63,11 @@ def only(
     """Return the row of a section that has one, with its line; refuse another count."""
     if len(rows[section]) != 1:
         raise DataError(
-            f"{len(rows[section])} rows in section {section}, and one is needed",
+            "io.rows-section-needed",
             file=file.name,
             quantity=section,
-            remedy="get the header from the database again",
+            count=len(rows[section]),
+            section=section,
         )
     return rows[section][0]
 
@@ -104,21 +95,17 @@ def to_whole(text: str, file: Path, line: int, what: str) -> int:
 
 def bad_number(text: str, file: Path, line: int, what: str) -> DataError:
     """What is said of a field that should be a number."""
-    return DataError(
-        f"'{text}' is no number",
-        file=file.name,
-        row=line,
-        quantity=what,
-        remedy="correct the header, or get it from the database again",
-    )
+    return DataError("io.no-number-4", file=file.name, row=line, quantity=what, text=text)
 
 
 def row_error(file: Path, line: int, section: str, found: int, needed: int) -> DataError:
     """What is said of a row with too few or too many fields."""
     return DataError(
-        f"{found} fields between its bars, and a row of {section} has {needed}",
+        "io.fields-between-bars-row",
         file=file.name,
         row=line,
         quantity=section,
-        remedy="the header is cut or was edited: get it from the database again",
+        found=found,
+        section=section,
+        needed=needed,
     )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import DataError, nearest
+from strapdown.errors import DataError
 from strapdown.formats.nhtsa import CrashTest
 from strapdown.formats.nhtsa_channel import Channel
 from strapdown.tables import imu_table
@@ -58,11 +58,14 @@ def accelerations(
     if not found:
         places = dict.fromkeys(c.location for c in test.channels if c.kind == "AC" and c.present)
         raise DataError(
-            f"no accelerometer with samples at {location or 'any place'}, axis {axis or 'any'}, "
-            f"occupant {occupant or 'any'}",
+            "io.no-accelerometer-samples-axis-occupant",
             file=test.path.name,
             quantity="location",
-            remedy=nearest((location or "").upper(), places),
+            location=location or "any place",
+            axis=axis or "any",
+            occupant=occupant or "any",
+            word=(location or "").upper(),
+            known=places,
         )
     return found
 
@@ -106,29 +109,32 @@ def imu_of(
             channel = test.channel(number)
             if channel.si_unit != unit:
                 raise DataError(
-                    f"{channel.name} is in {channel.unit}, and {unit} is needed",
+                    "io.needed-2",
                     file=test.path.name,
                     quantity=f"channel {number}",
-                    remedy="give accelerometers as accel and angular rates as gyro",
+                    name=channel.name,
+                    unit=channel.unit,
+                    unit_2=unit,
                 )
             values.append(channel.table["value"])
     time = values[0].index.to_numpy(dtype=np.float64)
     for series, number in zip(values, (*gyro, *accel), strict=True):
         if not np.array_equal(series.index.to_numpy(), time):
             raise DataError(
-                f"its stamps are not those of channel {gyro[0]}",
+                "io.stamps-not-those-channel",
                 file=test.path.name,
                 quantity=f"channel {number}",
-                remedy="resample the channels onto one clock first",
+                gyro=gyro[0],
             )
     table = np.column_stack([s.to_numpy(dtype=np.float64) for s in values])
     before = time < until
     if before.sum() < 2:
         raise DataError(
-            f"{int(before.sum())} samples before {until:g} s",
+            "io.samples-before",
             file=test.path.name,
             quantity="time",
-            remedy="give `until` later than the beginning of the record",
+            before=int(before.sum()),
+            until=until,
         )
     table -= table[before].mean(axis=0)
     table[:, 3:] += np.asarray(rest_force, dtype=np.float64)

@@ -8,7 +8,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 
 def load(path: Path, label: str) -> NDArray[Any]:
@@ -36,9 +36,7 @@ def load(path: Path, label: str) -> NDArray[Any]:
         raise
     except Exception as error:  # a damaged header can break the parser that NumPy uses for it
         raise DataError(
-            f"the array cannot be read: {error or type(error).__name__}",
-            file=label,
-            remedy="copy it again; it must come from numpy.save, with numbers alone",
+            "io.array-cannot-read", file=label, error=error or type(error).__name__
         ) from None
 
 
@@ -73,22 +71,19 @@ def read_array(stream: BinaryIO | Any, size: int, name: str | None, file: str) -
     )
     shape, fortran, dtype = header(stream)
     if dtype.hasobject:
-        raise DataError(
-            "it holds Python objects, which are not loaded: they could run code",
-            file=file,
-            quantity=name,
-            remedy="save numbers alone",
-        )
+        raise DataError("io.holds-python-objects-not-loaded", file=file, quantity=name)
     count = int(np.prod([int(n) for n in shape], dtype=object))
     stored = size - stream.tell()
     if count * dtype.itemsize != stored:
         raise DataError(
-            f"it claims {count} values of {dtype.itemsize} bytes, and {stored} bytes are stored",
+            "io.claims-values-bytes-bytes-stored"
+            if name
+            else "io.claims-values-bytes-bytes-stored-2",
             file=file,
             quantity=name,
-            remedy="the archive is damaged or made to mislead; get it again from its source"
-            if name
-            else "the file is cut or damaged; copy it again",
+            count=count,
+            itemsize=dtype.itemsize,
+            stored=stored,
         )
     data = np.frombuffer(stream.read(), dtype=dtype)
     return data.reshape(shape, order="F" if fortran else "C")

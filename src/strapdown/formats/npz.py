@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.npy import read_array
 from strapdown.formats.recording import RawLog
@@ -64,9 +64,7 @@ def arrays_of(path: Path) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # a damaged archive can break any of the decoders it goes through
         raise DataError(
-            f"the archive cannot be read: {error or type(error).__name__}",
-            file=path.name,
-            remedy="copy it again; it must come from numpy.savez, with numbers alone",
+            "io.archive-cannot-read-2", file=path.name, error=error or type(error).__name__
         ) from None
     return found
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
 
@@ -42,11 +42,12 @@ def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
     bad = np.flatnonzero(np.isnan(found) & texts.notna().to_numpy())
     if bad.size:
         raise DataError(
-            f"'{values[bad[0]]}' is not a number (column '{column.source}')",
+            "io.not-number-column",
             file=raw.name,
             row=raw.row(int(bad[0])),
             quantity=quantity,
-            remedy="correct or delete that row, or choose another column with --columns",
+            values=values[bad[0]],
+            source=column.source,
         )
     return found
 
@@ -69,12 +70,12 @@ def ticks_of(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
     bad = np.flatnonzero(dates.isna().to_numpy())
     if bad.size:
         raise DataError(
-            f"'{values[bad[0]]}' is not a date and time like those before it (column "
-            f"'{column.source}')",
+            "io.not-date-time-like-those",
             file=raw.name,
             row=raw.row(int(bad[0])),
             quantity="time",
-            remedy="correct or delete that row",
+            values=values[bad[0]],
+            source=column.source,
         )
     stamps = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
     return stamps.astype(np.int64), True

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.recording import RawLog
 
@@ -66,9 +66,9 @@ def read(path: Path) -> RawLog:
         raise
     except Exception as error:  # a damaged file can break any of the decoders it goes through
         raise DataError(
-            f"the table cannot be read: {str(error).splitlines()[0] if str(error) else 'damaged'}",
+            "io.table-cannot-read",
             file=path.name,
-            remedy="the file is cut or damaged; copy it again",
+            splitlines=str(error).splitlines()[0] if str(error) else "damaged",
         ) from None
     return raw_log(path, {n: a for n, a in arrays.items() if a is not None}, units, meta)
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.find_columns import Column
 from strapdown.formats.join import Clock, at_stamps, in_seconds
 from strapdown.formats.numbers import numbers
@@ -99,20 +99,10 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
         use = np.isfinite(own) & np.isfinite(values[1]).all(axis=1)
         order = np.flatnonzero(use)[np.argsort(own[use], kind="stable")]
         if not order.size:
-            raise DataError(
-                "it holds no number",
-                file=gravity.name,
-                quantity="accel",
-                remedy="give the gyro's file alone",
-            )
+            raise DataError("io.holds-no-number", file=gravity.name, quantity="accel")
         at, inside, distance = at_stamps(time, own[order], values[1][order])
     if not inside.any():
-        raise DataError(
-            f"it and {linear.name} have no time in common",
-            file=gravity.name,
-            quantity="time",
-            remedy="export both sensors of one recording, or give the gyro's file alone",
-        )
+        raise DataError("io.no-time-common", file=gravity.name, quantity="time", name=linear.name)
     what = f"specific force is the sum of {linear.name} and {gravity.name}"
     if distance > 0:
         what += f", interpolated to the stamps of the first over at most {distance:.3g} s"
@@ -131,6 +121,8 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
         findings=[
             *linear.findings,
             *gravity.findings,
-            Finding(what, file=linear.name, quantity="accel"),
+            Finding(
+                "io.message-2", file=linear.name, quantity="accel", severity="note", message=what
+            ),
         ],
     )

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.join import join
 from strapdown.formats.members import Member, file_member, first_line, members_of, peek
@@ -102,12 +102,7 @@ def _mention_linear(logs: list[RawLog]) -> list[RawLog]:
     for log in logs:
         if not any(q in wanted for q, _ in log.stated.values()):
             log.findings.append(
-                Finding(
-                    "left out: it is acceleration without gravity",
-                    file=log.name,
-                    quantity="accel",
-                    remedy="record 'Acceleration (with g)' for levelling",
-                )
+                Finding("io.left-out-acceleration-without-gravity", file=log.name, quantity="accel")
             )
     return logs
 
@@ -120,19 +115,18 @@ def _pauses(member: Member) -> list[Finding]:
         clock = np.asarray(table["experiment time"], dtype=np.float64)
         wall = np.asarray(table["system time"], dtype=np.float64)
     except (DataError, KeyError, ValueError, TypeError):
-        return [Finding("left out: it has no starts and pauses", file=member.label)]
+        return [Finding("io.left-out-no-starts-pauses", file=member.label, severity="note")]
     out = []
     for k in range(1, len(events)):
         if events[k - 1] == "PAUSE" and events[k] == "START":
             out.append(
                 Finding(
-                    f"the recording stood still for {wall[k] - wall[k - 1]:.3g} s at "
-                    f"{clock[k]:.6g} s of its own clock, which does not count that: what was "
-                    "turned then is not in it",
+                    "io.recording-stood-still-own-clock",
                     file=member.label,
                     row=k + 2,
                     quantity="time",
-                    remedy="split the log there, or put a reference point on each side",
+                    wall=wall[k] - wall[k - 1],
+                    clock=clock[k],
                 )
             )
     return out

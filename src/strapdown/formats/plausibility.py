@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.tables import find_gaps
 
 Array = NDArray[np.float64]
@@ -44,7 +44,9 @@ def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) ->
     remedy = None
     if worst.length >= LONG_GAP:
         remedy = "split the log there, or put a reference point on each side of it"
-    findings.append(Finding(what, file=name, quantity="time", remedy=remedy))
+    findings.append(
+        Finding("io.message", file=name, quantity="time", message=what, remedy_text=remedy)
+    )
 
 
 def report_absurd(
@@ -62,32 +64,33 @@ def report_absurd(
     if largest[k] > IMPOSSIBLE_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
         raise DataError(
-            f"{gyro[at, k]:.4g} rad/s is beyond anything that turns",
+            "io.rad-beyond-anything-turns",
             file=name,
             row=row(at),
             quantity=f"gyro_{AXES[k]}",
-            remedy="correct or delete that row, or state another unit with --gyro-unit",
+            gyro=gyro[at, k],
         )
     lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
     if LASTING_RATE < lasting <= largest[k] <= ABSURD_RATE:
         findings.append(
             Finding(
-                f"a twentieth of the samples are beyond {lasting:.3g} rad/s, "
-                f"{lasting / (2 * np.pi):.2g} turns a second",
+                "io.twentieth-samples-beyond-rad-turns",
                 file=name,
                 quantity="gyro",
-                remedy="if the sensor was not spun like that, the unit is another: --gyro-unit",
+                lasting=lasting,
+                lasting_2=lasting / (2 * np.pi),
             )
         )
     if largest[k] > ABSURD_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
         findings.append(
             Finding(
-                f"{gyro[at, k]:.4g} rad/s is {largest[k] / (2 * np.pi):.3g} turns a second",
+                "io.rad-turns-second",
                 file=name,
                 row=row(at),
                 quantity=f"gyro_{AXES[k]}",
-                remedy="if the sensor was not spun like that, the unit is another: --gyro-unit",
+                gyro=gyro[at, k],
+                largest=largest[k] / (2 * np.pi),
             )
         )
     for k in range(3):
@@ -101,11 +104,11 @@ def report_absurd(
         if run.any():
             findings.append(
                 Finding(
-                    f"{int(full.sum())} samples stand at {reading:.6g} deg/s, a full scale: the "
-                    "rate was cut off there, and what it was beyond is not known",
+                    "io.samples-stand-full-scale-rate",
                     file=name,
                     row=row(int(run.argmax())),
                     quantity=f"gyro_{AXES[k]}",
-                    remedy="use a larger range of the gyro; do not trust the attitude from there",
+                    full=int(full.sum()),
+                    reading=reading,
                 )
             )

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.recording import RawLog, StatedStart
 
@@ -102,11 +102,16 @@ def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> Raw
     roll, pitch, heading = start.roll_pitch_heading_deg
     findings.append(
         Finding(
-            f"the header states roll {roll:.3f}°, pitch {pitch:.3f}° and heading {heading:.3f}° "
-            f"at the start, at {start.lat_deg:.6f}°, {start.lon_deg:.6f}°, {start.alt:g} m, and "
-            "calls that perhaps inaccurate; kept as what the file says, used by no computation",
+            "io.header-states-roll-pitch-heading",
             file=path.name,
             quantity="start",
+            severity="note",
+            roll=roll,
+            pitch=pitch,
+            heading=heading,
+            lat_deg=start.lat_deg,
+            lon_deg=start.lon_deg,
+            alt=start.alt,
         )
     )
     return _log(path, stamps, np.asarray(counts * factors), rows, AXES, findings, start)
@@ -116,11 +121,7 @@ def _header(file: str, lines: Lines, which: int) -> list[float]:
     """Six numbers of one line of the header."""
     what, holds = _HEADER[which]
     if len(lines) <= which:
-        raise DataError(
-            f"the file ends before line {which + 1} of its header ({what})",
-            file=file,
-            remedy="copy the file again: a SIMU log has three lines of header",
-        )
+        raise DataError("io.file-ends-before-line-header", file=file, which=which + 1, what=what)
     row, line = lines[which]
     fields = line.split()
     if len(fields) != 6:
@@ -142,7 +143,12 @@ def _number(text: str) -> float:
 
 def _refuse(file: str, row: int, quantity: str, what: str, holds: str) -> None:
     raise DataError(
-        what, file=file, row=row, quantity=quantity, remedy=f"that line holds: {holds}; {_COPY}"
+        "io.message",
+        file=file,
+        row=row,
+        quantity=quantity,
+        message=what,
+        remedy_text=f"that line holds: {holds}; {_COPY}",
     )
 
 
@@ -171,13 +177,12 @@ def _counts(
     if bad.size:
         i, j = (int(k) for k in bad[0])
         raise DataError(
-            f"{block[i, j]:g} is no whole number, and a SIMU log holds counts of its scale "
-            f"factors ({len(np.unique(bad[:, 0]))} such rows in all)",
+            "io.no-whole-number-simu-log",
             file=file,
             row=int(rows[i]),
             quantity=(GYROS + ACCELS)[j],
-            remedy="correct that row; increments in rad and m/s belong in a file without the "
-            "comments and the header of a SIMU log",
+            block=block[i, j],
+            count=len(np.unique(bad[:, 0])),
         )
     return block, rows
 
@@ -205,12 +210,11 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
     up = float(np.median(block[:, 5])) / usual > 0.5 * force
     findings.append(
         Finding(
-            "seven columns without a header, the last a clock of "
-            f"{1.0 / usual:.4g} Hz, and {force:.4g} m/s² of force: taken for a matrix of "
-            "PSINS, increments in rad and m/s"
-            + (", axes right, forward, up" if up else "; gravity is not on its third axis"),
+            "io.message",
             file=path.name,
-            remedy="if not, state units and axes (--gyro-unit, --accel-unit, --axes)",
+            message=f"seven columns without a header, the last a clock of {1.0 / usual:.4g} Hz, and {force:.4g} m/s² of force: taken for a matrix of PSINS, increments in rad and m/s"
+            + (", axes right, forward, up" if up else "; gravity is not on its third axis"),
+            remedy_text="if not, state units and axes (--gyro-unit, --accel-unit, --axes)",
         )
     )
     return _log(path, time, block[:, :6], rows, AXES if up else None, findings, None)
@@ -224,38 +228,20 @@ def _block(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Numbers of all rows; a last row that may have lost digits is left out."""
     if lines and (not ended or len(lines[-1][1].split()) < width):
-        findings.append(
-            Finding(
-                "the last line does not end as the others do, and may be cut; it was left out",
-                file=file,
-                row=lines[-1][0],
-                remedy="if more is missing, copy the file again",
-            )
-        )
+        findings.append(Finding("io.last-line-does-not-end", file=file, row=lines[-1][0]))
         lines = lines[:-1]
     if not lines:
-        raise DataError(
-            "a header, and no samples under it",
-            file=file,
-            remedy="check that the recording was saved and copied whole",
-        )
+        raise DataError("io.header-no-samples-under-2", file=file)
     for row, line in lines:
         if (count := len(line.split())) != width:
-            raise DataError(
-                f"{count} numbers, where every sample has {width}",
-                file=file,
-                row=row,
-                remedy="correct or delete that row",
-            )
+            raise DataError("io.numbers-every-sample", file=file, row=row, count=count, width=width)
     try:
         flat = np.array(" ".join(line for _, line in lines).split(), dtype=np.float64)
     except ValueError:
         row, text = next(
             (row, f) for row, line in lines for f in line.split() if math.isnan(_number(f))
         )
-        raise DataError(
-            f"'{text}' is not a number", file=file, row=row, remedy="correct or delete that row"
-        ) from None
+        raise DataError("io.not-number-2", file=file, row=row, text=text) from None
     return flat.reshape(-1, width), np.array([row for row, _ in lines], dtype=np.int64)
 
 

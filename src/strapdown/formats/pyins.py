@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import npz
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.gnss_fixes import Fixes, GnssOptions
@@ -58,10 +58,12 @@ def _arrays(path: Path, time: str, values: str, width: int) -> tuple[Array, Arra
     numeric = stamps.dtype.kind in "iuf" and block.dtype.kind in "iuf"
     if not numeric or stamps.ndim != 1 or block.shape != (stamps.size, width):
         raise DataError(
-            f"shapes {stamps.shape} and {block.shape}, where (n,) and (n, {width}) belong",
+            "io.shapes-n-n-belong",
             file=path.name,
             quantity=f"{time}, {values}",
-            remedy=f"save {width} numbers a stamp",
+            shape=stamps.shape,
+            shape_2=block.shape,
+            width=width,
         )
     return stamps.astype(np.float64), block.astype(np.float64)
 

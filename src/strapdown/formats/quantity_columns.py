@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.columns import CLOCKS
 from strapdown.formats.unit_words import UNIT_OF as UNITS_OF_LOGS
 from strapdown.formats.unit_words import unit_of
@@ -131,18 +131,23 @@ def find_quantities(
     for quantity, name in asked.items():
         if quantity not in known:
             raise ConfigError(
-                f"'{quantity}' is no quantity of {of}",
+                "io.no-quantity-2",
                 quantity="columns",
-                remedy=nearest(quantity, known),
+                of_what=quantity,
+                of=of,
+                word=quantity,
+                known=known,
             )
         if name not in columns and name.isdecimal() and 1 <= int(name) <= len(columns):
             name = columns[int(name) - 1]
         if name not in columns:
             raise ConfigError(
-                f"there is no column '{name}'",
+                "io.no-column-3",
                 file=file,
                 quantity=f"columns {quantity}",
-                remedy=nearest(name, columns),
+                name=name,
+                word=name,
+                known=columns,
             )
         wanted[name] = quantity
     found: dict[str, Found] = {}
@@ -157,10 +162,12 @@ def find_quantities(
         factor = sign * _factor(meant, known[meant], unit, word, name, file)
         if meant in found:
             raise DataError(
-                f"columns '{found[meant].source}' and '{name}' could both be it",
+                "io.columns-could-both",
                 file=file,
                 quantity=meant,
-                remedy=f'say which: columns = {{{meant} = "{name}"}}',
+                source=found[meant].source,
+                name=name,
+                meant=meant,
             )
         found[meant] = Found(name, factor, bool(unit))
     return found
@@ -201,9 +208,11 @@ def _factor(
     spelled = SPELLINGS.get(unit) or unit_of(unit) or unit
     if spelled not in known.units:
         raise DataError(
-            f"'{unit}' is no unit of it (column '{name}')",
+            "io.no-unit-column",
             file=file,
             quantity=quantity,
-            remedy=f"known are {', '.join(known.units) or 'none'}",
+            unit=unit,
+            name=name,
+            units=", ".join(known.units) or "none",
         )
     return known.units[spelled]

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.results.inputs import Reading
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.place_references import is_place, parse_place
 from strapdown.evaluation.reference_points import parse_reference
-from strapdown.exceptions import ConfigError, DataError
 from strapdown.formats import csv, read_raw
 from strapdown.formats.assemble_truth import truth_of_file
 from strapdown.formats.recording import Origin, ReadOptions
@@ -68,22 +68,21 @@ def read_reference_words(path: Path) -> list[str] | None:
 def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[str]:
     """Return the sentences, or say which of them is not understood."""
     if not numbered:
-        raise DataError(
-            "an empty list of reference points",
-            file=path.name,
-            remedy="write one sentence at least, or leave the file out",
-        )
+        raise DataError("io.empty-list-reference-points", file=path.name)
     for number, text in numbered:
         try:
             read = parse_place if is_place(text) else parse_reference
             read(text, -math.inf, math.inf)
         except ConfigError as error:
             raise DataError(
-                error.finding.what if what == "line" else f"{what} {number}: {error.finding.what}",
+                "io.message",
                 file=path.name,
                 row=number if what == "line" else None,
                 quantity="reference",
-                remedy=error.finding.remedy,
+                message=error.finding.what
+                if what == "line"
+                else f"{what} {number}: {error.finding.what}",
+                remedy_text=error.finding.remedy,
             ) from None
     return [text for _, text in numbered]
 
@@ -92,14 +91,10 @@ def _from_toml(path: Path) -> list[str]:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError(f"no TOML: {error}", file=path.name, remedy="correct it there") from None
+        raise DataError("io.no-toml", file=path.name, error=error) from None
     words = content.get("references")
     if not isinstance(words, list) or not all(isinstance(w, str) for w in words):
-        raise DataError(
-            "no list of sentences named references",
-            file=path.name,
-            remedy='write references = ["end same as start"]',
-        )
+        raise DataError("io.no-list-sentences-named-references", file=path.name)
     return words
 
 
@@ -113,11 +108,11 @@ def _from_csv(path: Path) -> list[str]:
         def value(name: str, row: dict[str, Any] = row, file_row: int = file_row) -> str:
             if name not in row or pd.isna(row[name]) or not str(row[name]).strip():
                 raise DataError(
-                    f"a reference of kind '{row['kind']}' needs it, and it is missing",
+                    "io.reference-kind-needs-missing",
                     file=path.name,
                     row=file_row,
                     quantity=name,
-                    remedy="fill in the column",
+                    at_row=row["kind"],
                 )
             return str(row[name]).strip()
 
@@ -137,11 +132,7 @@ def _from_csv(path: Path) -> list[str]:
             )
         else:
             raise DataError(
-                f"unknown kind '{kind}'",
-                file=path.name,
-                row=file_row,
-                quantity="kind",
-                remedy="use known, tilt, same or turns",
+                "io.unknown-kind", file=path.name, row=file_row, quantity="kind", kind=kind
             )
         sd = row.get("sd_deg")
         words.append(text if sd is None or pd.isna(sd) else f"{text} sd {sd}")
@@ -175,10 +166,5 @@ def read_truth(
     """
     truth = truth_of_file(read_raw(path), options or ReadOptions(), origin or Origin(0, "s"))
     if truth is None or not np.isfinite(truth.to_numpy()).all():
-        raise DataError(
-            "no attitude in it",
-            file=path.name,
-            remedy="give columns time_s, q_w, q_x, q_y, q_z (body to north-east-down), or time_s, "
-            "roll_deg, pitch_deg, heading_deg; or a list of reference points",
-        )
+        raise DataError("io.no-attitude", file=path.name)
     return truth

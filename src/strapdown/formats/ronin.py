@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.phones import AXES
@@ -58,9 +58,11 @@ def read(path: Path) -> RawLog:
     for name in TRIADS:
         if name in arrays and arrays[name].shape != (samples, 3):
             raise DataError(
-                f"'{name}' has the shape {arrays[name].shape}, and there are {samples} stamps",
+                "io.shape-stamps",
                 file=path.name,
-                remedy="get the recording again from its source",
+                name=name,
+                shape=arrays[name].shape,
+                samples=samples,
             )
     raw = raw_log(path, arrays, {}, {})
     stated: dict[str, tuple[str, str | None]] = {TIME: ("time", "s")}
@@ -70,6 +72,14 @@ def read(path: Path) -> RawLog:
     with h5py.File(path, "r") as file:
         if CHEST in file:
             what = f"{CHEST} is not used: it is the attitude of another phone, on the chest"
-            raw.findings.append(Finding(what, file=path.name, quantity="attitude"))
+            raw.findings.append(
+                Finding(
+                    "io.message-2",
+                    file=path.name,
+                    quantity="attitude",
+                    severity="note",
+                    message=what,
+                )
+            )
     raw.stated, raw.axes = stated, AXES
     return raw

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from strapdown.exceptions import ConfigError, Finding, nearest
+from strapdown.errors import ConfigError, Finding
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.tables import SAMPLINGS
 
@@ -30,19 +30,10 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
     """
     asked = (options.sampling or raw.sampling or "").lower()
     if not asked:
-        findings.append(
-            Finding(
-                "each row is taken as the rate at its stamp: nothing says that it is a mean",
-                file=raw.name,
-                quantity="sampling",
-                remedy="say --sampling mean for a sensor that averages over its interval",
-            )
-        )
+        findings.append(Finding("io.each-row-taken-rate-stamp", file=raw.name, quantity="sampling"))
         return "instantaneous"
     if asked not in SAMPLINGS:
         raise ConfigError(
-            f"'{asked}' is no kind of sampling",
-            quantity="--sampling",
-            remedy=nearest(asked, SAMPLINGS),
+            "io.no-kind-sampling-2", quantity="--sampling", asked=asked, word=asked, known=SAMPLINGS
         )
     return asked

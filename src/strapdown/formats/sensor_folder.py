@@ -6,7 +6,7 @@ import dataclasses
 import re
 from pathlib import Path
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import find_columns
@@ -48,10 +48,7 @@ def read(path: Path) -> RawLog:
     if not any(_triad(m) == "gyro" for m in tables):
         held = ", ".join(m.name for m in members[:6]) + (" …" if len(members) > 6 else "")
         raise DataError(
-            f"no table of a gyro in it; it holds: {held or 'nothing'}",
-            file=name,
-            quantity="gyro",
-            remedy="unpack it and give the log in it, or call the tables gyro.csv, accel.csv",
+            "io.no-table-gyro-holds", file=name, quantity="gyro", held=held or "nothing"
         )
     return join([_log(m) for m in tables], name, rows_of_member=True)
 

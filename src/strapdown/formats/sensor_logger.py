@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.join import join
 from strapdown.formats.members import Member, file_member, first_line, members_of, peek
@@ -90,11 +90,10 @@ def read(path: Path) -> RawLog:
         sensors, meta, files = _from_members(members or [file_member(path)])
     if not any(kind in sensors for kind in GYROS):
         raise DataError(
-            f"no gyroscope in it; of what is read here it holds: {', '.join(sensors) or 'nothing'}",
+            "io.no-gyroscope-read-here-holds",
             file=name,
             quantity="gyro",
-            remedy="record with the gyroscope switched on; give the folder or archive, and not a "
-            "table of it",
+            sensors=", ".join(sensors) or "nothing",
         )
     findings: list[Finding] = []
     logs = [_gyro(sensors, findings), *_force(sensors, meta, name, findings)]
@@ -126,11 +125,7 @@ def _from_members(
         if kind not in SENSORS and kind.lower() != METADATA.lower():
             continue
         if kind in sensors:
-            raise DataError(
-                f"it and {sensors[kind].name} are both {kind}",
-                file=member.label,
-                remedy="keep one recording in the folder or archive",
-            )
+            raise DataError("io.both", file=member.label, name=sensors[kind].name, kind=kind)
         data = member.read()
         files.append(member.file)
         if kind not in SENSORS:
@@ -149,9 +144,7 @@ def _require(name: str, columns: dict[str, NDArray[Any]]) -> None:
     missing = [n for n in ("time", "x", "y", "z") if n not in columns]
     if missing:
         raise DataError(
-            f"no column {', '.join(missing)}; it has: {', '.join(columns) or 'none'}",
-            file=name,
-            remedy="export the recording again",
+            "io.no-column-4", file=name, missing=missing, columns=", ".join(columns) or "none"
         )
 
 
@@ -160,20 +153,11 @@ def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
     try:
         records = json.loads(text)
     except json.JSONDecodeError as error:
-        raise DataError(
-            f"no JSON from there on: {error.msg}",
-            file=path.name,
-            row=error.lineno,
-            remedy="the file is cut or was edited; export the recording again",
-        ) from None
+        raise DataError("io.no-json", file=path.name, row=error.lineno, msg=error.msg) from None
     except RecursionError:
         records = None
     if not isinstance(records, list) or not all(isinstance(r, dict) for r in records):
-        raise DataError(
-            "it is not a list of records",
-            file=path.name,
-            remedy="export the recording again as JSON",
-        )
+        raise DataError("io.not-list-records", file=path.name)
     groups: dict[str, list[int]] = {}
     meta: dict[str, str] = {}
     for k, record in enumerate(records):
@@ -202,20 +186,18 @@ def _values(
             out.append(int(value) if name == "time" else float(value))  # type: ignore[arg-type]
         except (TypeError, ValueError, OverflowError):
             raise DataError(
-                f"'{value}' is not a number (field '{name}' of that record)",
+                "io.not-number-field-record",
                 file=f"{path.name}/{kind}",
                 row=k + 1,
                 quantity=name,
-                remedy="correct or delete that record; rows count the records of the file",
+                value=value,
+                name=name,
             ) from None
     try:
         return np.array(out, dtype=np.int64 if name == "time" else np.float64)
     except OverflowError:
         raise DataError(
-            "a stamp has more than 64 bits",
-            file=f"{path.name}/{kind}",
-            quantity="time",
-            remedy="export the recording again",
+            "io.stamp-more-than-bits", file=f"{path.name}/{kind}", quantity="time"
         ) from None
 
 
@@ -237,10 +219,10 @@ def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
     if kind == GYROS[1]:
         findings.append(
             Finding(
-                "there is no Gyroscope; GyroscopeUncalibrated is read, from which the phone has "
-                "taken no bias",
+                "io.no-gyroscope-gyroscopeuncalibrated-read-phone",
                 file=sensors[kind].name,
                 quantity="gyro",
+                severity="note",
             )
         )
     return _log(sensors[kind], "gyro", "rad/s")
@@ -270,29 +252,19 @@ def _force(
         if linear in sensors:
             findings.append(
                 Finding(
-                    "left out: it is without gravity, and there is no Gravity beside it",
-                    file=sensors[linear].name,
-                    quantity="accel",
-                    remedy="record Gravity too",
+                    "io.left-out-without-gravity-no", file=sensors[linear].name, quantity="accel"
                 )
             )
         return []
     if not known:
-        findings.append(
-            Finding(
-                "the platform is not known, and iOS writes acceleration with the opposite sign",
-                file=name,
-                quantity="accel",
-                remedy="keep Metadata.csv beside it, or state --accel-unit: m/s2 for Android or "
-                "standardised frames; for iOS -m/s2, and -g for AccelerometerUncalibrated",
-            )
-        )
+        findings.append(Finding("io.platform-not-known-ios-writes", file=name, quantity="accel"))
     elif turned:
         findings.append(
             Finding(
-                "written on iOS without standardised frames: its sign is turned",
+                "io.written-ios-without-standardised-frames",
                 file=name,
                 quantity="accel",
+                severity="note",
             )
         )
     return logs

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.find_columns import Column
 from strapdown.formats.join import join
@@ -79,7 +79,9 @@ def read(path: Path) -> RawLog:
         logs.append(_log(raw, FORCE, "accel", "-g", findings))
     if len(logs) > 1:
         what = "acceleration is as iOS writes it: its sign is turned"
-        findings.append(Finding(what, file=path.name, quantity="accel"))
+        findings.append(
+            Finding("io.message-2", file=path.name, quantity="accel", severity="note", message=what)
+        )
     out = join(logs, path.name, (path,))
     return dataclasses.replace(out, findings=[*raw.findings, *findings, *out.findings])
 
@@ -99,10 +101,13 @@ def _log(raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding])
     if (repeated := int((~own).sum())) and triad == "gyro":
         findings.append(
             Finding(
-                f"{repeated} of {own.size} rows repeat the sample before, with its stamp; left out",
+                "io.rows-repeat-sample-before-stamp",
                 file=raw.name,
                 row=raw.row(int(np.argmin(own))),
                 quantity=triad,
+                severity="note",
+                repeated=repeated,
+                size=own.size,
             )
         )
     rows = np.arange(1, stamps.size + 1) if raw.rows is None else raw.rows
@@ -124,10 +129,7 @@ def _clock(raw: RawLog, kind: str) -> str:
         if name in raw.columns:
             return name
     raise DataError(
-        f"no column {STAMPS[kind]}; it has: {', '.join(raw.columns)}",
-        file=raw.name,
-        quantity="time",
-        remedy="record with the time stamps of the sensors switched on",
+        "io.no-column-5", file=raw.name, quantity="time", stamps=STAMPS[kind], columns=raw.columns
     )
 
 

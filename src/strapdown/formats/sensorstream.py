@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.csv import SUFFIXES, decoded
 from strapdown.formats.join import join
 from strapdown.formats.phones import force_of, sensor_log
@@ -78,30 +78,27 @@ def read(path: Path) -> RawLog:
         if parsed is None:
             if k == len(numbered) - 1 and k and not text.endswith(("\n", "\r")):
                 findings.append(
-                    Finding("the last line is cut; it was left out", file=path.name, row=row)
+                    Finding("io.last-line-cut-left-out-2", file=path.name, row=row, severity="note")
                 )
                 break
             raise DataError(
-                f"'{_shown(line)}' is not a stamp and blocks of an id and its values",
-                file=path.name,
-                row=row,
-                remedy="correct or delete that row",
+                "io.not-stamp-blocks-id-values", file=path.name, row=row, value_shown=_shown(line)
             )
         for kind, values in parsed[1].items():
             seen.setdefault(kind, []).append((row, parsed[0], values))
     if 4 not in seen:
         raise DataError(
-            f"no line has a gyroscope (id 4); it has the ids {', '.join(map(str, sorted(seen)))}",
-            file=path.name,
-            quantity="gyro",
-            remedy="switch the gyroscope on in the app and record again",
+            "io.no-line-gyroscope-id-ids", file=path.name, quantity="gyro", seen=sorted(seen)
         )
     if without := len(numbered) - len(seen[4]):
         findings.append(
             Finding(
-                f"{without} of {len(numbered)} lines have no gyroscope and are no samples of it",
+                "io.lines-no-gyroscope-no-samples",
                 file=path.name,
                 quantity="gyro",
+                severity="note",
+                without=without,
+                count=len(numbered),
             )
         )
     logs = [_log(path, seen, kind, *TRIADS[kind]) for kind in (4, 3, 5) if kind in seen]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import unrolled
 from strapdown.formats.inference.clock import infer_time_unit, wrap_bits
 from strapdown.formats.inference.conclusion import THRESHOLD
@@ -101,10 +101,11 @@ def read_stamps(
             stamps, unit = whole, "s"
             findings.append(
                 Finding(
-                    "the seconds of week begin again; they are counted on",
+                    "io.seconds-week-begin-again-they",
                     file=file,
                     row=row(weeks[0]),
                     quantity="time",
+                    severity="note",
                 )
             )
     ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor can round them
@@ -118,10 +119,7 @@ def read_stamps(
     ):
         findings.append(
             Finding(
-                f"in {unit}, as stated, it has {1.0 / usual:.3g} samples a second",
-                file=file,
-                quantity="time",
-                remedy="if that cannot be, state another unit with --time-unit",
+                "io.stated-samples-second", file=file, quantity="time", unit=unit, usual=1.0 / usual
             )
         )
     factor = TIME_UNITS[unit]
@@ -132,10 +130,12 @@ def read_stamps(
         if far:
             findings.append(
                 Finding(
-                    "stamps count from a distant origin; time here counts from the first of them, "
-                    f"{first} {unit}",
+                    "io.stamps-count-distant-origin-time-2",
                     file=file,
                     quantity="time",
+                    severity="note",
+                    first=first,
+                    unit=unit,
                 )
             )
     return Stamps(_since(first, unit, origin) + ticks * factor, unit, why, keep, origin, findings)
@@ -164,27 +164,31 @@ def _refuse_backward(
     here, then = stamps[k], stamps[k + 1]
     if steps[k] == 0:
         raise DataError(
-            f"the stamp {then} repeats that of the row before ({_times(bad.size)} in all)",
+            "io.stamp-repeats-row-before-all",
             file=file,
             row=row(k + 1),
             quantity="time",
-            remedy="--repair keeps the first row of each stamp and says how many it dropped",
+            then=then,
+            times=_times(bad.size),
         )
     if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
         raise DataError(
-            f"time falls from {here} to {then}, as a counter of {bits} bits does when it wraps",
+            "io.time-falls-counter-bits-does",
             file=file,
             row=row(k + 1),
             quantity="time",
-            remedy="--repair adds the counter's range from there on",
+            here=here,
+            then=then,
+            bits=bits,
         )
     raise DataError(
-        f"time goes back from {here} to {then} ({_times(bad.size)} in all)",
+        "io.time-goes-back-all",
         file=file,
         row=row(k + 1),
         quantity="time",
-        remedy="--repair drops the rows that are not later than every row before them; if two "
-        "logs were joined, split them",
+        here=here,
+        then=then,
+        times=_times(bad.size),
     )
 
 
@@ -209,17 +213,25 @@ def _repaired(
     if wraps := int(np.count_nonzero(added)):
         ticks = ticks + np.cumsum(added)
         findings.append(
-            Finding(f"the counter wrapped {_times(wraps)}; undone", file=file, quantity="time")
+            Finding(
+                "io.counter-wrapped-undone",
+                file=file,
+                quantity="time",
+                severity="note",
+                times=_times(wraps),
+            )
         )
     latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
     keep = ticks > latest
     if dropped := int((~keep).sum()):
         findings.append(
             Finding(
-                f"{dropped} row{'s' if dropped > 1 else ''} left out, whose stamp is not later "
-                "than every one before",
+                "io.row-left-out-whose-stamp",
                 file=file,
                 quantity="time",
+                severity="note",
+                dropped=dropped,
+                value="s" if dropped > 1 else "",
             )
         )
     return keep, ticks
@@ -233,7 +245,13 @@ def _evident_unit(
         unit = str(said.value)
         if unit != "s":
             findings.append(
-                Finding(str(said), file=file, quantity="time", remedy="if not, say --time-unit")
+                Finding(
+                    "io.message",
+                    file=file,
+                    quantity="time",
+                    message=str(said),
+                    remedy_text="if not, say --time-unit",
+                )
             )
         return unit, str(said)
     usual = _mean_step((stamps - stamps[0]).astype(np.float64))
@@ -244,8 +262,9 @@ def _evident_unit(
         if p >= 1e-3 and usual > 0
     )
     raise DataError(
-        f"no unit stated, and a mean step of {usual:.6g} does not tell it to {THRESHOLD:g}",
+        "io.message",
         file=file,
         quantity="time",
-        remedy=told or "check that this is the time column",
+        message=f"no unit stated, and a mean step of {usual:.6g} does not tell it to {THRESHOLD:g}",
+        remedy_text=told or "check that this is the time column",
     )

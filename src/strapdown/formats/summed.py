@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import ACCEL_SUMS, GYRO_SUMS
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["OPEN", "SUMS", "intervals", "sampling_of_sums", "sum_of"]
 
@@ -71,19 +71,17 @@ def sampling_of_sums(
     names = " and ".join(t for t in ("gyro", "accel") if t in summed)
     if asked and asked.lower() != "mean":
         raise ConfigError(
-            f"'{asked}' does not go with increments ({names}): they belong to the interval that "
-            "ends at their stamp",
-            quantity="--sampling",
-            remedy="leave it out, or state units of rates if these are none",
+            "io.does-not-go-increments-they", quantity="--sampling", asked=asked, names=names
         )
     rest = [t for t in ("gyro", "accel") if t in triads - summed]
     findings.append(
         Finding(
-            f"{names}: increments of each sample, divided by its step (the first by the usual "
-            "step); each row is the mean over the interval that ends at its stamp"
-            + "".join(f"; {t} is taken for such a mean, too" for t in rest),
+            "io.message-2",
             file=file,
             quantity="sampling",
+            severity="note",
+            message=f"{names}: increments of each sample, divided by its step (the first by the usual step); each row is the mean over the interval that ends at its stamp"
+            + "".join(f"; {t} is taken for such a mean, too" for t in rest),
         )
     )
     return "mean"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["told_by_file_rows"]
 
@@ -31,9 +31,10 @@ def told_by_file_rows(name: str, row_of: Callable[[int], int | None]) -> Iterato
     except DataError as error:
         said = error.finding
         raise DataError(
-            said.what,
+            "io.message",
             file=name,
             row=None if said.row is None else row_of(said.row - 1),
             quantity=said.quantity,
-            remedy=said.remedy,
+            message=said.what,
+            remedy_text=said.remedy,
         ) from None

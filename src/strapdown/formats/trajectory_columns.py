@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.columns import CLOCKS, EULERS, TIMES
 from strapdown.formats.geodetic_quantities import GEODETIC_QUANTITIES
 from strapdown.formats.quantity_columns import ANGLES, Found, Quantity, find_quantities
@@ -51,10 +51,5 @@ def find_trajectory_columns(
     found = find_quantities(columns, QUANTITIES, asked, file, of="a trajectory")
     missing = [q for q in QUANTITIES if q not in found]
     if missing:
-        raise DataError(
-            f"missing columns: {', '.join(missing)}; it has {', '.join(columns)}",
-            file=file,
-            remedy="a trajectory needs time, lat, lon, alt, VN, VE, VD, roll, pitch and heading; "
-            "name columns that are called otherwise with columns={'lat': …}",
-        )
+        raise DataError("io.missing-columns-3", file=file, missing=missing, columns=columns)
     return found

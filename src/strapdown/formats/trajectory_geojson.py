@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.date_line import cut_at_date_line
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
@@ -60,7 +60,7 @@ def write_geojson(
     chosen.require_wgs84("GeoJSON")
     check_trajectory(trajectory)
     if trajectory.empty:
-        raise DataError("the trajectory has no rows", remedy="write one that has")
+        raise DataError("io.trajectory-no-rows")
     thinned = thin(trajectory, chosen.most_points)
     title = one_line(name)
     features = [_end(trajectory, 0, "start", title, chosen)]

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.date_line import cut_at_date_line
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
@@ -67,7 +67,7 @@ def write_kml(
     chosen.require_wgs84("KML")
     check_trajectory(trajectory)
     if trajectory.empty:
-        raise DataError("the trajectory has no rows", remedy="write one that has")
+        raise DataError("io.trajectory-no-rows")
     thinned = thin(trajectory, chosen.most_points)
     kept = trajectory.iloc[thinned.rows]
     points = kept[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
 from strapdown.formats.decimal_rows import write_decimals
@@ -75,11 +75,11 @@ def read(path: Path) -> pd.DataFrame:
     raw = csv.read(path)
     if len(raw.columns) != len(NAMES):
         raise DataError(
-            f"it has {len(raw.columns)} columns, and this layout {len(NAMES)}",
+            "io.columns-layout",
             file=raw.name,
             row=raw.row(0),
-            remedy="give week, seconds of week, lat, lon, height, velocity north, east, down, "
-            "roll, pitch, heading; or a table with a header, as .csv",
+            count=len(raw.columns),
+            count_2=len(NAMES),
         )
     named = zip(NAMES, raw.columns, strict=True)
     values = {

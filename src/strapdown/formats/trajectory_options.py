@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 
 __all__ = ["TUM_FRAMES", "TrajectoryFileOptions"]
 
@@ -57,47 +57,39 @@ class TrajectoryFileOptions:
 
     def __post_init__(self) -> None:
         if not isinstance(self.ellipsoid, Ellipsoid):
-            raise ConfigError(
-                f"{self.ellipsoid!r} is no Ellipsoid",
-                quantity="ellipsoid",
-                remedy="give one, as ellipsoids.find_ellipsoid makes of a name",
-            )
+            raise ConfigError("io.no-ellipsoid", quantity="ellipsoid", ellipsoid=self.ellipsoid)
         if self.epoch is not None and not isinstance(self.epoch, datetime):
-            raise ConfigError(
-                f"{self.epoch!r} is no datetime",
-                quantity="epoch",
-                remedy="give one, as in datetime(2026, 3, 1, 12, tzinfo=UTC)",
-            )
+            raise ConfigError("io.no-datetime", quantity="epoch", epoch=self.epoch)
         if self.epoch is not None and self.epoch.utcoffset() is None:
-            raise ConfigError(
-                f"{self.epoch.isoformat()} has no time zone",
-                quantity="epoch",
-                remedy="give it one, as in datetime(2026, 3, 1, 12, tzinfo=UTC)",
-            )
+            raise ConfigError("io.no-time-zone", quantity="epoch", isoformat=self.epoch.isoformat())
         # The geoid is nowhere farther than 110 m from the ellipsoid.
         if self.geoid_undulation is not None and not abs(self.geoid_undulation) < 200.0:
             raise ConfigError(
-                f"a geoid {self.geoid_undulation:.9g} m from the ellipsoid is none",
+                "io.geoid-ellipsoid-none",
                 quantity="geoid_undulation",
-                remedy="give height over the ellipsoid minus height over the sea, -110 to 90 m",
+                geoid_undulation=self.geoid_undulation,
             )
         if not isinstance(self.most_points, int) or self.most_points < 2:
             raise ConfigError(
-                f"a line cannot be drawn through {self.most_points} points",
+                "io.line-cannot-drawn-through-points",
                 quantity="most_points",
-                remedy="allow two or more",
+                most_points=self.most_points,
             )
         if self.tum_frame not in TUM_FRAMES:
             raise ConfigError(
-                f"'{self.tum_frame}' is no frame of a TUM file",
+                "io.no-frame-tum-file",
                 quantity="tum_frame",
-                remedy=nearest(str(self.tum_frame), TUM_FRAMES),
+                tum_frame=self.tum_frame,
+                word=str(self.tum_frame),
+                known=TUM_FRAMES,
             )
         if self.digits not in DIGITS:
             raise ConfigError(
-                f"'{self.digits}' is no way to write numbers",
+                "io.no-way-write-numbers",
                 quantity="digits",
-                remedy=nearest(str(self.digits), DIGITS),
+                digits=self.digits,
+                word=str(self.digits),
+                known=DIGITS,
             )
 
     def require_wgs84(self, form: str) -> None:
@@ -110,10 +102,10 @@ class TrajectoryFileOptions:
         """
         if self.ellipsoid != WGS84:
             raise ConfigError(
-                f"{form} holds places of WGS 84 alone, and these refer to {self.ellipsoid.name}",
+                "io.holds-places-wgs-alone-these",
                 quantity="ellipsoid",
-                remedy="transform the places to WGS 84 first, or write csv or tum, which say "
-                "what they refer to",
+                form=form,
+                name=self.ellipsoid.name,
             )
 
     def date(self, time: float) -> str:
@@ -127,19 +119,13 @@ class TrajectoryFileOptions:
             There is no such date.
         """
         if self.epoch is None:
-            raise ConfigError(
-                "without an epoch there are no dates",
-                quantity="epoch",
-                remedy="give the instant at which the trajectory's time is zero",
-            )
+            raise ConfigError("io.without-epoch-no-dates", quantity="epoch")
         try:
             at = self.epoch.astimezone(UTC) + timedelta(seconds=time)
         except (OverflowError, ValueError):
             at = None
         if at is None or not math.isfinite(time):
             raise DataError(
-                f"{time:.9g} s after {self.epoch.isoformat()} is no date",
-                quantity="epoch",
-                remedy="give the instant at which the trajectory's time is zero",
+                "io.after-no-date", quantity="epoch", time=time, isoformat=self.epoch.isoformat()
             )
         return at.strftime("%Y-%m-%dT%H:%M:%S.%fZ")

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY
 
@@ -91,18 +91,18 @@ def judge_trajectory(
     for why, remedy, of, possible in readings:
         if possible and of() < AGREE:
             raise DataError(
-                f"places and velocities disagree ({plain:.0%} of the motion is unexplained), and "
-                f"agree if {why} ({of():.1%})",
+                "io.message",
                 file=file,
                 quantity="lat, lon",
-                remedy=remedy,
+                message=f"places and velocities disagree ({plain:.0%} of the motion is unexplained), and agree if {why} ({of():.1%})",
+                remedy_text=remedy,
             )
     return [
         Finding(
-            f"places and the integral of velocity disagree by {plain:.0%} of the motion",
+            "io.places-integral-velocity-disagree-motion",
             file=file,
             quantity="lat, lon",
-            remedy="check the units and the axes of both: north, east, down in m/s",
+            plain=plain,
         )
     ]
 
@@ -121,8 +121,9 @@ def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None)
     # Nothing drives 20 deg beside its heading and, by accident, along 57 times its heading.
     if plain > 20.0 and radians < 5.0:
         raise DataError(
-            f"heading is {plain:.0f}° from the course, and {radians:.1f}° if it is in radians",
+            "io.heading-course-if-radians",
             file=file,
             quantity="heading",
-            remedy="name the columns roll_rad, pitch_rad and heading_rad",
+            plain=plain,
+            radians=radians,
         )

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv, kitti, parquet, pyins, trajectory_nav
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.find_columns import Column
@@ -95,7 +95,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     """
     path = Path(path)
     if not path.exists():
-        raise ConfigError("there is no such file", file=str(path), remedy="check the path")
+        raise ConfigError("io.no-such-file", file=str(path))
     if columns is None or not columns:
         for reader in TRAJECTORY_READERS.values():
             if reader.detect(path):
@@ -131,11 +131,11 @@ def _refuse_others(path: Path) -> None:
     known = (*csv.SUFFIXES, *parquet.SUFFIXES, ".nav", ".npz")
     if path.is_dir() or path.suffix.lower() not in known:
         raise DataError(
-            "a trajectory is read from a text table alone"
+            "io.trajectory-read-text-table-alone"
             if not path.is_dir()
-            else "this is a folder, and a trajectory is read from one file",
+            else "io.folder-trajectory-read-file",
             file=path.name,
-            remedy=f"give a file with the ending {', '.join(known)}",
+            known=known,
         )
 
 

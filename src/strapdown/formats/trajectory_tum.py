@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_options import TUM_FRAMES, TrajectoryFileOptions
 from strapdown.frames import ecef_from_geodetic, q_ne
@@ -99,7 +99,7 @@ def write_tum(
     chosen = options or TrajectoryFileOptions()
     check_trajectory(trajectory)
     if trajectory.empty:
-        raise DataError("the trajectory has no rows", remedy="write one that has")
+        raise DataError("io.trajectory-no-rows")
     position, q_wb = poses(trajectory, chosen)
     world, body = TUM_FRAMES[chosen.tum_frame]
     lat, lon, alt = (float(v) for v in places_of(trajectory.iloc[:1])[0])

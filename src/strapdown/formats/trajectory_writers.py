@@ -7,7 +7,7 @@ from typing import Protocol
 
 import pandas as pd
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats.trajectory_csv import write_csv
 from strapdown.formats.trajectory_geojson import write_geojson
 from strapdown.formats.trajectory_kml import write_kml
@@ -89,19 +89,17 @@ def write_trajectory(
     form = path.suffix.lower().removeprefix(".")
     if form not in TRAJECTORY_WRITERS:
         raise ConfigError(
-            f"there is no writer for files that end in '{path.suffix}'",
+            "io.no-writer-files-end",
             file=str(path),
-            remedy=nearest(form, TRAJECTORY_WRITERS),
+            suffix=path.suffix,
+            word=form,
+            known=TRAJECTORY_WRITERS,
         )
     part = path.with_name(f".{path.name}.part")
     try:
         TRAJECTORY_WRITERS[form](part, trajectory, name=name or path.stem, options=options)
         part.replace(path)
     except OSError as error:
-        raise ConfigError(
-            f"it cannot be written: {error.strerror}",
-            file=str(path),
-            remedy="make its folder, or give another",
-        ) from None
+        raise ConfigError("io.cannot-written", file=str(path), strerror=error.strerror) from None
     finally:
         part.unlink(missing_ok=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.body_axes import mirrored
 from strapdown.formats.columns import parse_axes, says_increment
 from strapdown.formats.find_columns import AXES, Column
@@ -130,10 +130,7 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
         unit = OPEN[triad]
     if unit and " or " in unit:
         raise DataError(
-            f"the file leaves open whether it is in {unit}",
-            file=raw.name,
-            quantity=triad,
-            remedy=f"state it with --{triad}-unit",
+            "io.file-leaves-open-whether", file=raw.name, quantity=triad, unit=unit, triad=triad
         )
 
 

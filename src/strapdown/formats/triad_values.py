@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.numbers import numbers
 from strapdown.formats.recording import RawLog
@@ -45,13 +45,13 @@ def values_of_triads(
         try:
             missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in found]
             if missing:
-                raise DataError(f"{', '.join(missing)} is not there")
+                raise DataError("io.not", missing=missing)
             block = _triad(raw, found, triad)
             if not np.isfinite(block).any():
-                raise DataError("it holds no number")
+                raise DataError("io.holds-no-number-2")
             empty = int((~np.isfinite(block)).any(axis=1).sum())
             if triad == "mag" and empty:
-                raise DataError(f"{empty} rows hold no number of it")
+                raise DataError("io.rows-hold-no-number", empty=empty)
         except DataError as error:
             findings.append(left_out(raw, triad, error))
         else:
@@ -68,5 +68,10 @@ def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
     """Say of a triad that it is not used, and why."""
     said = error.finding
     return Finding(
-        f"left out: {said.what}", file=raw.name, row=said.row, quantity=triad, remedy=said.remedy
+        "io.message",
+        file=raw.name,
+        row=said.row,
+        quantity=triad,
+        message=f"left out: {said.what}",
+        remedy_text=said.remedy,
     )

@@ -14,7 +14,7 @@ from strapdown.constants import (
     MAG_UNITS,
     TIME_UNITS,
 )
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError, nearest
 
 __all__ = ["UNIT_OF", "factor_of", "parse_unit", "unit_of"]
 
@@ -116,7 +116,12 @@ def parse_unit(text: str, kind: str) -> str:
         if counted:
             example = "deg/s/131" if kind == "gyro" else "g/16384"
             remedy = f"{remedy.rstrip('.')}; of raw counts say how many are a unit, as in {example}"
-        raise ConfigError(f"'{text}' is no unit of it", quantity=f"--{kind}-unit", remedy=remedy)
+        raise ConfigError(
+            "io.message",
+            quantity=f"--{kind}-unit",
+            message=f"'{text}' is no unit of it",
+            remedy_text=remedy,
+        )
     counts = f"{1.0 / scale:g}"
     exact = math.isclose(float(counts) * scale, 1.0, rel_tol=1e-12)
     return f"{unit}/{counts}" if exact else f"{scale!r} {unit}"

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.recording import RawLog, ReadOptions
 
@@ -61,23 +61,27 @@ def finite_rows(
         count = int(bad.any(axis=1).sum())
         if not options.repair:
             raise DataError(
-                f"{block[row, column]} is not a finite number (column '{found[quantity].source}'; "
-                f"{count} such row{'s' if count > 1 else ''} in all)",
+                "io.not-finite-number-column-such",
                 file=raw.name,
                 row=raw.row(row),
                 quantity=quantity,
-                remedy="--repair leaves such rows out and integrates across them",
+                block=block[row, column],
+                source=found[quantity].source,
+                count=count,
+                value="s" if count > 1 else "",
             )
         findings.append(
             Finding(
-                f"{count} row{'s' if count > 1 else ''} left out that held no finite number; "
-                "integrated across",
+                "io.row-left-out-held-no",
                 file=raw.name,
                 row=raw.row(row),
                 quantity=quantity,
+                severity="note",
+                count=count,
+                value="s" if count > 1 else "",
             )
         )
         keep &= ~bad.any(axis=1)
     if not keep.any():
-        raise DataError("no row can be used", file=raw.name, remedy="look at the file")
+        raise DataError("io.no-row-can-used", file=raw.name)
     return keep

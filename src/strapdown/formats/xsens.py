@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.find_columns import Column
 from strapdown.formats.numbers import numbers
@@ -78,7 +78,9 @@ def read(path: Path) -> RawLog:
     findings = list(raw.findings)
     if "Mag_X" in raw.columns:
         what = "Mag is not used: it counts in the magnetic field at the factory, in no unit"
-        findings.append(Finding(what, file=path.name, quantity="mag"))
+        findings.append(
+            Finding("io.message-2", file=path.name, quantity="mag", severity="note", message=what)
+        )
     columns = dict(raw.columns)
     source, stamps = _stamps(raw, rate, findings)
     if source is not None:
@@ -99,16 +101,23 @@ def _stamps(
         tick = _tick(raw, ticks, rate)
         if tick != 1:
             what = f"{STAMP} counts 0.1 ms, by its step and the rate; shown in µs"
-            findings.append(Finding(what, file=raw.name, quantity="time"))
+            findings.append(
+                Finding(
+                    "io.message-2", file=raw.name, quantity="time", severity="note", message=what
+                )
+            )
         return STAMP, ticks * tick
     if rate is None:
         return None, np.empty(0)
     count = _unwrapped(raw, COUNTER, (16, 32), findings)
     findings.append(
         Finding(
-            f"stamps are {COUNTER} over the {rate:g} Hz at the top of the file",
+            "io.stamps-over-hz-top-file",
             file=raw.name,
             quantity="time",
+            severity="note",
+            counter=COUNTER,
+            rate=rate,
         )
     )
     return COUNTER, np.asarray((count - count[0]) * (1e6 / rate))
@@ -130,10 +139,14 @@ def _unwrapped(
                 count[1:] += np.cumsum(steps < -(2 ** (bits - 1))) * 2**bits
                 findings.append(
                     Finding(
-                        f"{name} wrapped at {bits} bits, {falls.size} in all; undone",
+                        "io.wrapped-bits-all-undone",
                         file=raw.name,
                         row=raw.row(int(falls[0]) + 1),
                         quantity="time",
+                        severity="note",
+                        name=name,
+                        bits=bits,
+                        size=falls.size,
                     )
                 )
             break
@@ -160,10 +173,4 @@ def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
         return fits[0]
     told = " or ".join(f"{r:.4g} Hz in ticks of {t} µs" for t, r in found.items())
     top = f"the rate at the top, {rate:g} Hz, is neither" if rate else "no rate stands at the top"
-    raise DataError(
-        f"a step of {step:g} is {told}; {top}",
-        file=raw.name,
-        quantity=STAMP,
-        remedy="write the rate that it was recorded at above the names, as in // Update Rate: "
-        "100.0Hz",
-    )
+    raise DataError("io.step", file=raw.name, quantity=STAMP, step=step, told=told, top=top)

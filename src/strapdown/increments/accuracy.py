@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["MotionAccuracy", "motion_accuracy"]
 
@@ -71,8 +71,9 @@ def motion_accuracy(
         return ORDERS[sampling, samples, interpolation]
     except KeyError:
         raise ConfigError(
-            f"no motion increments are made of {sampling!r} with samples={samples!r}, "
-            f"interpolation={interpolation!r}",
+            "mechanization.no-motion-increments-made-samples",
             quantity="accuracy",
-            remedy="cubic and constant go with samples=1, constant with means alone",
+            sampling=sampling,
+            samples=samples,
+            interpolation=interpolation,
         ) from None

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown._kernels import increments as kernel
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.tables import GYRO, check_imu, increments_table
 
 __all__ = ["increments_from_imu"]
@@ -45,9 +45,10 @@ def increments_from_imu(imu: pd.DataFrame, interpolation: str = "linear") -> pd.
     """
     if interpolation not in INTERPOLATIONS:
         raise ConfigError(
-            f"'{interpolation}' is no interpolation",
+            "mechanization.no-interpolation",
             quantity="interpolation",
-            remedy=f"use {' or '.join(INTERPOLATIONS)}",
+            interpolation=interpolation,
+            interpolations=INTERPOLATIONS,
         )
     check_imu(imu)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import motion_blocks
 from strapdown._kernels import motion_increments as one_step
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.increments.angle import INTERPOLATIONS as BETWEEN_STAMPS
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
 
@@ -99,37 +99,36 @@ def motion_increments(
 def _check(imu: pd.DataFrame, samples: int, interpolation: str, rows: str) -> bool:
     """Whether the table holds means; everything that was asked is possible."""
     if samples not in (1, 2, 3, 4):
-        raise ConfigError(
-            f"{samples} is out of range", quantity="samples", remedy="use 1, 2, 3 or 4 steps"
-        )
+        raise ConfigError("mechanization.out-range", quantity="samples", samples=samples)
     for quantity, value, known in (
         ("interpolation", interpolation, INTERPOLATIONS),
         ("rows", rows, ROWS),
     ):
         if value not in known:
             raise ConfigError(
-                f"'{value}' is no choice", quantity=quantity, remedy=nearest(str(value), known)
+                "mechanization.no-choice",
+                quantity=quantity,
+                value=value,
+                word=str(value),
+                known=known,
             )
     if samples > 1 and interpolation != "linear":
         raise ConfigError(
-            f"{samples} steps of a block share one polynomial: '{interpolation}' is for one",
+            "mechanization.steps-block-share-polynomial",
             quantity="interpolation",
-            remedy="leave it out, or use samples=1",
+            samples=samples,
+            interpolation=interpolation,
         )
     check_imu(imu)
     mean = bool(imu.attrs["sampling"] == "mean")
     if interpolation == "constant" and not mean:
         raise ConfigError(
-            "samples at the stamps are not constant between them",
-            quantity="interpolation",
-            remedy="use linear or cubic",
+            "mechanization.samples-stamps-not-constant-between", quantity="interpolation"
         )
     if ACCEL[0] not in imu.columns:
         raise DataError(
-            "there is no accelerometer: without specific force there is no velocity",
+            "mechanization.no-accelerometer-without-specific-force",
             file=imu.attrs.get("source"),
             quantity="accel",
-            remedy="name its columns when the log is read (--columns accel_x=NAME, ...); for an "
-            "attitude alone the gyro is enough (increments_from_imu)",
         )
     return mean

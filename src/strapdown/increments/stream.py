@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import motion_blocks
 from strapdown._kernels import motion_increments as one_step
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["IncrementStream", "IncrementStreamState"]
 
@@ -60,9 +60,11 @@ class IncrementStream:
     def __post_init__(self) -> None:
         if self.interpolation not in STREAMED:
             raise ConfigError(
-                f"'{self.interpolation}' is no choice",
+                "mechanization.no-choice-2",
                 quantity="interpolation",
-                remedy=nearest(str(self.interpolation), STREAMED),
+                interpolation=self.interpolation,
+                word=str(self.interpolation),
+                known=STREAMED,
             )
 
     def begin(self, sampling: str = "instantaneous") -> IncrementStreamState:

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables import imu_table
 from strapdown.tables.checks import as_array, check_same_length, check_time
 
@@ -58,11 +58,7 @@ def imu_from_increments(
     first = float(np.median(np.diff(stamps))) if dt is None else float(dt)
     if not (np.isfinite(first) and first > 0.0):
         raise DataError(
-            f"a first step of {first:g} s is none",
-            file=source,
-            row=1,
-            quantity="dt",
-            remedy="give the length of the first interval in seconds, or leave it out",
+            "mechanization.first-step-none", file=source, row=1, quantity="dt", first=first
         )
     steps = np.concatenate([[first], np.diff(stamps)])[:, None]
     return imu_table(

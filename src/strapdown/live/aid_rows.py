@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
 from strapdown.config.navigation import AidSpec
-from strapdown.exceptions import nearest
+from strapdown.errors import nearest
 from strapdown.formats import csv
 from strapdown.live.lines import BadLineError
 from strapdown.systems.sins.aid_files import COLUMN_UNITS

@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from strapdown.exceptions import nearest
+from strapdown.errors import nearest
 from strapdown.formats.sensorstream import blocks_of
 
 __all__ = ["END", "BadLineError", "Measured", "Sample", "Word", "parse_line"]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
 from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec, aids_of
-from strapdown.exceptions import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.stamps import EPOCH
 from strapdown.live.aid_rows import AidRows

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.aiding.aid import Aid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.live.clock import Clock, MachineClock
 from strapdown.live.latency import LatencyTape
 from strapdown.live.warm_up import warm_up
@@ -50,11 +50,7 @@ def parse_pace(text: str) -> float:
     except ValueError:
         pace = math.nan
     if not 0.0 < pace < math.inf:
-        raise ConfigError(
-            f"'{text}' is no pace",
-            quantity="--pace",
-            remedy="give 1 for the pace of the record, 10 for ten times that, or max",
-        )
+        raise ConfigError("live.no-pace", quantity="--pace", text=text)
     return pace
 
 

@@ -16,7 +16,7 @@ from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.slots import SLOTS
-from strapdown.exceptions import DataError, StrapdownError
+from strapdown.errors import DataError, StrapdownError
 from strapdown.live.clock import Clock
 from strapdown.live.latency import Latency
 from strapdown.live.received import write_received

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import Mark
 from strapdown.rotation.euler_angles import euler_sd
@@ -54,13 +54,9 @@ class StateLines:
         every: float = 1.0,
     ) -> None:
         if form not in LINE_FORMS:
-            raise ConfigError(
-                f"there is no form '{form}'", quantity="--lines", remedy="use json or csv"
-            )
+            raise ConfigError("live.no-form", quantity="--lines", form=form)
         if not 0.0 <= every < math.inf:
-            raise ConfigError(
-                f"{every!r} s is no interval", quantity="--every", remedy="give seconds, 0 for all"
-            )
+            raise ConfigError("live.no-interval", quantity="--every", every=every)
         self._used, self._write, self._form, self._every = navigator, write, form, every
         self._next = -math.inf
         self._mark: Mark | None = None

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import IO
 from urllib.parse import urlsplit
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.live.clock import Clock
 
 __all__ = ["Line", "LineSource", "open_source"]
@@ -158,11 +158,7 @@ def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
     except ValueError:
         parts, host, port = urlsplit(""), _LOCAL, None
     if parts.scheme != "udp" or port is None or parts.path.strip("/"):
-        raise ConfigError(
-            f"nothing comes from '{where}'",
-            quantity="--live",
-            remedy="give - for standard input, or udp://127.0.0.1:5555 for datagrams",
-        )
+        raise ConfigError("live.nothing-comes", quantity="--live", where=where)
     bound = _bound(host, port)
     bound.settimeout(LOOK)
     name = f"udp://{host}:{bound.getsockname()[1]}"
@@ -180,8 +176,6 @@ def _bound(host: str, port: int) -> socket.socket:
             raise
     except OSError as error:
         raise ConfigError(
-            f"it cannot be listened to: {error.strerror or error}",
-            quantity="--live",
-            remedy="give an address of this machine and a port that is free; 0 takes any",
+            "live.cannot-listened", quantity="--live", strerror=error.strerror or error
         ) from None
     return made

@@ -10,7 +10,7 @@ import pandas as pd
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 from strapdown.nav_state import NavState
 from strapdown.systems.sins.chain import Chain
 from strapdown.systems.sins.drive import run_by_sample

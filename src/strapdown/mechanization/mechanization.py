@@ -26,7 +26,7 @@ from strapdown._kernels.ned import (
 from strapdown._kernels.ned_level import ned_correct, ned_correct_rows, ned_levels
 from strapdown._kernels.trajectory import trajectory_rows
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, Finding, nearest
+from strapdown.errors import ConfigError, Finding
 from strapdown.mechanization.reference_heights import HEIGHTS, reference_heights
 from strapdown.mechanization.refusal import refuse_start, refuse_step
 from strapdown.nav_state import NavState
@@ -85,9 +85,11 @@ class Mechanization(ABC):
         find_ellipsoid(self.ellipsoid)
         if self.height not in HEIGHTS:
             raise ConfigError(
-                f"'{self.height}' is nothing that the height can be",
+                "mechanization.nothing-height-can",
                 quantity="height",
-                remedy=nearest(str(self.height), HEIGHTS),
+                height=self.height,
+                word=str(self.height),
+                known=HEIGHTS,
             )
         for name, low, high in (
             ("height_time_constant", 1.0, 1000.0),
@@ -97,9 +99,7 @@ class Mechanization(ABC):
             value = getattr(self, name)
             if not is_number(value) or not low <= value <= high:
                 raise ConfigError(
-                    f"{value} is outside {low:g} to {high:g}",
-                    quantity=name,
-                    remedy="choose a value in that range",
+                    "mechanization.outside", quantity=name, value=value, low=low, high=high
                 )
         limits = self.height_limits
         if (
@@ -109,9 +109,7 @@ class Mechanization(ABC):
             or not limits[0] < limits[1]
         ):
             raise ConfigError(
-                f"{limits} are no two heights",
-                quantity="height_limits",
-                remedy="give the lowest and then the highest, in m",
+                "mechanization.no-two-heights", quantity="height_limits", limits=limits
             )
 
     @abstractmethod

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -38,36 +38,21 @@ def reference_heights(height: str, heights: ArrayLike | None, steps: int) -> Arr
     if height != "damped":
         if heights is None:
             return np.empty(0)
-        raise DataError(
-            f"there are heights to damp by, and the height is '{height}'",
-            quantity="heights",
-            remedy="use height='damped', or leave them out",
-        )
+        raise DataError("mechanization.heights-damp-height", quantity="heights", height=height)
     if heights is None:
-        raise DataError(
-            "the height is to be damped, and there is no reference for it",
-            quantity="heights",
-            remedy="give a height for every step, or use height='held' or 'free'",
-        )
+        raise DataError("mechanization.height-damped-no-reference", quantity="heights")
     try:
         reference = np.ascontiguousarray(heights, dtype=np.float64)
     except (TypeError, ValueError):
-        raise DataError(
-            "these are no numbers",
-            quantity="heights",
-            remedy="give one height in m for every step, NaN where there is none",
-        ) from None
+        raise DataError("mechanization.these-no-numbers", quantity="heights") from None
     if reference.shape != (steps,):
         raise DataError(
-            f"its shape is {reference.shape}, and there are {steps} steps",
-            quantity="heights",
-            remedy="give one height in m for every step, NaN where there is none",
+            "mechanization.shape-steps", quantity="heights", shape=reference.shape, steps=steps
         )
     if np.isinf(reference).any():
         raise DataError(
-            "it is infinite",
+            "mechanization.infinite",
             row=int(np.argmax(np.isinf(reference))) + 1,
             quantity="heights",
-            remedy="give heights in m, NaN where there is none",
         )
     return reference

@@ -7,7 +7,7 @@ from typing import NoReturn
 import pandas as pd
 
 from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
-from strapdown.exceptions import DivergenceError
+from strapdown.errors import DivergenceError
 from strapdown.tables import MOTION
 
 
@@ -37,12 +37,14 @@ def refuse_start(
     lowest, highest = height_limits
     if speed > largest_speed or not lowest <= alt <= highest:
         raise DivergenceError(
-            f"the state to begin with, {alt:.6g} m high and at {speed:.6g} m/s, is "
-            f"outside of {lowest:g} to {highest:g} m, or above {largest_speed:g} m/s",
+            "mechanization.state-begin-high-outside-or",
             file=source,
             quantity="state",
-            remedy="give the height over the ellipsoid in m and the velocity in m/s, or other "
-            "height_limits or largest_speed",
+            alt=alt,
+            speed=speed,
+            lowest=lowest,
+            highest=highest,
+            largest_speed=largest_speed,
         )
 
 
@@ -73,30 +75,32 @@ def refuse_step(
     source = increments.attrs.get("source")
     if why == POLE:
         raise DivergenceError(
-            f"the sample at {time:.9g} s (step {step + 1}) comes nearer to a pole than "
-            f"{latitude_limit_deg:g} deg of latitude{before}: north, and every angle from "
-            "it, changes too fast there",
+            "mechanization.sample-step-comes-nearer-pole",
             file=source,
             quantity="lat",
-            remedy="end the run before it, or navigate with WanderAzimuth, which knows no "
-            "pole; north-east-down has no meaning there",
+            time=time,
+            step=step + 1,
+            latitude_limit_deg=latitude_limit_deg,
+            before=before,
         )
     if why == LEAP:
         raise DivergenceError(
-            f"with the sample at {time:.9g} s (step {step + 1}, of {row['dt']:.4g} s) the "
-            f"place moves by more than {LARGEST_TURN:g} rad around the Earth{before}",
+            "mechanization.sample-step-place-moves-more",
             file=source,
             quantity="state",
-            remedy="a step so long has no course between its ends: cut the log there",
+            time=time,
+            step=step + 1,
+            at_row=row["dt"],
+            largest_turn=LARGEST_TURN,
+            before=before,
         )
     given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
     raise DivergenceError(
-        f"the state has diverged with the sample at {time:.9g} s (step {step + 1}: {given})"
-        f"{before}",
+        "mechanization.state-diverged-sample-step",
         file=source,
         quantity="state",
-        remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-        "gravity (-9.8 on z at level rest), a burst; at the start: an attitude in rad; or a "
-        "sensor too poor for so long a run, whose bias is best taken off at a rest, or a free "
-        "height over an hour",
+        time=time,
+        step=step + 1,
+        given=given,
+        before=before,
     )

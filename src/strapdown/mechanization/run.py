@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.increments.stream import IncrementStream, IncrementStreamState
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
@@ -112,10 +112,7 @@ def run_mechanization(
     check_motion_increments(increments)
     if increments.empty:
         raise DataError(
-            "there is no increment",
-            file=increments.attrs.get("source"),
-            quantity="increments",
-            remedy="a log of at least two samples is needed",
+            "mechanization.no-increment", file=increments.attrs.get("source"), quantity="increments"
         )
     _refuse_holes(increments, longest_step)
     ends = increments.index.to_numpy(dtype=np.float64)
@@ -204,9 +201,7 @@ def check_longest_step(longest: float) -> None:
     """Refuse what is no length of time."""
     if not is_number(longest) or not longest > 0.0:
         raise ConfigError(
-            f"a longest step of {longest} is none",
-            quantity="longest_step",
-            remedy="give a time in s above zero; inf allows every step",
+            "mechanization.longest-step-none", quantity="longest_step", longest=longest
         )
 
 
@@ -225,10 +220,11 @@ def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> Non
     slack = 0.5 * float(increments["dt"].iloc[0])
     if abs(start.time - begin) > slack:
         raise DataError(
-            f"the state is at {start.time:.9g} s, and the increments begin at {begin:.9g} s",
+            "mechanization.state-increments-begin",
             file=increments.attrs.get("source"),
             quantity="time",
-            remedy="give the state of that instant, or cut the log where the state is known",
+            time=start.time,
+            begin=begin,
         )
 
 
@@ -241,13 +237,13 @@ def _check_joints(increments: pd.DataFrame, dt: Array) -> None:
         if holes.size:
             at = int(holes[0])
             raise DataError(
-                f"no increment from {ends[at]:.9g} s to {ends[at] + between[at]:.9g} s: what the "
-                f"body did then is not known ({holes.size} such)",
+                "mechanization.no-increment-body-did-then",
                 file=increments.attrs.get("source"),
                 row=at + 2,
                 quantity="dt",
-                remedy="keep every row of the table that was made of the log, and cut it at its "
-                "ends alone; or go on from there with a state that is known",
+                ends=ends[at],
+                ends_2=ends[at] + between[at],
+                size=holes.size,
             )
 
 
@@ -260,12 +256,14 @@ def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
         row = int(long[0])
         end = float(increments.index[row])
         raise DataError(
-            f"a gap of {dt[row]:.6g} s, from {end - dt[row]:.9g} s to {end:.9g} s: what the body "
-            f"did in it is not known ({long.size} such)",
+            "mechanization.gap-body-did-not-known",
             file=increments.attrs.get("source"),
             quantity="dt",
-            remedy=f"cut the log there, or pass longest_step={float(dt.max()):.3g} or more to join "
-            "its sides by a line",
+            dt=dt[row],
+            end=end - dt[row],
+            end_2=end,
+            size=long.size,
+            dt_2=float(dt.max()),
         )
 
 
@@ -281,12 +279,13 @@ def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
     row = int(wide[np.argmax(dt[wide])])
     return (
         Finding(
-            f"{wide.size} steps are more than three times as long as the usual {usual:.6g} s; the "
-            f"longest, {dt[row]:.6g} s, ends at {float(increments.index[row]):.9g} s: rate and "
-            "force are taken as linear over it",
+            "mechanization.steps-more-than-three-times",
             file=increments.attrs.get("source"),
             quantity="dt",
-            remedy="errors after it are larger than the sensors alone would make them",
+            size=wide.size,
+            usual=usual,
+            dt=dt[row],
+            index=float(increments.index[row]),
         ),
     )
 
@@ -298,11 +297,10 @@ def _large_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
     row, axis = divmod(int(np.abs(phi).argmax()), 3)
     return (
         Finding(
-            f"in the step ending at {float(increments.index[row]):.9g} s the body turns by "
-            f"{phi[row, axis]:.4g} rad: more than samples at its two ends can tell",
+            "mechanization.step-ending-body-turns-rad",
             file=increments.attrs.get("source"),
             quantity=PHI[axis],
-            remedy="look at the unit of the gyro (rad/s) and for a burst there; a body that does "
-            "turn so fast needs a faster log",
+            index=float(increments.index[row]),
+            phi=phi[row, axis],
         ),
     )

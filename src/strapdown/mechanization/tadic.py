@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from strapdown._kernels import ned_simplified as kernel
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
 
@@ -51,9 +51,7 @@ class Tadic(Mechanization):
         super().__post_init__()
         if self.gravity is not None and not 0.0 < self.gravity < 20.0:
             raise ConfigError(
-                f"{self.gravity:g} m/s² is no gravity of this Earth",
-                quantity="gravity",
-                remedy="give a positive number near 9.8, or leave it out",
+                "mechanization.no-gravity-earth", quantity="gravity", gravity=self.gravity
             )
 
     def begin(self, start: NavState) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from strapdown._kernels import sample as kernel
 from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, DataError, DivergenceError
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.run import LONGEST_STEP, check_longest_step
@@ -59,18 +59,18 @@ class NavTracker:
         check_longest_step(longest_step)
         if sampling not in SAMPLINGS:
             raise ConfigError(
-                f"'{sampling}' is no kind of sampling",
+                "mechanization.no-kind-sampling",
                 quantity="sampling",
-                remedy=f"use {' or '.join(SAMPLINGS)}",
+                sampling=sampling,
+                samplings=SAMPLINGS,
             )
         used: object = NorthEastDown() if mechanization is None else mechanization
         update = used.sample_kernel() if isinstance(used, Mechanization) else None
         if not isinstance(used, Mechanization) or update is None:
             raise ConfigError(
-                f"a tracker steps with NorthEastDown or WanderAzimuth, and not with {used!r}",
+                "mechanization.tracker-steps-northeastdown-or-wanderazimuth",
                 quantity="mechanization",
-                remedy="leave it out, or give one of these with its options; others navigate a "
-                "whole log with run_mechanization",
+                used=used,
             )
         begin = used.begin(start)
         record = np.zeros(kernel.STATE + len(begin))
@@ -131,70 +131,62 @@ class NavTracker:
         row = int(self._record[kernel.SAMPLES]) + 1
         if why == kernel.BAD_TIME:
             raise DataError(
-                f"time does not advance: {self._record[kernel.TIME]:.9g} s is followed by "
-                f"{time:.9g} s",
+                "mechanization.time-does-not-advance-followed",
                 row=row,
                 quantity="time",
-                remedy="leave the sample out; the state is as before it",
+                record=self._record[kernel.TIME],
+                time=time,
             )
         if why == kernel.BAD_START:
             raise DataError(
-                f"the state is at {self._record[kernel.TIME]:.9g} s, and the first sample at "
-                f"{time:.9g} s",
+                "mechanization.state-first-sample",
                 row=row,
                 quantity="time",
-                remedy="give the state of that instant",
+                record=self._record[kernel.TIME],
+                time=time,
             )
         if why == kernel.BAD_HEIGHT:
             raise DataError(
-                f"a reference height with a height that is {self._mechanization.height}, or one "
-                "that is infinite",
+                "mechanization.reference-height-height-or-infinite",
                 row=row,
                 quantity="height",
-                remedy="give finite heights to a mechanization with height='damped' alone, NaN "
-                "where there is none",
+                height=self._mechanization.height,
             )
         if why == kernel.GAP:
             raise DataError(
-                f"a gap of {time - self._record[kernel.TIME]:.6g} s before {time:.9g} s: what the "
-                "body did in it is not known",
+                "mechanization.gap-before-body-did-not",
                 row=row,
                 quantity="time",
-                remedy="begin again from a known state, or pass a longer longest_step",
+                time=time - self._record[kernel.TIME],
+                time_2=time,
             )
         rate, force = (v.tolist() if isinstance(v, np.ndarray) else v for v in (gyro, accel))
         given = f"time {time}, rate {rate}, force {force}"
         if why == kernel.BAD_SAMPLE:
             raise DataError(
-                f"{given}: a time, three finite rates and three finite forces are needed",
+                "mechanization.time-three-finite-rates-three",
                 row=row,
                 quantity="gyro, accel",
-                remedy="leave the sample out; the state is as before it",
+                given=given,
             )
         if why == POLE:
             raise DivergenceError(
-                f"the step to {time:.9g} s comes nearer to a pole than "
-                f"{self._mechanization.latitude_limit_deg:g} deg of latitude",
+                "mechanization.step-comes-nearer-pole-than",
                 row=row,
                 quantity="lat",
-                remedy="end here, or track with WanderAzimuth, which knows no pole; "
-                "north-east-down has no meaning there",
+                time=time,
+                latitude_limit_deg=self._mechanization.latitude_limit_deg,
             )
         if why == LEAP:
             raise DivergenceError(
-                f"in the step to {time:.9g} s the place would move by more than {LARGEST_TURN:g} "
-                "rad around the Earth",
+                "mechanization.step-place-would-move-more",
                 row=row,
                 quantity="state",
-                remedy="a step so long has no course between its ends: begin again from a known "
-                "state",
+                time=time,
+                largest_turn=LARGEST_TURN,
             )
         raise DivergenceError(
-            f"the state would diverge: {given}",
-            row=row,
-            quantity="state",
-            remedy="look at this sample and those before it: units (rad/s, m/s²), the sign of "
-            "gravity (-9.8 on z at level rest), a burst; the state is as before it",
+            "mechanization.state-would-diverge", row=row, quantity="state", given=given
         )
 
     @property

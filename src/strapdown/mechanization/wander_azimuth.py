@@ -16,7 +16,7 @@ from strapdown._kernels import wander_level as level
 from strapdown._kernels.level import LEVEL
 from strapdown._kernels.wander_sample import wander_update
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.mechanization.mechanization import Array, Mechanization
 from strapdown.nav_state import NavState
 
@@ -62,9 +62,9 @@ class WanderAzimuth(Mechanization):
         super().__post_init__()
         if self.latitude_limit_deg != Mechanization.latitude_limit_deg:
             raise ConfigError(
-                f"a limit of {self.latitude_limit_deg:g} deg for axes that have none",
+                "mechanization.limit-axes-none",
                 quantity="latitude_limit_deg",
-                remedy="leave it out: a wander azimuth navigates up to the poles and across them",
+                latitude_limit_deg=self.latitude_limit_deg,
             )
 
     def begin(self, start: NavState) -> Array:
@@ -163,12 +163,13 @@ class WanderAzimuth(Mechanization):
         begin, end = time[near[0]], time[near[-1]]
         return (
             Finding(
-                f"{near.size} states from {begin:.9g} s to {end:.9g} s are within {NEAR:g} m of a "
-                f"pole, the nearest {distance.min():.3g} m: there an error of the place across is "
-                "as large an angle of longitude, heading and velocity from north as it is a part "
-                "of that distance",
+                "mechanization.states-within-pole-nearest-error",
                 quantity="heading",
-                remedy="compare places in ECEF and attitudes by earth_attitude of the history",
+                size=near.size,
+                begin=begin,
+                end=end,
+                near=NEAR,
+                distance=distance.min(),
             ),
         )
 

@@ -15,6 +15,7 @@ from strapdown._kernels.level import LEVEL
 from strapdown._kernels.level_place import NED, WANDER
 from strapdown.aiding.aid import Epochs
 from strapdown.aiding.gnss import POSITION_CODE
+from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import CovarianceForm, Innovations
 from strapdown.estimation.covariance_input import bad_observation
 from strapdown.estimation.error_filter import ErrorFilter, diverged
@@ -25,7 +26,6 @@ from strapdown.estimation.observed_together import Rules
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.ud import BiermanThornton
 from strapdown.estimation.wd import Chernodarov
-from strapdown.exceptions import DivergenceError
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
@@ -344,8 +344,5 @@ class CompiledEngine(Engine):
     def _no_covariance(self) -> DivergenceError:
         time = float(self._times[kernel.AT_STEP])
         return DivergenceError(
-            f"the covariance is none any more at {time:.9g} s: a variance is negative or no number",
-            quantity="covariance",
-            remedy="use covariance 'ud' or 'wd', which cannot lose a variance to rounding, and "
-            "look at the standard deviations that are given: units, and nothing known exactly",
+            "navigation.covariance-none-any-more-variance", quantity="covariance", time=time
         )

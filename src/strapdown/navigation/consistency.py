@@ -18,7 +18,7 @@ from strapdown.dsp.chi_square import (
     normal_above,
     normal_quantile,
 )
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.innovation_monitor import Alarm, InnovationMonitor
 from strapdown.navigation.innovation_verdicts import Verdict, judge
 
@@ -170,16 +170,10 @@ def consistency_of(
         The window has not at least two epochs, or the probability is none.
     """
     if window < 2:
-        raise ConfigError(
-            f"a window of {window} epochs says nothing",
-            quantity="window",
-            remedy="give at least 2 epochs",
-        )
+        raise ConfigError("navigation.window-epochs-says-nothing", quantity="window", window=window)
     if not 0.0 < false_alarm < 1.0:
         raise ConfigError(
-            f"{false_alarm} is no probability of a false alarm",
-            quantity="false_alarm",
-            remedy="give a number between 0 and 1",
+            "navigation.no-probability-false-alarm", quantity="false_alarm", false_alarm=false_alarm
         )
     labels = [column[3:] for column in innovations.columns if column.startswith("nu ")]
     time = innovations.index.to_numpy(dtype=np.float64)

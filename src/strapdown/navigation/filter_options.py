@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_model import ErrorModel
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import ConfigError
 from strapdown.tables.checks import is_number
 
 __all__ = ["FilterOptions"]
@@ -53,7 +53,5 @@ class FilterOptions:
             value = getattr(self, name)
             if not is_number(value) or not 0.0 < value <= most:
                 raise ConfigError(
-                    f"{value!r} is no time that the covariance can take",
-                    quantity=name,
-                    remedy=f"give seconds above 0, up to {most:g}",
+                    "navigation.no-time-covariance-can-take", quantity=name, value=value, most=most
                 )

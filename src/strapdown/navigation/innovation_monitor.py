@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["Alarm", "InnovationMonitor", "MonitorState"]
 
@@ -94,9 +94,11 @@ class InnovationMonitor:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > least):
                 raise ConfigError(
-                    f"{name} = {value} of the monitor is not above {least:g}",
+                    "navigation.monitor-not-above",
                     quantity=name,
-                    remedy=f"give a finite number above {least:g}",
+                    name=name,
+                    value=value,
+                    least=least,
                 )
 
     def begin(self, components: int) -> MonitorState:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DivergenceError
+from strapdown.errors import DivergenceError
 
 __all__ = ["LostCovarianceError"]
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import Aid, Epochs, TableAid, WatchingAid
 from strapdown.aiding.gnss import Gnss
+from strapdown.errors import ConfigError
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.filter_state import FilterState
 from strapdown.estimation.large_tilt import is_large
-from strapdown.exceptions import ConfigError, nearest
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled
 from strapdown.navigation.damping import Damping, Feedback
@@ -72,9 +72,9 @@ class Navigator:
         for name in names:
             if not name or names.count(name) > 1:
                 raise ConfigError(
-                    f"'{name}' is the name of two aids" if name else "an aid has no name",
+                    "navigation.name-two-aids" if name else "navigation.aid-no-name",
                     quantity="aiding",
-                    remedy="give each a name of its own",
+                    name=name,
                 )
 
     @cached_property
@@ -135,9 +135,11 @@ class Navigator:
         aid = self.by_name.get(name)
         if not isinstance(aid, TableAid):
             raise ConfigError(
-                f"there is no aid '{name}' with a table",
+                "navigation.no-aid-table",
                 quantity="aiding",
-                remedy=nearest(name, [a.name for a in self.aids if isinstance(a, TableAid)]),
+                name=name,
+                word=name,
+                known=[a.name for a in self.aids if isinstance(a, TableAid)],
             )
         more = aid.epochs(table)
         queue = state.queues[name]

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import Mark, NavigationPiece, Seen
@@ -85,9 +85,7 @@ class IntervalRecorder(Recorder):
     def __post_init__(self) -> None:
         if not is_number(self.rate_hz) or not 0.0 < self.rate_hz < math.inf:
             raise ConfigError(
-                f"{self.rate_hz!r} Hz is no rate of a recorder",
-                quantity="rate_hz",
-                remedy="give Hz above zero, as 10; kind = 'full' keeps every sample",
+                "navigation.hz-no-rate-recorder", quantity="rate_hz", rate_hz=self.rate_hz
             )
 
     @property
@@ -180,12 +178,7 @@ class Tape:
         """
         states = self._states.rows
         if not len(states):
-            raise DataError(
-                "navigation made no step",
-                file=source,
-                quantity="time",
-                remedy="give samples beyond the end of the alignment",
-            )
+            raise DataError("navigation.navigation-made-no-step", file=source, quantity="time")
         used, model = self.navigator.filter.mechanization, self.navigator.filter.model
         marks = self._marks.rows
         if self._newest_mark is not None:

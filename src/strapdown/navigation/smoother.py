@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown._kernels.smoothing import padded, smooth_back
 from strapdown._kernels.smoothing_rows import COVARIANCE, TURN
+from strapdown.errors import ConfigError
 from strapdown.estimation.observation import Observation
-from strapdown.exceptions import ConfigError
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.smoothed import Smoothed
@@ -75,9 +75,7 @@ class RauchTungStriebel(Smoother):
     def __post_init__(self) -> None:
         if not is_number(self.memory) or not 1.0 <= self.memory <= 1e6:
             raise ConfigError(
-                f"{self.memory!r} MB is no memory for a smoother",
-                quantity="memory_mb",
-                remedy="give MB from 1 on; 256 is usual",
+                "navigation.mb-no-memory-smoother", quantity="memory_mb", memory=self.memory
             )
 
     def begin(self, navigator: Navigator) -> Smoothing:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown._kernels.smoothing_rows import TIME, row_width
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["SmoothingTape"]
 
@@ -103,11 +103,12 @@ class SmoothingTape:
             folder = tempfile.gettempdir()
             took = 8e-6 * CHUNK * self._width * self._written
             raise ConfigError(
-                f"the smoother keeps {1e-6 * self._memory:.4g} MB in memory, and {folder} took "
-                f"{took:.3g} MB of what is more: {error.strerror or error}",
+                "navigation.smoother-keeps-mb-memory-took",
                 quantity="smoother, memory_mb",
-                remedy="free some space there, name another folder in TMPDIR, or give more "
-                "memory_mb",
+                memory=1e-06 * self._memory,
+                folder=folder,
+                took=took,
+                strerror=error.strerror or error,
             ) from None
         self._written += 1
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import ConfigError, Finding, nearest
+from strapdown.errors import ConfigError, Finding, nearest
 from strapdown.peers import peer_ahrs, peer_imufusion, peer_vqf
 from strapdown.peers.peer import (
     AIDINGS,
@@ -48,16 +48,17 @@ def _chosen(names: Sequence[str]) -> list[tuple[Peer, str]]:
         name, _, one = word.strip().lower().partition(":")
         if name not in PEERS:
             raise ConfigError(
-                f"'{name}' is no library that is known here",
-                quantity="peers",
-                remedy=nearest(name, PEERS),
+                "peers.no-library-known-here", quantity="peers", name=name, word=name, known=PEERS
             )
         peer = PEERS[name]
         if one and one not in peer.filters:
             raise ConfigError(
-                f"'{one}' is no filter of {name}",
+                "peers.no-filter",
                 quantity="peers",
-                remedy=nearest(one, peer.filters),
+                one=one,
+                name=name,
+                word=one,
+                known=peer.filters,
             )
         _ = peer.version  # before the first, perhaps long, run: is it installed?
         pairs += [(peer, f) for f in ([one] if one else peer.filters) if (peer, f) not in pairs]
@@ -126,9 +127,10 @@ def run_peers(
             if longest_s is not None and seconds > longest_s:
                 findings.append(
                     Finding(
-                        f"left out: on {len(imu)} samples it takes about {seconds:.0f} s",
+                        "peers.left-out-samples-takes-about",
                         quantity=f"{label}, {aiding}",
-                        remedy="allow it more time, or use a shorter part of the log",
+                        count=len(imu),
+                        seconds=seconds,
                     )
                 )
                 continue

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError, DataError, DivergenceError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.tables import ACCEL, GYRO, MAG, attitude_table, check_imu
 
 Array = NDArray[np.float64]
@@ -145,9 +145,12 @@ class Peer:
         chosen = filter_name if filter_name is not None else next(iter(offering), "")
         if chosen not in offering:
             raise ConfigError(
-                f"'{chosen}' does not run on {aiding}",
+                "peers.does-not-run",
                 quantity=f"peers: {self.name}",
-                remedy=nearest(chosen, offering or AIDINGS),
+                chosen=chosen,
+                aiding=aiding,
+                word=chosen,
+                known=offering or AIDINGS,
             )
         samples = samples_for(imu, aiding)
         unit = rotation.normalise(q_nb)
@@ -156,16 +159,14 @@ class Peer:
             return attitude_table(imu.index.to_numpy(dtype=np.float64), q, imu.attrs.get("source"))
         except (ValueError, ArithmeticError, np.linalg.LinAlgError, DataError) as error:
             raise DivergenceError(
-                f"it gave up: {error}",
-                quantity=f"{self.label(chosen)}, {aiding}",
-                remedy="leave it out of the comparison, or try it with other sensors",
+                "peers.gave-up", quantity=f"{self.label(chosen)}, {aiding}", error=error
             ) from error
 
 
 def _known_aiding(aiding: str) -> None:
     if aiding not in AIDINGS:
         raise ConfigError(
-            f"'{aiding}' is no aiding", quantity="aiding", remedy=nearest(aiding, AIDINGS)
+            "peers.no-aiding", quantity="aiding", aiding=aiding, word=aiding, known=AIDINGS
         )
 
 
@@ -180,11 +181,7 @@ def load(name: str) -> Any:
     try:
         return importlib.import_module(name)
     except ImportError:
-        raise ConfigError(
-            f"{name} is not installed",
-            quantity="peers",
-            remedy="pip install 'strapdown[peers]'",
-        ) from None
+        raise ConfigError("peers.not-installed", quantity="peers", name=name) from None
 
 
 def needed_columns(aiding: str) -> list[str]:
@@ -213,21 +210,23 @@ def samples_for(imu: pd.DataFrame, aiding: str) -> Samples:
     missing = [c for c in columns if c not in imu.columns]
     if missing:
         raise DataError(
-            f"{aiding} needs {', '.join(missing)}, and the log has {', '.join(imu.columns)}",
+            "peers.needs-log",
             file=source,
             quantity=missing[0],
-            remedy="compare without this sensor, or use a log that has it",
+            aiding=aiding,
+            missing=missing,
+            columns=imu.columns,
         )
     values = imu[columns].to_numpy(dtype=np.float64)
     bad = np.argwhere(~np.isfinite(values))
     if bad.size:
         row, column = (int(i) for i in bad[0])
         raise DataError(
-            f"not a finite number ({values[row, column]})",
+            "peers.not-finite-number",
             file=source,
             row=row + 1,
             quantity=columns[column],
-            remedy="bring this sensor onto the stamps of the gyro, or compare without it",
+            values=values[row, column],
         )
     blocks = [np.ascontiguousarray(values[:, k : k + 3]) for k in range(0, values.shape[1], 3)]
     blocks += [np.empty((0, 3))] * (3 - len(blocks))
@@ -254,11 +253,13 @@ def steadiness(dt: Array, label: str, source: str | None) -> Finding | None:
     if off <= STEADY:
         return None
     return Finding(
-        f"{label} takes a constant rate: it was given the mean step of {mean * 1e3:.4g} ms, and "
-        f"steps run from {dt.min() * 1e3:.4g} to {dt.max() * 1e3:.4g} ms",
+        "peers.takes-constant-rate-given-mean",
         file=source,
         quantity="time",
-        remedy="its errors include those of the steps; compare it on an evenly sampled log",
+        label=label,
+        mean=mean * 1000.0,
+        dt=dt.min() * 1000.0,
+        dt_2=dt.max() * 1000.0,
     )
 
 

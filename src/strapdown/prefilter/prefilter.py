@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.prefilter.report import Changed, PrefilterReport, report_of
 from strapdown.tables import ACCEL, GYRO, MOTION, check_imu, check_motion_increments
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -167,12 +167,14 @@ class Prefilter(ABC):
         changed = Changed.joined([p.changed for p in portions])
         if len(time) < 2:
             raise DataError(
-                f"of {len(values)} samples, {grid.step * len(values):.4g} s, {len(time)} are left "
-                f"by '{self.name}', which reaches {self.figures(grid)['delay']:.4g} s to either "
-                "side",
+                "prefilter.samples-left-reaches-either-side",
                 file=source,
                 quantity="time",
-                remedy="record for longer, or decimate less",
+                count=len(values),
+                step=grid.step * len(values),
+                count_2=len(time),
+                name=self.name,
+                figures=self.figures(grid)["delay"],
             )
         table = pd.DataFrame(out, index=pd.Index(time, name="time"), columns=columns)
         table.attrs = {**imu.attrs, "sampling": self.sampling(grid)}
@@ -208,7 +210,12 @@ def grid_of(imu: pd.DataFrame) -> Grid:
     except DataError as error:
         f = error.finding
         raise DataError(
-            f.what, file=source_of(imu), row=f.row, quantity=f.quantity, remedy=f.remedy
+            "prefilter.message",
+            file=source_of(imu),
+            row=f.row,
+            quantity=f.quantity,
+            message=f.what,
+            remedy_text=f.remedy,
         ) from None
     return Grid(float(time[0]), step, imu.attrs["sampling"] == "mean")
 
@@ -223,14 +230,16 @@ def whole_factor(rate: float, grid: Grid, name: str) -> int:
     """
     own = 1.0 / grid.step
     if not (math.isfinite(rate) and rate > 0.0):
-        raise ConfigError(f"{rate!r} Hz is no rate", quantity="rate", remedy="give Hz, as 100")
+        raise ConfigError("prefilter.hz-no-rate", quantity="rate", rate=rate)
     factor = round(own / rate)
     if factor < 1 or abs(own / rate - factor) > 1e-3 * factor:
         near = own / max(1, factor)
         raise ConfigError(
-            f"'{name}' gives every so manyth sample, and {rate:g} Hz is no whole part of "
-            f"{own:.6g} Hz",
+            "prefilter.gives-every-manyth-sample-hz",
             quantity="rate",
-            remedy=f"give {near:.6g} Hz, or another whole part",
+            name=name,
+            rate=rate,
+            own=own,
+            near=near,
         )
     return factor

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.outliers import KEPT, REPLACED, Screened
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -173,19 +173,26 @@ def _bursts(
             a, b = int(number[event[0]]), int(number[event[-1]])
             found.append(
                 Finding(
-                    f"from {grid.time(a):.9g} to {grid.time(b):.9g} s (rows {a + 1} to {b + 1}) "
-                    f"{len(kept)} samples stand out, too close to each other to be bridged: they "
-                    "are left as they came",
+                    "prefilter.rows-samples-stand-out-too",
                     file=source,
                     row=a + 1,
                     quantity=column,
-                    remedy="look at the channel there: cut the record, take another unit, or, if "
-                    "the motion is that fast, give outliers a larger bandwidth",
+                    time=grid.time(a),
+                    time_2=grid.time(b),
+                    a=a + 1,
+                    b=b + 1,
+                    count=len(kept),
                 )
             )
         if left:
             found.append(
-                Finding(f"{left} more such bursts", file=source, quantity=column, remedy=None)
+                Finding(
+                    "prefilter.more-such-bursts",
+                    file=source,
+                    quantity=column,
+                    severity="note",
+                    left=left,
+                )
             )
     return found
 
@@ -193,12 +200,11 @@ def _bursts(
 def _too_many(share: dict[str, float], samples: int, source: str | None) -> list[Finding]:
     return [
         Finding(
-            f"{100.0 * part:.2g} % of {samples} samples were replaced as outliers, which is no "
-            "rare fault",
+            "prefilter.samples-replaced-outliers-no-rare",
             file=source,
             quantity=column,
-            remedy="look at the channel; if it reads in coarse steps, give them (steps), and if it "
-            "shakes, a higher threshold",
+            part=100.0 * part,
+            samples=samples,
         )
         for column, part in share.items()
         if part > USUAL_SHARE
@@ -211,12 +217,12 @@ def _knocks(replaced: pd.DataFrame, grid: Any, source: str | None) -> list[Findi
     first = replaced.iloc[0]
     return [
         Finding(
-            f"{len(replaced)} {'sample was' if len(replaced) == 1 else 'samples were'} replaced, "
-            f"at {1.0 / grid.step:.4g} Hz: a knock on the body lasts no longer than one of these, "
-            "so that what was taken for an outlier may be motion, whose turn is then lost",
+            "prefilter.replaced-hz-knock-body-lasts",
             file=source,
             row=int(first["row"]),
             quantity=str(first["channel"]),
-            remedy=LEAVE_IT_OUT,
+            count=len(replaced),
+            value="sample was" if len(replaced) == 1 else "samples were",
+            step=1.0 / grid.step,
         )
     ]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.fir_decimation import FirDecimation, FirState, fir_decimation
 from strapdown.dsp.outliers import OutlierDesign, OutlierState
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
 from strapdown.prefilter.report import Changed
 
@@ -77,10 +77,11 @@ class RobustFir(Prefilter):
         factor = whole_factor(self.rate, grid, self.name)
         if factor == 1:
             raise ConfigError(
-                f"'{self.name}' is to give {self.rate:g} Hz, and the log has no more",
+                "prefilter.give-hz-log-no-more",
                 quantity="rate",
-                remedy=f"give a lower rate, as {self.name}:rate={0.5 * self.rate:g}; or use "
-                "'summed', which replaces outliers and keeps the rate",
+                name=self.name,
+                rate=self.rate,
+                rate_2=0.5 * self.rate,
             )
         return fir_decimation(
             grid.step,

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.outliers import REPLACED
 from strapdown.dsp.samples import check_segment
+from strapdown.errors import DataError
 from strapdown.estimation.covariance import CovarianceForm
 from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.signal_filter import SignalFilter, SignalState
 from strapdown.estimation.update_rule import UpdateRule
 from strapdown.estimation.wd import Chernodarov
-from strapdown.exceptions import DataError
 from strapdown.prefilter.prefilter import Grid, Portion, Prefilter, whole_factor
 from strapdown.prefilter.report import Changed
 
@@ -185,11 +185,7 @@ def _noise(samples: Array) -> Array:
     if not (sd > 0.0).all():
         c = int(np.argmin(sd))
         raise DataError(
-            f"the first {len(samples)} samples of channel {c} show no noise by which others could "
-            "be judged",
-            quantity="noise",
-            remedy="give the standard deviation of a sample of each channel (noise), or use "
-            "'robust_fir'",
+            "prefilter.first-samples-channel-show-no", quantity="noise", count=len(samples), c=c
         )
     return np.asarray(sd)
 

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.report.alignment_words import limits
 from strapdown.systems.alignment_run import AlignmentResult

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.fine_findings import ROCKS
 from strapdown.constants import TWO_SIDED_95
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.report.alignment_values import (
     small,
 )

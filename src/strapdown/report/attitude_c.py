@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from strapdown.attitude import make_algorithm
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.export_c import export_c
 from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.tables import GYRO, QUATERNION
@@ -26,26 +26,11 @@ def check_c(path: Path | None, force: bool) -> None:
         return
     if path.suffix.lower() not in (".c", ".h"):
         # What --force replaces might else be the log itself.
-        raise ConfigError(
-            "it is no name of a C file",
-            file=str(path),
-            quantity="--export-c",
-            remedy="let it end in .c",
-        )
+        raise ConfigError("report.no-name-c-file", file=str(path), quantity="--export-c")
     if path.is_dir() or (path.exists() and not force):
-        raise ConfigError(
-            "it is there already",
-            file=str(path),
-            quantity="--export-c",
-            remedy="give another name, or add --force",
-        )
+        raise ConfigError("report.already", file=str(path), quantity="--export-c")
     if not path.parent.is_dir():
-        raise ConfigError(
-            "there is no such folder",
-            file=str(path.parent),
-            quantity="--export-c",
-            remedy="make it first, or give another name",
-        )
+        raise ConfigError("report.no-such-folder", file=str(path.parent), quantity="--export-c")
 
 
 def chosen_for_c(bench: AttitudeBench) -> str:
@@ -59,11 +44,7 @@ def chosen_for_c(bench: AttitudeBench) -> str:
     labels = [run.algorithm for run in bench.runs]
     chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm
     if chosen is None:
-        raise ConfigError(
-            "no algorithm was accurate enough to be chosen",
-            quantity="--export-c",
-            remedy="name one with --algorithms, or allow more with --tolerance-deg",
-        )
+        raise ConfigError("report.no-algorithm-accurate-enough-chosen", quantity="--export-c")
     return chosen
 
 

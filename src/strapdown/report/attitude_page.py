@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from strapdown import __version__
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.report import attitude_tables as tables
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_body import body_caption, body_figure

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_tables import TextTable, result_tables
@@ -53,14 +53,12 @@ def plot(bench: AttitudeBench, kind: str = "cost") -> Figure:
     """
     if kind not in KINDS:
         raise ConfigError(
-            f"'{kind}' is no chart of this bench", quantity="kind", remedy=nearest(kind, KINDS)
+            "report.no-chart-bench", quantity="kind", kind=kind, word=kind, known=KINDS
         )
     drawn = {chart.slug: chart for chart in charts(bench)}
     if kind not in drawn:
         raise ConfigError(
-            f"there is nothing to draw: it needs {KINDS[kind]}",
-            quantity=f"kind '{kind}'",
-            remedy=f"plot one of {', '.join(drawn)}",
+            "report.nothing-draw-needs", quantity=f"kind '{kind}'", kinds=KINDS[kind], drawn=drawn
         )
     return notebook_figure(drawn[kind])
 

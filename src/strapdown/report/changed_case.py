@@ -8,7 +8,7 @@ from typing import Any
 from strapdown.bundle.configuration_paths import names_file
 from strapdown.config.changed_options import changed_options
 from strapdown.config.crash_case_file import read_case_spec
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 
 __all__ = ["changed_case"]
 

@@ -14,7 +14,7 @@ from strapdown.config.coast import coast_spec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
 from strapdown.config.toml_file import read_toml
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 from strapdown.report.coast_document import coast_document
 from strapdown.report.coast_json import coast_json, write_coast_tables
 from strapdown.report.document_data import draw_stills
@@ -105,19 +105,14 @@ def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path |
         if {"log", "simulation", "live"} & set(table):
             return read_navigation_spec(path), path
     elif path.is_file():
-        raise ConfigError(
-            "it is a log, and not a run of navigation",
-            file=path.name,
-            quantity="SENSOR|BUNDLE",
-            remedy="navigate first (strapdown navigate), and give the folder that it wrote; or "
-            "write the file of a run (strapdown init navigate), and give that",
-        )
+        raise ConfigError("report.log-not-run-navigation", file=path.name, quantity="SENSOR|BUNDLE")
     elif path.suffix.lower() != ".toml":
         raise ConfigError(
-            f"'{source}' is no sensor of the catalogue, and no folder is there by this name",
+            "report.no-sensor-catalogue-no-folder",
             quantity="SENSOR|BUNDLE",
-            remedy=f"{nearest(str(source).lower(), SENSORS)} Or name the folder that strapdown "
-            "navigate wrote, or a .toml file of your own",
+            source=source,
+            word=str(source).lower(),
+            known=SENSORS,
         )
     return None, None
 
@@ -127,30 +122,21 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
     manifest = read_manifest(root)
     if manifest["command"] != "navigate":
         raise DataError(
-            f"it is a folder of 'strapdown {manifest['command']}', and no run of navigation",
+            "report.folder-strapdown-no-run-navigation",
             file=path.name,
             quantity="SENSOR|BUNDLE",
-            remedy="name a folder that strapdown navigate wrote, or a sensor of the catalogue",
+            manifest=manifest["command"],
         )
     for item in manifest["inputs"]:
         if not (root / item["name"]).is_file():
-            raise DataError(
-                f"what it was made of is not there any more: {item['name']}",
-                file=path.name,
-                remedy="put it back where it was, or navigate again; a sensor alone needs no "
-                "record: strapdown coast SENSOR",
-            )
+            raise DataError("report.made-not-any-more", file=path.name, item=item["name"])
     changed = [
         c
         for c in unsealed_changes(root, manifest)
         if any(c.startswith(item["name"]) for item in manifest["inputs"])
     ]
     if changed:
-        raise DataError(
-            f"what it was made of has changed since: {changed[0]}",
-            file=path.name,
-            remedy="navigate again, and give the new folder",
-        )
+        raise DataError("report.made-changed-since", file=path.name, changed=changed[0])
     configuration = resolved(manifest["configuration"], root)
     file = configuration.get("file_path")
     spec = navigation_spec(configuration["navigation"])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.crash.pdof_sensitivity import SHIFTS, WINDOWS, pdof_by_shift, pdof_by_window
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.report.chart import BLACK, Chart, Line, Mark, Panel
 from strapdown.report.crash_moments import unit_look
 from strapdown.report.crash_values import MEAN

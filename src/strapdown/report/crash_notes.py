@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.report.crash_values import MEAN
 from strapdown.systems.crash_case import CaseResult

@@ -8,7 +8,7 @@ import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.severity_model import SPEEDS, InjuryRisk, SeverityModel, injury_risk
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 from strapdown.report.chart import Chart, Line, Panel, look
 
 __all__ = ["risk_chart"]

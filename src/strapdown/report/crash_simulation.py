@@ -15,7 +15,7 @@ from strapdown.bundle.seal import Seal
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.mme_writer import write_mme
 from strapdown.formats.recorder_csv import (
@@ -103,9 +103,11 @@ def _formats(spec: CrashSimulationSpec) -> tuple[str, ...]:
     for name in spec.formats:
         if name not in (*RECORD_WRITERS, "all"):
             raise ConfigError(
-                f"there is no writer of crash records for '{name}'",
+                "report.no-writer-crash-records",
                 quantity="--format",
-                remedy=nearest(name, [*RECORD_WRITERS, "all"]),
+                name=name,
+                word=name,
+                known=[*RECORD_WRITERS, "all"],
             )
     return tuple(RECORD_WRITERS) if "all" in spec.formats else tuple(dict.fromkeys(spec.formats))
 

@@ -7,7 +7,7 @@ from itertools import count
 from typing import Any
 from xml.etree import ElementTree
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.report.chart import Chart
 from strapdown.report.document import (
     Animation,
@@ -177,10 +177,11 @@ class _Writer:
             ElementTree.fromstring(picture.svg)
         except ElementTree.ParseError as error:
             raise DataError(
-                f"the picture '{picture.slug}' is no SVG: {error}",
+                "report.picture-no-svg",
                 file="report",
                 quantity=picture.title,
-                remedy="Escape the texts in it.",
+                slug=picture.slug,
+                error=error,
             ) from error
         return {
             "number": 0,

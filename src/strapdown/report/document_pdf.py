@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.report.document import Document
 from strapdown.report.document_data import document_data, draw_stills
 from strapdown.report.pdf_letters import shown
@@ -68,10 +68,9 @@ def _pdf(document: Document, stills: Sequence[str]) -> bytes:
             return _compiled(typst, folder)
         except typst.TypstError as error:
             raise DataError(
-                f"the document cannot be laid out: {str(error).splitlines()[0]}",
+                "report.document-cannot-laid-out",
                 file="report.pdf",
-                remedy="Mend the picture that typst names, or leave the PDF out: the page shows "
-                "the same document.",
+                splitlines=str(error).splitlines()[0],
             ) from error
 
 
@@ -105,8 +104,5 @@ def _typst() -> Any:
     try:
         import typst
     except ImportError as error:
-        raise ConfigError(
-            "a PDF is laid out by typst, which is not installed",
-            remedy="pip install typst, or leave the PDF out.",
-        ) from error
+        raise ConfigError("report.pdf-laid-out-typst-not") from error
     return typst

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.evaluation.truth_comparison import TruthComparison, compare_with_truth
-from strapdown.exceptions import Finding
 from strapdown.report.navigation_told import NavigationTold
 from strapdown.tables import EULER, NED, VELOCITY
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from strapdown.errors import Finding
 from strapdown.evaluation.smoother_consistency import SmootherConsistency, smoother_consistency
-from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.navigation_agreement import Agreement, agreements
 from strapdown.report.navigation_errors import NavigationErrors, navigation_errors

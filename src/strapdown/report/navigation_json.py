@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.config.navigation_checks import STAGES
+from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.navigation_agreement import Agreement
 from strapdown.report.navigation_conventions import CONVENTIONS

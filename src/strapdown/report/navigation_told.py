@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import pandas as pd
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
+from strapdown.errors import Finding
 from strapdown.evaluation.control_points import ControlPointScore
-from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 
 __all__ = ["NavigationTold", "Withheld"]

@@ -13,7 +13,7 @@ from strapdown.bundle.json_text import to_json
 from strapdown.bundle.seal import Seal
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import ReproduceSpec, specify
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.report.page import embedded, render
 from strapdown.report.plotly_chart import figure as plotly_figure
 from strapdown.report.reproduction_charts import chart
@@ -89,9 +89,11 @@ def reproduction_specification(paper: str) -> ReproduceSpec:
     name = paper.strip().lower()
     if name not in REPRODUCTIONS:
         raise ConfigError(
-            f"'{paper}' is no paper that is re-made here",
+            "report.no-paper-re-made-here",
             quantity="paper",
-            remedy=nearest(name, REPRODUCTIONS),
+            paper=paper,
+            word=name,
+            known=REPRODUCTIONS,
         )
     return specify(ReproduceSpec, paper=name)
 

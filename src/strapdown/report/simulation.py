@@ -17,7 +17,7 @@ from strapdown.config import (
     read_trajectory_spec,
     specify,
 )
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.stated_errors import stated_errors
@@ -84,15 +84,11 @@ def simulate(
     """
     wanted = [formats] if isinstance(formats, str) else formats and list(formats)
     if wanted is not None and not wanted:
-        raise ConfigError("none is named", quantity="--format", remedy="name csv, npz, h5 or mat")
+        raise ConfigError("report.none-named", quantity="--format")
     wanted = wanted and [f.lower() for f in wanted]
     if name.lower() in CASES:
         if sensor is not None:
-            raise ConfigError(
-                "the recorders of a crash have parts of their own",
-                quantity="--sensor",
-                remedy="leave it out",
-            )
+            raise ConfigError("report.recorders-crash-parts-their-own", quantity="--sensor")
         crash = specify(
             CrashSimulationSpec,
             name=name.lower(),
@@ -104,11 +100,7 @@ def simulate(
         )
         return write_crash_simulation(crash, Path(out), force=force)
     if units:
-        raise ConfigError(
-            f"'{name}' is no crash and has no recorders",
-            quantity="--units",
-            remedy="leave it out, or name a crash (see: strapdown modules)",
-        )
+        raise ConfigError("report.no-crash-no-recorders", quantity="--units", name=name)
     if name.lower().endswith(".toml"):
         trajectory = read_trajectory_spec(
             Path(name),
@@ -121,9 +113,11 @@ def simulate(
         return write_trajectory_simulation(trajectory, Path(out), force=force)
     if name.lower() not in SCENARIOS:
         raise ConfigError(
-            f"'{name}' is no scenario and no crash",
+            "report.no-scenario-no-crash",
             quantity="scenario",
-            remedy=nearest(name.lower(), [*SCENARIOS, *CASES]),
+            name=name,
+            word=name.lower(),
+            known=[*SCENARIOS, *CASES],
         )
     scenario = specify(
         ScenarioSpec,

@@ -13,7 +13,7 @@ from strapdown.bundle.seal import Seal
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import TrajectorySpec
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS, log_formats
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
@@ -69,10 +69,12 @@ def write_trajectory_simulation(spec: TrajectorySpec, out: Path, *, force: bool 
     for name in spec.trajectory_formats:
         if name not in TRAJECTORY_WRITERS:
             raise ConfigError(
-                f"there is no writer for '{name}'",
+                "report.no-writer",
                 file=f"{spec.name}.toml",
                 quantity="trajectory_formats",
-                remedy=nearest(name, TRAJECTORY_WRITERS),
+                name=name,
+                word=name,
+                known=TRAJECTORY_WRITERS,
             )
     motion, errors, imu, attitude, trajectory = simulate_trajectory(spec)
     configuration = spec.model_dump(mode="json", exclude_none=True)

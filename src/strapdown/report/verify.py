@@ -26,7 +26,7 @@ from strapdown.config import (
     SimulateSpec,
     TrajectorySpec,
 )
-from strapdown.exceptions import DataError, StrapdownError
+from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.report.alignment import rerun_alignment
 from strapdown.report.attitude import write_attitude
@@ -146,11 +146,7 @@ def verify(bundle: str | Path) -> Verification:
     if changes:
         return Verification("changed", math.inf, digest, tuple(changes))
     if manifest["command"] not in RERUNS:
-        raise DataError(
-            f"its command '{manifest['command']}' is not known",
-            file=MANIFEST,
-            remedy="use the version of strapdown that wrote it",
-        )
+        raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
         again = Path(folder) / "again"
         configuration = resolved(manifest["configuration"], root)
@@ -159,9 +155,9 @@ def verify(bundle: str | Path) -> Verification:
             RERUNS[manifest["command"]](configuration, again, sealed)
         except ValidationError as error:
             raise DataError(
-                f"its configuration is not understood: {error.errors()[0]['msg']}",
+                "report.configuration-not-understood",
                 file=MANIFEST,
-                remedy="use the version of strapdown that wrote it",
+                errors=error.errors()[0]["msg"],
             ) from None
         return _compare(root, again, manifest, digest)
 

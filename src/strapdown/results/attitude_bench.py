@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.results.answer import Answer, Cost, Share, Trials
 from strapdown.results.inputs import InputFiles, Reading
 from strapdown.results.rests import RestStretch, SamePose

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels.increments import LARGEST
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["apply", "common_shape", "proper_matrices", "rows_of", "unit_quaternions"]
 
@@ -25,9 +25,7 @@ def rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array
     array = np.asarray(values, dtype=np.float64)
     if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
         raise DataError(
-            f"shape {array.shape} does not end in {shape}",
-            quantity=name,
-            remedy=f"pass an array of shape (..., {', '.join(map(str, shape))})",
+            "geodesy.shape-does-not-end-2", quantity=name, shape=array.shape, shape_2=shape
         )
     leading = array.shape[: array.ndim - len(shape)]
     rows = np.ascontiguousarray(array.reshape(-1, int(np.prod(shape))))
@@ -35,10 +33,11 @@ def rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array
     bad = np.flatnonzero(~(np.abs(rows) < LARGEST).all(axis=1))
     if bad.size:
         raise DataError(
-            f"not a finite number below {LARGEST:g}: {rows[bad[0]].tolist()}",
+            "geodesy.not-finite-number-below",
             row=int(bad[0]) + 1,
             quantity=name,
-            remedy="leave that row out",
+            largest=LARGEST,
+            rows=rows[bad[0]].tolist(),
         )
     return rows, leading
 
@@ -50,10 +49,10 @@ def unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
     bad = np.flatnonzero(np.abs(norm - 1.0) > _TOLERANCE)
     if bad.size:
         raise DataError(
-            f"a rotation needs a quaternion of norm 1, and this one has {norm[bad[0]]:.6g}",
+            "geodesy.rotation-needs-quaternion-norm",
             row=int(bad[0]) + 1,
             quantity=name,
-            remedy="normalise it, and check the order: scalar first (w, x, y, z)",
+            norm=norm[bad[0]],
         )
     return rows / norm[:, None], leading
 
@@ -66,11 +65,11 @@ def proper_matrices(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     bad = np.flatnonzero(~(loss <= _TOLERANCE) | ~(np.linalg.det(matrices) > 0))
     if bad.size:
         raise DataError(
-            "not a rotation: C^T C differs from the identity by "
-            f"{loss[bad[0]]:.3g}, determinant {np.linalg.det(matrices[bad[0]]):.3g}",
+            "geodesy.not-rotation-c-t-c",
             row=int(bad[0]) + 1,
             quantity="direction cosine matrix",
-            remedy="pass right-handed orthogonal matrices with C_nb @ v_b = v_n",
+            loss=loss[bad[0]],
+            det=np.linalg.det(matrices[bad[0]]),
         )
     return rows, leading
 
@@ -80,10 +79,7 @@ def common_shape(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
     try:
         return np.broadcast_shapes(a, b)
     except ValueError:
-        raise DataError(
-            f"leading shapes {a} and {b} do not go together",
-            remedy="pass as many of the one as of the other, or one of either",
-        ) from None
+        raise DataError("geodesy.leading-shapes-do-not-go", a=a, b=b) from None
 
 
 def apply(

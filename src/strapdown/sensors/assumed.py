@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.triad_numbers import finite, triple
 
@@ -74,12 +74,7 @@ class Assumed:
 
     def __post_init__(self) -> None:
         if self.turn_sd_deg is None and self.delta_v_sd is None:
-            raise ConfigError(
-                "nothing is assumed",
-                quantity="assumed",
-                remedy="give turn_sd_deg for a missing gyro, delta_v_sd for a missing "
-                "accelerometer axis, or both",
-            )
+            raise ConfigError("sensors.nothing-assumed", quantity="assumed")
         for name, unit, most in (
             ("turn_sd_deg", "deg: roll, pitch, heading", MOST_TURN),
             ("delta_v_sd", "m/s: forward, right, down", MOST_CHANGE),
@@ -90,9 +85,7 @@ class Assumed:
         object.__setattr__(self, "over", _stretch(self.over))
         if not isinstance(self.because, str):
             raise ConfigError(
-                f"this is of kind {type(self.because).__name__}",
-                quantity="assumed, because",
-                remedy="give the reason in words, or leave it out",
+                "sensors.kind", quantity="assumed, because", name=type(self.because).__name__
             )
 
     def sd_of(self, name: str) -> Triad:
@@ -138,7 +131,12 @@ def _sds(given: object, name: str, unit: str, most: float) -> Triad:
         given = (given, given, given)
     numbers = triple(given, f"assumed, {name}", remedy)
     if any(x < 0.0 or x > most for x in numbers):
-        raise ConfigError(f"{given!r} is out of range", quantity=f"assumed, {name}", remedy=remedy)
+        raise ConfigError(
+            "sensors.message",
+            quantity=f"assumed, {name}",
+            message=f"{given!r} is out of range",
+            remedy_text=remedy,
+        )
     return numbers
 
 
@@ -149,9 +147,6 @@ def _stretch(given: object) -> tuple[float, float]:
         start = end = math.nan
     if not (math.isfinite(start) and math.isfinite(end) and 0.0 < end - start <= LONGEST):
         raise ConfigError(
-            f"{given!r} is no stretch",
-            quantity="assumed, over",
-            remedy=f"give its start and end in s from the trigger, as (0.0, 0.15), {LONGEST:g} s "
-            "at most",
+            "sensors.no-stretch", quantity="assumed, over", given=given, longest=LONGEST
         )
     return start, end

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["NAMED_AXES", "axes_letters", "check_axes_matrix", "report_transposed"]
 
@@ -54,27 +54,22 @@ def check_axes_matrix(matrix: ArrayLike, quantity: str = "matrix") -> Array:
     except (TypeError, ValueError):
         m = np.empty(0)
     if m.shape != (3, 3) or not np.isfinite(m).all():
-        raise ConfigError(
-            "it is not three rows of three finite numbers",
-            quantity=quantity,
-            remedy="give the body's forward, right and down, each along the sensor's x, y, z: "
-            "[[1, 0, 0], [0, -1, 0], [0, 0, -1]] for a sensor with axes forward, left, up",
-        )
+        raise ConfigError("sensors.not-three-rows-three-finite", quantity=quantity)
     product = m @ m.T
     worst = np.unravel_index(np.argmax(np.abs(product - np.eye(3))), (3, 3))
     if abs(product[worst] - (worst[0] == worst[1])) > ROUNDING:
         raise ConfigError(
-            _not_square(product, (int(worst[0]), int(worst[1]))),
+            "sensors.message",
             quantity=quantity,
-            remedy="write cosines with four decimals or more; scale factors and misalignments of "
-            "the sensor do not belong here",
+            message=_not_square(product, (int(worst[0]), int(worst[1]))),
+            remedy_text="write cosines with four decimals or more; scale factors and misalignments of the sensor do not belong here",
         )
     if np.linalg.det(m) < 0.0:
         raise ConfigError(
-            "it is a mirror image (its determinant is -1), which turns no right-handed sensor "
-            "into a right-handed body",
+            "sensors.message",
             quantity=quantity,
-            remedy=_unmirrored(m),
+            message="it is a mirror image (its determinant is -1), which turns no right-handed sensor into a right-handed body",
+            remedy_text=_unmirrored(m),
         )
     u, _, vt = np.linalg.svd(m)
     return np.asarray(u @ vt)
@@ -169,11 +164,6 @@ def report_transposed(
     tilt = float(np.degrees(np.arccos(np.clip(-up[2], -1.0, 1.0))))
     return (
         Finding(
-            f"the matrix looks transposed: with it the body lies {tilt:.0f}° from level, and with "
-            "its rows and columns exchanged it stands upright",
-            file=file,
-            quantity=quantity,
-            remedy="rows are the body's forward, right, down, in components along the sensor's "
-            "x, y, z; exchange rows and columns if yours are the other way round",
+            "sensors.matrix-looks-transposed-body-lies", file=file, quantity=quantity, tilt=tilt
         ),
     )

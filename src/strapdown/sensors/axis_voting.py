@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.parity import checked_directions
 from strapdown.sensors.voting_rule import AxisErrors, VotingRule
 from strapdown.tables.checks import is_number
@@ -131,21 +131,17 @@ class AxisVoting:
         groups = np.asarray(list(own), dtype=np.int64)
         if len(self.errors.bias) != len(h) or groups.size != len(h):
             raise ConfigError(
-                f"{len(h)} directions, {len(self.errors.bias)} errors and {groups.size} groups",
+                "sensors.directions-errors-groups",
                 quantity="errors",
-                remedy="give one of each for each axis",
+                count=len(h),
+                count_2=len(self.errors.bias),
+                size=groups.size,
             )
         if not (is_number(self.rate) and 0.0 < self.rate < math.inf):
-            raise ConfigError(
-                f"{self.rate!r} is no rate", quantity="rate", remedy="give hertz above zero"
-            )
+            raise ConfigError("sensors.no-rate", quantity="rate", rate=self.rate)
         if not (self._one_second() > 0.0).all():
             k = int(np.argmin(self._one_second()))
-            raise ConfigError(
-                f"neither noise nor bias is stated of axis {k + 1}",
-                quantity="errors",
-                remedy="state them: axes are weighed and held against each other by these",
-            )
+            raise ConfigError("sensors.neither-noise-nor-bias-stated", quantity="errors", k=k + 1)
         object.__setattr__(self, "groups", groups)
 
     @property
@@ -210,9 +206,11 @@ class AxisVoting:
         aside = np.zeros((len(z), 3)) if other is None else np.nan_to_num(np.array(other, float))
         if z.ndim != 2 or z.shape[1] != len(h) or aside.shape != (len(z), 3):
             raise DataError(
-                f"readings of the shape {z.shape}, and {aside.shape} of the other triad",
+                "sensors.readings-shape-other-triad",
                 quantity="readings",
-                remedy=f"give {len(h)} columns, one an axis, and three of the other triad",
+                shape=z.shape,
+                shape_2=aside.shape,
+                count=len(h),
             )
         arrays = tuple(a.copy() for a in state.arrays)
         fused, used = np.empty((len(z), 3)), np.zeros((len(z), len(h)), dtype=bool)
@@ -243,10 +241,10 @@ class AxisVoting:
         if raw and int(raw[-1][1]) == kernel.TOO_FEW:
             row = int(raw[-1][0])
             raise DataError(
-                f"{int(used[row].sum())} healthy axes are left, and they do not span the space",
+                "sensors.healthy-axes-left-they-do",
                 row=row + 1,
                 quantity="readings",
-                remedy="cut the log before, or state larger uncertainties if these axes are sound",
+                used=int(used[row].sum()),
             )
         kinds = {kernel.EXCLUDED: "excluded", kernel.READMITTED: "readmitted"}
         events = []

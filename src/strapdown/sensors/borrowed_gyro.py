@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.onto_stamps import TriadAtStamps
 from strapdown.sensors.triad_errors import Triad, triad_of
@@ -37,18 +37,24 @@ def check_lenders(units: dict[str, CrashUnit]) -> None:
         having = [u.name for u in units.values() if u.gyro is not None]
         if unit.gyro_from not in units:
             raise ConfigError(
-                f"unit {unit.name} borrows the gyro of {unit.gyro_from!r}, which is not among the "
-                "units",
+                "sensors.unit-borrows-gyro-not-among"
+                if having
+                else "sensors.unit-borrows-gyro-not-among-2",
                 quantity="gyro_from",
-                remedy=nearest(unit.gyro_from, having) if having else "give a unit with a gyro",
+                name=unit.name,
+                gyro_from=unit.gyro_from,
+                word=unit.gyro_from,
+                known=having,
             )
         if units[unit.gyro_from].gyro is None:
             raise ConfigError(
-                f"unit {unit.name} borrows the gyro of {unit.gyro_from}, which has none either",
-                quantity="gyro_from",
-                remedy=f"borrow from a unit that has one: {', '.join(having)}"
+                "sensors.unit-borrows-gyro-none-either"
                 if having
-                else "give a unit with a gyro",
+                else "sensors.unit-borrows-gyro-none-either-2",
+                quantity="gyro_from",
+                name=unit.name,
+                gyro_from=unit.gyro_from,
+                having=having,
             )
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue_keys import KEYS, Key
 from strapdown.sensors.error_draws import child
 from strapdown.sensors.triad_errors import ImuErrors, Matrix, Triad, TriadErrors
@@ -132,12 +132,10 @@ def load_sensor(name: str | Path) -> Sensor:
     path = Path(text)
     if path.suffix.lower() != ".toml":
         raise ConfigError(
-            f"'{text}' is no sensor",
-            quantity="sensor",
-            remedy=f"{nearest(text.lower(), SENSORS)} Or give the path of a .toml file.",
+            "sensors.no-sensor", quantity="sensor", text=text, word=text.lower(), known=SENSORS
         )
     if not path.is_file():
-        raise ConfigError("there is no such file", file=text, remedy="check the path")
+        raise ConfigError("sensors.no-such-file", file=text)
     return _read(path)
 
 
@@ -145,16 +143,14 @@ def _read(path: Path) -> Sensor:
     try:
         table = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(
-            f"it is no TOML: {error}", file=path.name, remedy="mend it where it says"
-        ) from None
+        raise ConfigError("sensors.no-toml", file=path.name, error=error) from None
     _known(table, TOP, path, "")
     title, summary, grade = (_text(table, key, path) for key in ("title", "summary", "class"))
     if grade not in GRADES:
-        raise _bad(path, "class", f"'{grade}' is no class", nearest(grade, GRADES))
+        raise _bad(path, "class", "sensors.no-class", grade=grade, word=grade, known=GRADES)
     documents = table.get("sources", {})
     if not isinstance(documents, dict):
-        raise _bad(path, "sources", "it is no table", "write [sources], one document a line")
+        raise _bad(path, "sources", "sensors.no-table")
     figures: list[Figure] = []
     triads: dict[str, TriadErrors] = {}
     spreads: dict[str, dict[str, Spread]] = {}
@@ -164,7 +160,7 @@ def _read(path: Path) -> Sensor:
             triads[triad], spreads[triad] = _triad(table[triad], triad, documents, path, figures)
             rates.update((triad, f.value[0]) for f in figures if f.key == f"{triad}.output_rate_hz")
     if not triads:
-        raise _bad(path, "gyro, accel", "there is neither", "write [gyro], [accel] or both")
+        raise _bad(path, "gyro, accel", "sensors.neither")
     return Sensor(
         path.stem,
         title,
@@ -181,7 +177,7 @@ def _triad(
     table: Any, triad: str, documents: Mapping[str, Any], path: Path, figures: list[Figure]
 ) -> tuple[TriadErrors, dict[str, Spread]]:
     if not isinstance(table, dict):
-        raise _bad(path, triad, "it is no table", f"write [{triad}]")
+        raise _bad(path, triad, "sensors.no-table-2", triad=triad)
     _known(table, KEYS[triad], path, f"{triad}.")
     errors: dict[str, Any] = {}
     spreads: dict[str, Spread] = {}
@@ -192,7 +188,7 @@ def _triad(
         if key.quantity == "output_rate":
             continue
         if key.quantity in errors or key.quantity in spreads:
-            raise _bad(path, place, "the quantity is stated twice", "keep one of the two")
+            raise _bad(path, place, "sensors.quantity-stated-twice")
         size = _si(figure, key)
         if key.spread != "value":
             spreads[key.quantity] = Spread(key.spread, size)
@@ -201,12 +197,7 @@ def _triad(
         else:
             errors[key.quantity] = size
     if "bias_instability" in errors and "correlation_time" not in errors:
-        raise _bad(
-            path,
-            f"{triad}.correlation_time_s",
-            "a bias instability needs it, and it is missing",
-            "state it, if need be as assumed",
-        )
+        raise _bad(path, f"{triad}.correlation_time_s", "sensors.bias-instability-needs-missing")
     try:
         nominal = TriadErrors(**errors)
         # The worst unit must be one that can exist, or a draw would fail for some seeds.
@@ -228,13 +219,15 @@ def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) ->
         isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) and x >= 0.0
         for x in numbers
     ):
-        raise _bad(path, place, f"the value is {given!r}", "give one number, or [x, y, z]")
+        raise _bad(path, place, "sensors.value", given=given)
     source, assumed = entry.get("source", ""), entry.get("assumed", "")
     if bool(source) == bool(assumed):
         raise _bad(path, place, "it must have either a source or a reason to assume it", form)
     if source:
         if source not in documents:
-            raise _bad(path, place, f"there is no source '{source}'", nearest(source, documents))
+            raise _bad(
+                path, place, "sensors.no-source", source=source, word=source, known=documents
+            )
         where = entry.get("place", "")
         source = f"{documents[source]}, {where}" if where else str(documents[source])
     x, y, z = (float(n) for n in numbers)
@@ -302,15 +295,17 @@ def _matrix(rows: np.ndarray[Any, Any]) -> Matrix:
 def _known(table: Mapping[str, Any], known: Any, path: Path, prefix: str) -> None:
     for key in table:
         if key not in known:
-            raise _bad(path, f"{prefix}{key}", "there is no such key", nearest(key, known))
+            raise _bad(path, f"{prefix}{key}", "sensors.no-such-key", word=key, known=known)
 
 
 def _text(table: Mapping[str, Any], key: str, path: Path) -> str:
     value = table.get(key)
     if not isinstance(value, str) or not value:
-        raise _bad(path, key, "it is missing, or no text", f'write {key} = "…"')
+        raise _bad(path, key, "sensors.missing-or-no-text", key=key)
     return value
 
 
 def _bad(path: Path, key: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError(what, file=path.name, quantity=key, remedy=remedy)
+    return ConfigError(
+        "sensors.message", file=path.name, quantity=key, message=what, remedy_text=remedy
+    )

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.equal_runs import equal_runs
 
 __all__ = ["ChannelHealth", "Fault", "check_channel", "check_peers"]
@@ -139,9 +139,11 @@ def check_channel(
     rest = v[t < rest_until]
     if rest.size < LEAST_REST:
         raise DataError(
-            f"{rest.size} samples before {rest_until:g} s: too few for its noise",
+            "sensors.samples-before-too-few-noise",
             quantity=name,
-            remedy=f"give a record with at least {LEAST_REST} samples before the impact",
+            size=rest.size,
+            rest_until=rest_until,
+            least_rest=LEAST_REST,
         )
     noise = float(rest.std(ddof=1))
     usual = _usual_run(rest)
@@ -217,26 +219,27 @@ def _fault(
     remedy: str,
 ) -> Fault:
     name = channel if isinstance(channel, str) else channel.name
-    return Fault(kind, at, size, limit, Finding(what, quantity=name, remedy=remedy))
+    return Fault(
+        kind,
+        at,
+        size,
+        limit,
+        Finding("sensors.message", quantity=name, message=what, remedy_text=remedy),
+    )
 
 
 def _arrays(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array]:
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or v.shape != t.shape:
-        raise DataError(
-            f"times have the shape {t.shape} and values {v.shape}",
-            quantity=name,
-            remedy="give one value for each time",
-        )
+        raise DataError("sensors.times-shape-values", quantity=name, shape=t.shape, shape_2=v.shape)
     bad = np.flatnonzero(~(np.isfinite(t) & np.isfinite(v)))
     back = np.flatnonzero(np.diff(t) <= 0.0) + 1
     if bad.size or back.size:
         row = int(bad[0] if bad.size else back[0]) + 1
         raise DataError(
-            "not a finite number" if bad.size else "time does not advance",
+            "sensors.not-finite-number" if bad.size else "sensors.time-does-not-advance",
             row=row,
             quantity=name,
-            remedy="mend or cut the record there",
         )
     return t, v
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from strapdown.constants import GYRO_UNITS
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 
@@ -31,7 +31,7 @@ def crash_priors(rate: float = 200.0) -> dict[str, TriadUncertainty]:
         The rate is not positive.
     """
     if not (math.isfinite(rate) and rate > 0.0):
-        raise ConfigError(f"{rate:g} Hz is no rate", quantity="rate", remedy="give it in Hz")
+        raise ConfigError("sensors.hz-no-rate", quantity="rate", rate=rate)
     return {
         "accel": TriadUncertainty(
             bias=0.2,

@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.assumed import Assumed
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.triad_numbers import FARTHEST, check_sd, triple
@@ -56,9 +56,10 @@ class Mounting:
             object.__setattr__(self, name, triple(getattr(self, name), name, how))
         if math.hypot(*self.position) > FARTHEST:
             raise ConfigError(
-                f"{self.position} is {math.hypot(*self.position):.4g} m from the vehicle's origin",
+                "sensors.vehicle-origin",
                 quantity="position",
-                remedy="give it in m: mm divided by 1000",
+                position=self.position,
+                hypot=math.hypot(*self.position),
             )
         check_sd(self.position_sd, "position_sd", "m")
         check_sd(self.angles_sd_deg, "angles_sd_deg", "deg")
@@ -114,10 +115,11 @@ class RecordedTriad:
             raise _kind(self.uncertainty, self.name, "uncertainty", "give a TriadUncertainty")
         if self.held is not None and np.shape(self.held) != (len(self.table), 3):
             raise ConfigError(
-                f"it has the shape {np.shape(self.held)}, and the table {len(self.table)} rows",
+                "sensors.shape-table-rows",
                 file=self.name,
                 quantity="held",
-                remedy="leave it out: what is at an end of the range as recorded is found",
+                shape=np.shape(self.held),
+                count=len(self.table),
             )
 
 
@@ -192,8 +194,9 @@ class CrashUnit:
 
 def _kind(given: object, name: object, quantity: str, remedy: str) -> ConfigError:
     return ConfigError(
-        f"this is of kind {type(given).__name__}",
+        "sensors.message",
         file=str(name),
         quantity=quantity,
-        remedy=remedy,
+        message=f"this is of kind {type(given).__name__}",
+        remedy_text=remedy,
     )

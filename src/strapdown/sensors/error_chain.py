@@ -23,7 +23,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.error_draws import (
     JITTER,
     Seed,
@@ -175,10 +175,10 @@ def jitter(errors: TriadErrors, steps: Array, seed: Seed) -> Array:
     shortest = float(steps.min())
     if errors.jitter > MOST_JITTER * shortest:
         raise ConfigError(
-            f"a jitter of {errors.jitter:.3g} s is more than a tenth of the interval of "
-            f"{shortest:.3g} s",
+            "sensors.jitter-more-than-tenth-interval",
             quantity="jitter",
-            remedy="sample more slowly, or give less jitter",
+            jitter=errors.jitter,
+            shortest=shortest,
         )
     if errors.jitter == 0.0:
         return np.zeros(steps.size)
@@ -188,24 +188,16 @@ def jitter(errors: TriadErrors, steps: Array, seed: Seed) -> Array:
 def _rows(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array]:
     t, v = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
     if t.ndim != 1 or t.size < 2 or v.shape != (t.size, 3):
-        raise DataError(
-            f"time has the shape {t.shape} and the values {v.shape}",
-            quantity=name,
-            remedy="pass at least two stamps, and one row of three values for each",
-        )
+        raise DataError("sensors.time-shape-values", quantity=name, shape=t.shape, shape_2=v.shape)
     if not (np.isfinite(t).all() and (np.diff(t) > 0.0).all()):
-        raise DataError(
-            "time does not advance", quantity="time", remedy="sort and drop repeated stamps"
-        )
+        raise DataError("sensors.time-does-not-advance-2", quantity="time")
     return t, v
 
 
 def _is_mean(sampling: str) -> bool:
     if sampling not in SAMPLINGS:
         raise ConfigError(
-            f"'{sampling}' is no kind of sampling",
-            quantity="sampling",
-            remedy=f"use {' or '.join(SAMPLINGS)}",
+            "sensors.no-kind-sampling", quantity="sampling", sampling=sampling, samplings=SAMPLINGS
         )
     return sampling == "mean"
 
@@ -254,11 +246,7 @@ def _g_effect(errors: TriadErrors, like: Array, specific_force: ArrayLike | None
     if not matrix.any():
         return np.zeros_like(like)
     if specific_force is None:
-        raise ConfigError(
-            "the triad feels the specific force, and none was given",
-            quantity="g_sensitivity",
-            remedy="pass specific_force, (n, 3) in m/s²",
-        )
+        raise ConfigError("sensors.triad-feels-specific-force-none", quantity="g_sensitivity")
     f = _alike(specific_force, like, "specific_force")
     return np.asarray(f @ matrix.T, dtype=np.float64)
 
@@ -273,11 +261,7 @@ def _rectified(errors: TriadErrors, like: Array, vibration: ArrayLike | None) ->
 def _alike(values: ArrayLike, like: Array, name: str) -> Array:
     out = np.asarray(values, dtype=np.float64)
     if out.shape != like.shape:
-        raise DataError(
-            f"it has the shape {out.shape}, and the values {like.shape}",
-            quantity=name,
-            remedy="pass one row of three values a sample",
-        )
+        raise DataError("sensors.shape-values", quantity=name, shape=out.shape, shape_2=like.shape)
     return out
 
 

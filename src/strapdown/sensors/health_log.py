@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -186,7 +186,14 @@ class HealthLog:
         """Make a fault of samples ``span[0]`` to ``span[1]``, both included."""
         name = channel if isinstance(channel, str) else self.names[channel]
         a, b = span
-        finding = Finding(what, self.source, a + 1, name, remedy)
+        finding = Finding(
+            "sensors.message",
+            file=self.source,
+            row=a + 1,
+            quantity=name,
+            message=what,
+            remedy_text=remedy,
+        )
         begin, end = float(self.time[a]), float(self.time[b])
         return ChannelFault(name, kind, begin, end, a, b, size, limit, finding)
 
@@ -215,10 +222,11 @@ def health_log(
     time = index_of(imu)
     if time.size < LEAST_SAMPLES:
         raise DataError(
-            f"{time.size} samples are too few to tell a channel's habits",
+            "sensors.samples-too-few-tell-channel",
             file=source,
             quantity="time",
-            remedy=f"give a record of {LEAST_SAMPLES} samples or more",
+            size=time.size,
+            least_samples=LEAST_SAMPLES,
         )
     check_time(time, source)
     values = np.ascontiguousarray(values_of(imu, names).T)

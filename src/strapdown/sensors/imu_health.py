@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.earth import gravity as normal_gravity
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.sensors.health_jump import find_jumps
 from strapdown.sensors.health_log import ChannelFault, HealthLog, health_log
 from strapdown.sensors.health_noise import find_noisy
@@ -201,9 +201,7 @@ def check_imu_channels(
     """
     if not 0.0 < false_alarm < 0.5:
         raise ConfigError(
-            f"{false_alarm!r} is no rate of false alarms",
-            quantity="false_alarm",
-            remedy="give a probability, as 1e-6",
+            "sensors.no-rate-false-alarms", quantity="false_alarm", false_alarm=false_alarm
         )
     if gravity is None:
         least = float(normal_gravity(0.0, HIGHEST)[2]) - ANOMALY
@@ -211,9 +209,7 @@ def check_imu_channels(
     elif math.isfinite(gravity) and gravity > 0.0:
         least = most = float(gravity)
     else:
-        raise ConfigError(
-            f"{gravity!r} is no gravity", quantity="gravity", remedy="give m/s² above zero"
-        )
+        raise ConfigError("sensors.no-gravity", quantity="gravity", gravity=gravity)
     log = health_log(imu, sensors, (least, most), false_alarm)
     faults: list[ChannelFault] = []
     for test in TESTS.values():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import Sensor
 from strapdown.sensors.sensor_uncertainty import uncertainty_of
 from strapdown.sensors.triad_errors import Triad, TriadErrors, TriadLike
@@ -35,16 +35,12 @@ class BiasDrift:
             (self.sd,) * 3 if isinstance(self.sd, int | float) else tuple(self.sd)
         )
         if len(given) != 3 or not all(is_number(x) and 0.0 <= x < math.inf for x in given):
-            raise ConfigError(
-                f"{self.sd!r} is no standard deviation",
-                quantity="sd",
-                remedy="give zero or more, one number or three",
-            )
+            raise ConfigError("sensors.no-standard-deviation", quantity="sd", sd=self.sd)
         if not is_number(self.correlation_time) or not self.correlation_time > 0.0:
             raise ConfigError(
-                f"{self.correlation_time!r} is no time",
+                "sensors.no-time",
                 quantity="correlation_time",
-                remedy="give seconds above zero, or inf",
+                correlation_time=self.correlation_time,
             )
         object.__setattr__(self, "sd", tuple(float(x) for x in given))
 

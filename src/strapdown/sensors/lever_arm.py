@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.local_slope import LocalSlope, local_slope
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.rotation import cross_matrix
 from strapdown.sensors.prepared_unit import PreparedUnit
 from strapdown.sensors.triad_numbers import triple
@@ -147,9 +147,7 @@ def move_imu(
     r = np.asarray(lever_arm, dtype=np.float64)
     if r.shape != (3,) or not np.isfinite(r).all():
         raise ConfigError(
-            f"{lever_arm!r} are not three finite numbers",
-            quantity="lever arm",
-            remedy="give forward, right, down in m from the sensor to the point",
+            "sensors.not-three-finite-numbers", quantity="lever arm", lever_arm=lever_arm
         )
     time = imu.index.to_numpy(dtype=np.float64)
     gyro = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float64))
@@ -245,23 +243,18 @@ def _covariances(noise: ArrayLike, n: int) -> Array:
     if given.ndim == 3:
         if given.shape != (n, 3, 3):
             raise ConfigError(
-                f"covariances of shape {given.shape} do not go with {n} samples",
-                quantity="gyro_noise",
-                remedy="give (n, 3, 3)",
+                "sensors.covariances-shape-do-not-go", quantity="gyro_noise", shape=given.shape, n=n
             )
         return given
     try:
         sd = np.broadcast_to(given, (n, 3))
     except ValueError:
         raise ConfigError(
-            f"standard deviations of shape {given.shape} do not go with {n} samples",
+            "sensors.standard-deviations-shape-do-not",
             quantity="gyro_noise",
-            remedy="give one number, three, or one row a sample",
+            shape=given.shape,
+            n=n,
         ) from None
     if not (np.isfinite(sd).all() and (sd >= 0.0).all() and math.isfinite(float(sd.sum()))):
-        raise ConfigError(
-            "a standard deviation is negative or not finite",
-            quantity="gyro_noise",
-            remedy="give zero or more",
-        )
+        raise ConfigError("sensors.standard-deviation-negative-or-not", quantity="gyro_noise")
     return np.asarray(sd[:, :, None] ** 2 * np.eye(3), dtype=np.float64)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 
 __all__ = ["MountedUnit"]
@@ -43,10 +43,5 @@ class MountedUnit:
         c = np.asarray(self.mounting, dtype=np.float64)
         good = c.shape == (3, 3) and np.isfinite(c).all()
         if not good or np.abs(c @ c.T - np.eye(3)).max() > ROTATION or np.linalg.det(c) < 0.0:
-            raise ConfigError(
-                "its mounting is no rotation",
-                file=self.name,
-                quantity="mounting",
-                remedy="give three orthonormal columns, the unit's axes in body axes",
-            )
+            raise ConfigError("sensors.mounting-no-rotation", file=self.name, quantity="mounting")
         object.__setattr__(self, "mounting", c)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.dsp.decimation import Resampled, decimate, low_pass_design, mean_samples
 from strapdown.dsp.interpolation import interpolate, interpolated_means
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.sensors.saturation import RangeLimits, find_limits
 from strapdown.sensors.triad_channels import OVER_RANGE, AxisGroup, TriadChannels
@@ -261,16 +261,24 @@ def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float)
         return []
     return [
         Finding(
-            f"{', '.join(names)} at {own:.5g} Hz, slower than the common stamps at {rate:g} Hz, "
-            "interpolated by polynomials through six samples",
+            "sensors.hz-slower-than-common-stamps",
             file=source,
             quantity="time",
-            remedy=f"nothing above some {own / 8.0:.3g} Hz is kept to a part in a thousand; use a "
-            "lower rate if that matters",
+            names=names,
+            own=own,
+            rate=rate,
+            own_2=own / 8.0,
         )
     ]
 
 
 def _named(error: DataError, source: str) -> DataError:
     f = error.finding
-    return DataError(f.what, file=source, row=f.row, quantity=f.quantity, remedy=f.remedy)
+    return DataError(
+        "sensors.message",
+        file=source,
+        row=f.row,
+        quantity=f.quantity,
+        message=f.what,
+        remedy_text=f.remedy,
+    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -26,25 +26,18 @@ def checked_directions(directions: ArrayLike) -> Array:
     """
     h = np.asarray(directions, dtype=np.float64)
     if h.ndim != 2 or h.shape[1] != 3 or h.shape[0] < 3 or not np.isfinite(h).all():
-        raise ConfigError(
-            f"directions of the shape {h.shape}",
-            quantity="directions",
-            remedy="give one row of three a sensitive axis, three rows or more",
-        )
+        raise ConfigError("sensors.directions-shape", quantity="directions", shape=h.shape)
     off = np.abs(np.sqrt((h**2).sum(axis=1)) - 1.0)
     if off.max() > 1e-6:
         raise ConfigError(
-            f"row {int(off.argmax()) + 1} has the length {1.0 + off.max():.6g} or its inverse",
+            "sensors.row-length-or-inverse",
             quantity="directions",
-            remedy="give unit vectors; a scale factor belongs to the sensor",
+            argmax=int(off.argmax()) + 1,
+            off=1.0 + off.max(),
         )
     values = np.linalg.svd(h, compute_uv=False)
     if values[-1] < RANK * values[0]:
-        raise ConfigError(
-            "all axes lie in one plane",
-            quantity="directions",
-            remedy="give axes that span the space",
-        )
+        raise ConfigError("sensors.all-axes-lie-plane", quantity="directions")
     return np.ascontiguousarray(h)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.triad_errors import Triad

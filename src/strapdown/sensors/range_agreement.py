@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.saturation import RangeLimits
 from strapdown.sensors.unit_checks import UnitArrays
@@ -99,11 +99,11 @@ def agreement_findings(
         if int(clear.sum()) < LEAST_SAMPLES:
             found.append(
                 Finding(
-                    f"there are {int(clear.sum())} samples in which both it and {low.name} are "
-                    "clear of their ends: nothing ties the two together",
+                    "sensors.samples-both-clear-their-ends",
                     file=source,
                     quantity="accel",
-                    remedy="give a record that begins before the crash, or leave one range out",
+                    clear=int(clear.sum()),
+                    name=low.name,
                 )
             )
             continue
@@ -136,10 +136,11 @@ def agreement_findings(
                 remedy = "one of the two is in g: multiply it by 9.80665"
             found.append(
                 Finding(
-                    what + ", where both are within their range",
+                    "sensors.message",
                     file=source,
                     quantity=f"accel_{axis}",
-                    remedy=remedy,
+                    message=what + ", where both are within their range",
+                    remedy_text=remedy,
                 )
             )
     return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.saturation import RangeLimits
 from strapdown.tables.checks import check_rows, check_time
 
@@ -209,29 +209,30 @@ def _check(
 ) -> None:
     if not values or not len(values) == len(limits) == len(noise):
         raise DataError(
-            f"{len(values)} ranges with limits of {len(limits)} and noise of {len(noise)}",
+            "sensors.ranges-limits-noise",
             quantity="ranges",
-            remedy="pass one of each for every range",
+            count=len(values),
+            count_2=len(limits),
+            count_3=len(noise),
         )
     check_time(time, None)
     for j, y in enumerate(values):
         if y.shape != (time.size, 3) or noise[j].shape != y.shape:
             raise DataError(
-                f"range {j} has shape {y.shape}, its noise {noise[j].shape}, and there are "
-                f"{time.size} stamps",
+                "sensors.range-shape-noise-stamps",
                 quantity="ranges",
-                remedy="bring all ranges to the same stamps first",
+                j=j,
+                shape=y.shape,
+                shape_2=noise[j].shape,
+                size=time.size,
             )
         check_rows(y, [f"range {j} {axis}" for axis in "xyz"], None)
     if not (0.0 <= margin < 1.0 and 0.0 <= hysteresis < 1.0 - margin):
         raise ConfigError(
-            f"a margin of {margin:g} and a hysteresis of {hysteresis:g} leave no range",
+            "sensors.margin-hysteresis-leave-no-range",
             quantity="margin",
-            remedy="give parts of the full scale, together below one",
+            margin=margin,
+            hysteresis=hysteresis,
         )
     if not fade >= 0.0:
-        raise ConfigError(
-            f"{fade:g} s is no length of a cross-fade",
-            quantity="fade",
-            remedy="give zero or more",
-        )
+        raise ConfigError("sensors.no-length-cross-fade", quantity="fade", fade=fade)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.low_pass import low_pass
 
 __all__ = ["RedundantComparison", "compare_redundant"]
@@ -106,40 +106,27 @@ def compare_redundant(
     label = f"{names[0]} and {names[1]}"
     if t.ndim != 1 or t.size < 2 or first.shape != t.shape or second.shape != t.shape:
         raise DataError(
-            f"shapes {first.shape}, {second.shape} and {t.shape} of the times",
+            "sensors.shapes-times",
             quantity=label,
-            remedy="cut both to the stamps that they share",
+            shape=first.shape,
+            shape_2=second.shape,
+            shape_3=t.shape,
         )
     both = np.column_stack([first, second])
     bad = np.flatnonzero(~np.isfinite(both).all(axis=1))
     if bad.size:
-        raise DataError(
-            "not a finite number",
-            row=int(bad[0]) + 1,
-            quantity=label,
-            remedy="cut the record there",
-        )
+        raise DataError("sensors.not-finite-number-2", row=int(bad[0]) + 1, quantity=label)
     if not bandwidth > 0.0:
-        raise ConfigError(
-            f"a bandwidth of {bandwidth} Hz is none", quantity="bandwidth", remedy="give hertz"
-        )
+        raise ConfigError("sensors.bandwidth-hz-none", quantity="bandwidth", bandwidth=bandwidth)
     if rest_until is not None:
         rest = t < rest_until
         if not rest.any():
-            raise DataError(
-                f"no sample before {rest_until:g} s",
-                quantity=label,
-                remedy="give rest_until within the record, or leave it out",
-            )
+            raise DataError("sensors.no-sample-before", quantity=label, rest_until=rest_until)
         both = both - both[rest].mean(axis=0)
     x, y = low_pass(t, both, bandwidth).T
     power = float(x @ x)
     if power == 0.0 or not np.any(y):
-        raise DataError(
-            "one of them is zero throughout",
-            quantity=label,
-            remedy="it is dead: use the other, and look at it alone",
-        )
+        raise DataError("sensors.them-zero-throughout", quantity=label)
     found_correlation = float(np.corrcoef(x, y)[0, 1])
     gain = float(x @ y) / power
     difference = y - x
@@ -152,28 +139,24 @@ def compare_redundant(
     if found_correlation < correlation:
         findings.append(
             Finding(
-                f"they correlate by {found_correlation:.4f} below {bandwidth:g} Hz, and "
-                f"{correlation:g} is the least of two that tell the same",
+                "sensors.they-correlate-below-hz-least",
                 quantity=label,
-                remedy="find which by a third channel or by each alone; check place and axis",
+                found_correlation=found_correlation,
+                bandwidth=bandwidth,
+                correlation=correlation,
             )
         )
     if abs(gain - 1.0) > gain_error:
-        findings.append(
-            Finding(
-                f"the gain of one on the other is {gain:.4f}",
-                quantity=label,
-                remedy="check sensitivities, units and axes; a gain near -1 is a turned sensor",
-            )
-        )
+        findings.append(Finding("sensors.gain-other", quantity=label, gain=gain))
     if share > integral_share:
         since = "" if apart_at is None else f", for good from {apart_at:.4f} s on"
         findings.append(
             Finding(
-                f"their integrals differ by up to {apart.max():.3g}, {100 * share:.1f} % of the "
-                f"greatest{since}",
+                "sensors.their-integrals-differ-up-greatest",
                 quantity=label,
-                remedy="the zero of one moved, or it clipped: find which by a third channel",
+                apart=apart.max(),
+                share=100 * share,
+                since=since,
             )
         )
     return RedundantComparison(

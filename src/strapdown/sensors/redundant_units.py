@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.axis_voting import AxisVoting, VotingState
 from strapdown.sensors.fused_axes import fused_drift, fused_noise, fused_uncertainty
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -97,9 +97,7 @@ class UnitVoting:
         names = [u.name for u in self.units]
         if len(names) < 2 or len(set(names)) < len(names):
             raise ConfigError(
-                f"units {', '.join(map(repr, names))} cannot test each other",
-                quantity="units",
-                remedy="give two or more, each with a name of its own",
+                "sensors.units-cannot-test-each-other", quantity="units", map=map(repr, names)
             )
         directions = np.vstack([np.asarray(u.mounting).T for u in self.units])
         groups = np.repeat(np.arange(len(names)), 3)
@@ -206,11 +204,7 @@ class UnitVoting:
         gyro, accel = [], []
         for unit in self.units:
             if unit.name not in tables:
-                raise DataError(
-                    f"there is no table of unit '{unit.name}'",
-                    quantity="tables",
-                    remedy="give one for each unit; NaN where it was silent",
-                )
+                raise DataError("sensors.no-table-unit", quantity="tables", name=unit.name)
             table = tables[unit.name]
             source = source_of(table) or unit.name
             check_columns(table, [*GYRO, *ACCEL], source)
@@ -220,29 +214,27 @@ class UnitVoting:
                 time = own
                 if state.last and not own[0] > state.last[0]:
                     raise DataError(
-                        f"it begins at {own[0]:.9g} s, and the last segment ended at "
-                        f"{state.last[0]:.9g} s",
+                        "sensors.begins-last-segment-ended",
                         file=source,
                         row=1,
                         quantity="time",
-                        remedy="give segments in order, without overlap",
+                        own=own[0],
+                        last=state.last[0],
                     )
             if own.size != time.size or np.abs(own - time).max() > SAME_STAMP / self.rate:
                 raise DataError(
-                    f"its {own.size} stamps are not the {time.size} of {self.units[0].name}",
+                    "sensors.stamps-not",
                     file=source,
                     quantity="time",
-                    remedy="bring the units to one clock and the same stamps first",
+                    size=own.size,
+                    size_2=time.size,
+                    name=self.units[0].name,
                 )
             samplings.add(str(table.attrs.get("sampling", "instantaneous")))
             gyro.append(values_of(table, GYRO))
             accel.append(values_of(table, ACCEL))
         if len(samplings) > 1:
-            raise DataError(
-                "some units give instantaneous values and some means over their intervals",
-                quantity="sampling",
-                remedy="bring all to the same kind first",
-            )
+            raise DataError("sensors.some-units-give-instantaneous-values", quantity="sampling")
         assert time is not None  # two units at least
         return time, np.hstack(gyro), np.hstack(accel), samplings.pop()
 
@@ -272,11 +264,7 @@ def vote_units(
     """
     first = tables.get(units[0].name) if units else None
     if first is None or len(first) < 2:
-        raise DataError(
-            "there is no table of two samples or more of the first unit",
-            quantity="tables",
-            remedy="give one for each unit, by its name",
-        )
+        raise DataError("sensors.no-table-two-samples-or", quantity="tables")
     time = index_of(first)
     rate = float((time.size - 1) / (time[-1] - time[0]))
     voting = UnitVoting(units, rate, VotingRule() if rule is None else rule)

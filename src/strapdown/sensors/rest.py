@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results.rests import RestStretch
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
@@ -145,10 +145,13 @@ def rest_between(
     a, b = int(np.searchsorted(time, start)), int(np.searchsorted(time, end, side="right"))
     if b - a < LEAST_SAMPLES:
         raise DataError(
-            f"{max(b - a, 0)} samples between {start:.9g} and {end:.9g} s, too few for a mean",
+            "sensors.samples-between-too-few-mean",
             file=imu.attrs.get("source"),
             quantity="rest",
-            remedy=f"name a stretch of at least {LEAST_SAMPLES} samples within the log",
+            b=max(b - a, 0),
+            start=start,
+            end=end,
+            least_samples=LEAST_SAMPLES,
         )
     gyro = imu[GYRO].to_numpy(dtype=np.float64)
     accel = imu[ACCEL].to_numpy(dtype=np.float64) if set(ACCEL) <= set(imu.columns) else None

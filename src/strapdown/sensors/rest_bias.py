@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results.rests import GyroBiasCourse, RestStretch
 from strapdown.tables import GYRO
 
@@ -43,19 +43,10 @@ def gyro_bias_from_rests(rests: Sequence[RestStretch]) -> GyroBiasCourse:
         There is no rest, or they are not in order of time.
     """
     if not rests:
-        raise DataError(
-            "no stationary stretch was found to take it from",
-            quantity="gyro bias",
-            remedy="give the bias itself, as in --gyro-bias '4.5,0.1,1.1 deg/s', or a log of the "
-            "sensor lying still",
-        )
+        raise DataError("sensors.no-stationary-stretch-found-take", quantity="gyro bias")
     time = np.array([0.5 * (r.start + r.end) for r in rests])
     if (np.diff(time) <= 0.0).any():
-        raise DataError(
-            "the rests are not in order of time",
-            quantity="gyro bias",
-            remedy="sort them by their start",
-        )
+        raise DataError("sensors.rests-not-order-time", quantity="gyro bias")
     mean = np.array([r.gyro_mean for r in rests], dtype=np.float64)
     sd = np.maximum(np.array([_mean_sd(r) for r in rests]), LEAST_SD)
     weight = sd**-2.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import Sensor, Spread
 from strapdown.sensors.triad_errors import Triad, TriadLike
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -48,9 +48,11 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
     """
     if triad not in TRIADS or not any(f.key.startswith(f"{triad}.") for f in sensor.sources):
         raise ConfigError(
-            f"sensor '{sensor.name}' has no triad '{triad}'",
+            "sensors.sensor-no-triad",
             quantity="triad",
-            remedy=f"give one of {', '.join(TRIADS)} that the sensor has",
+            name=sensor.name,
+            triad=triad,
+            triads=TRIADS,
         )
     errors = sensor.imu_errors.gyro if triad == "gyro" else sensor.imu_errors.accel
     values: dict[str, Any] = {name: getattr(errors, name) for name in FACTS}
@@ -62,9 +64,7 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
         known = TriadUncertainty.__dataclass_fields__
         wrong = ", ".join(name for name in overrides if name not in known)
         raise ConfigError(
-            f"a triad has no '{wrong}'",
-            quantity="overrides",
-            remedy=f"give {', '.join(known)}",
+            "sensors.triad-no", quantity="overrides", wrong=wrong, known=known
         ) from None
 
 

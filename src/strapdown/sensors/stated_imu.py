@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import Sensor
 from strapdown.sensors.catalogue_keys import KEYS
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
@@ -60,7 +60,9 @@ def stated_imu(
         except ConfigError as error:
             f = error.finding
             what = (f.quantity or "").replace("uncertainty", triad)
-            raise ConfigError(f.what, quantity=what, remedy=f.remedy) from None
+            raise ConfigError(
+                "sensors.message", quantity=what, message=f.what, remedy_text=f.remedy
+            ) from None
         drifts[triad] = _drift(
             triad, slow, None if base is None else getattr(base, f"{triad}_drift")
         )
@@ -83,11 +85,7 @@ def _drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | None) -> 
         elif isinstance(given, int | float):
             time = float(given) * factor
         else:
-            raise ConfigError(
-                "one time belongs to all axes",
-                quantity=f"{triad}, {name}",
-                remedy="give one number",
-            )
+            raise ConfigError("sensors.time-belongs-all-axes", quantity=f"{triad}, {name}")
     return BiasDrift(sd, time if time > 0.0 else math.inf)
 
 
@@ -100,8 +98,9 @@ def _require(triad: str, known: TriadUncertainty) -> None:
         keys = [k for k in STATED_KEYS[triad] if k.startswith(said)]
         noun = "bias" if attribute == "bias" else "noise"
         raise ConfigError(
-            f"nothing states the {noun} of the {triad}s: every bound would be that of a perfect "
-            "sensor",
+            "sensors.nothing-states-every-bound-would",
             quantity=f"{triad}, {said}",
-            remedy=f"name a sensor of the catalogue, or state {' or '.join(keys[:2])}",
+            noun=noun,
+            triad=triad,
+            keys=keys[:2],
         )

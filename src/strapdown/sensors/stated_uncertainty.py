@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import Sensor
 from strapdown.sensors.catalogue_keys import KEYS, Key
 from strapdown.sensors.sensor_uncertainty import FACTS, SPREADS, uncertainty_of
@@ -55,15 +55,13 @@ def stated_uncertainty(
     for name, given in stated.items():
         if name not in keys:
             raise ConfigError(
-                "there is no such key", quantity=f"uncertainty, {name}", remedy=nearest(name, keys)
+                "sensors.no-such-key", quantity=f"uncertainty, {name}", word=name, known=keys
             )
         key = keys[name]
         attribute = SPREADS.get(key.quantity, key.quantity)
         if attribute in values:
             raise ConfigError(
-                f"it states the same as {said[attribute]}",
-                quantity=f"uncertainty, {name}",
-                remedy="keep one of the two",
+                "sensors.states-same", quantity=f"uncertainty, {name}", said=said[attribute]
             )
         factor = key.factor / (math.sqrt(3.0) if key.spread == "bound" else 1.0)
         one = isinstance(given, int | float)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.borrowed_gyro import check_lenders, turned_gyro
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
@@ -106,9 +106,11 @@ class SynchronisedUnits:
             if u.unit.name == name:
                 return u
         raise ConfigError(
-            f"there is no unit {name!r}",
+            "sensors.no-unit",
             quantity="name",
-            remedy=nearest(name, [u.unit.name for u in self.units]),
+            name=name,
+            word=name,
+            known=[u.unit.name for u in self.units],
         )
 
 
@@ -276,10 +278,7 @@ def _triads(u: UnitChannels) -> tuple[TriadChannels, ...]:
 def _channels(unit: CrashUnit) -> UnitChannels:
     if not unit.accelerometers and unit.gyro is None:
         raise DataError(
-            "it has neither accelerometers nor a gyro",
-            file=unit.name,
-            quantity="accelerometers",
-            remedy="give it a triad, or leave the unit out",
+            "sensors.neither-accelerometers-nor-gyro", file=unit.name, quantity="accelerometers"
         )
     return UnitChannels(
         unit,
@@ -294,10 +293,9 @@ def _reference(given: list[UnitChannels], name: str | None) -> UnitChannels:
     having = [u for u in given if u.unit.trigger is not None]
     if not having:
         raise DataError(
-            "no unit has a trigger, and time is counted from it",
+            "sensors.no-unit-trigger-time-counted",
             file=", ".join(u.unit.name for u in given),
             quantity="trigger",
-            remedy="give one unit the instant of the trigger on its clock, in s",
         )
     return having[0]
 
@@ -320,11 +318,14 @@ def _stamps(spans: list[tuple[str, float, float]], rate: float) -> Array:
     last = math.floor(earliest[2] * rate + 1e-6)
     if last - first + 1 < LEAST_STAMPS:
         raise DataError(
-            f"on the common clock it begins at {latest[1]:.6g} s, and {earliest[0]} ends at "
-            f"{earliest[2]:.6g} s: they share no stretch of {LEAST_STAMPS} samples at {rate:g} Hz",
+            "sensors.common-clock-begins-ends-they",
             file=latest[0],
             quantity="time",
-            remedy="check the triggers, and that all records are of one crash",
+            latest=latest[1],
+            earliest=earliest[0],
+            earliest_2=earliest[2],
+            least_stamps=LEAST_STAMPS,
+            rate=rate,
         )
     return np.arange(first, last + 1) / rate
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.sensors.onto_stamps import TriadAtStamps
 from strapdown.tables import ACCEL, GYRO
 
@@ -34,12 +34,11 @@ def end_findings(
             )
             found.append(
                 Finding(
-                    f"the low-pass is {kept}: outside, the record's ends were continued by their "
-                    "point mirror, and samples scatter up to "
-                    f"{float(t.noise_factor.max() / np.median(t.noise_factor)):.2g} times as much",
+                    "sensors.low-pass-outside-record-ends",
                     file=f"{name}, {t.triad.name}",
                     quantity="time",
-                    remedy="record longer before and after, or use means (sampling='mean')",
+                    kept=kept,
+                    noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
                 )
             )
     return found
@@ -61,16 +60,14 @@ def clipped_findings(
                 if rows.size:
                     found.append(
                         Finding(
-                            "samples of the record are at the end of its range, and count in "
-                            f"{rows.size} common stamps from {time[rows[0]]:.5g} s to "
-                            f"{time[rows[-1]]:.5g} s",
+                            "sensors.samples-record-end-range-count"
+                            if gyro
+                            else "sensors.samples-record-end-range-count-2",
                             file=f"{name}, {t.triad.name}",
                             quantity=column,
-                            remedy="what is cut off is missing from the attitude after it; borrow "
-                            "the gyro of another unit with a wider range"
-                            if gyro
-                            else "what is cut off is missing from delta-V: it is a lower bound on "
-                            "this axis",
+                            size=rows.size,
+                            time=time[rows[0]],
+                            time_2=time[rows[-1]],
                         )
                     )
     return found
@@ -92,23 +89,23 @@ def cut_findings(spans: Sequence[tuple[str, float, float]], time: Array) -> list
     if time[0] - first[1] > WORTH_A_WORD:
         found.append(
             Finding(
-                f"it begins last, at {latest[1]:.4g} s, and {first[0]} at {first[1]:.4g} s: what "
-                "is before is not used, and a stationary stretch in it is lost to the biases and "
-                "the levelling",
+                "sensors.begins-last-before-not-used",
                 file=latest[0],
                 quantity="time",
-                remedy="leave this part or unit out if it is not needed, or reconstruct it by "
-                "itself",
+                latest=latest[1],
+                first=first[0],
+                first_2=first[1],
             )
         )
     if last[2] - time[-1] > WORTH_A_WORD:
         found.append(
             Finding(
-                f"it ends first, at {earliest[2]:.4g} s, and {last[0]} at {last[2]:.4g} s: what "
-                "is after is not used",
+                "sensors.ends-first-after-not-used",
                 file=earliest[0],
                 quantity="time",
-                remedy="leave this part or unit out if the later motion matters",
+                earliest=earliest[2],
+                last=last[0],
+                last_2=last[2],
             )
         )
     return found

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
 from strapdown.tables.checks import check_rows, check_time
@@ -111,21 +111,21 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     missing = [c for c in columns if c not in table.columns]
     if missing:
         raise DataError(
-            f"it has no {' and no '.join(missing)}; it has {', '.join(map(str, table.columns))}",
+            "sensors.no" if len(missing) == 3 else "sensors.no-2",
             file=source,
             quantity=missing[0],
-            remedy="give all three axes, or leave this part out"
-            if len(missing) == 3
-            else "give all three axes, leave this part out, or state what is taken of the "
-            f"missing one, CrashUnit(assumed=Assumed({_ASSUMED[columns[0]]}=...))",
+            missing=" and no ".join(missing),
+            columns=table.columns,
+            assumed=_ASSUMED[columns[0]],
         )
     sampling = table.attrs.get("sampling")
     if sampling not in SAMPLINGS:
         raise DataError(
-            f"the table's attrs['sampling'] is {sampling!r}",
+            "sensors.table-attrs-sampling",
             file=source,
             quantity="sampling",
-            remedy=f"say table.attrs['sampling'] = {' or '.join(map(repr, SAMPLINGS))}",
+            sampling=sampling,
+            map=map(repr, SAMPLINGS),
         )
     stamps = _stamps(table, source)
     check_time(stamps, source)
@@ -159,13 +159,7 @@ def _groups(
         for g in groups
     )
     return groups, [
-        Finding(
-            f"its axes were not sampled together: {said}",
-            file=source,
-            quantity="time",
-            remedy="each axis is brought to the common stamps by itself, and the record is cut to "
-            "what all have; check that a slow axis has the bandwidth that is needed",
-        )
+        Finding("sensors.axes-not-sampled-together", file=source, quantity="time", said=said)
     ]
 
 
@@ -183,39 +177,42 @@ def _group(
         if hole.any():
             row = int(rows[int(np.argmax(hole))]) + 1
             raise DataError(
-                f"nan at {stamps[row]:.9g} s, between samples of the axis",
+                "sensors.nan-between-samples-axis",
                 file=source,
                 row=row + 1,
                 quantity=names[0],
-                remedy="fill it with what is known, or use the record before it or after it alone",
+                stamps=stamps[row],
             )
     if len(time) < LEAST_SAMPLES:
         raise DataError(
-            f"it has {len(time)} samples, and {LEAST_SAMPLES} are needed",
+            "sensors.samples-needed",
             file=source,
             quantity=names[0],
-            remedy="give a record of the crash, or leave this part out",
+            count=len(time),
+            least_samples=LEAST_SAMPLES,
         )
     step = float(np.median(np.diff(time)))
     if step > SLOWEST_STEP:
         raise DataError(
-            f"its samples are {step:.4g} s apart, too far for a crash",
+            "sensors.samples-apart-too-far-crash",
             file=source,
             row=int(rows[1]) + 1,
             quantity="time",
-            remedy="the index must be time in s: divide stamps in ms by 1000, and set the index "
-            "where time is a column: table.set_index('time')",
+            step=step,
         )
     gaps = find_gaps(time)
     if gaps:
         worst = max(gaps, key=lambda g: g.length)
         raise DataError(
-            f"{len(gaps)} gap{'s' * (len(gaps) > 1)}, the longest of {1e3 * worst.length:.4g} ms "
-            f"from {worst.start:.6g} s, where {1e3 * worst.usual:.4g} ms are usual",
+            "sensors.gap-longest-ms-ms-usual",
             file=source,
             row=worst.sample + 1,
             quantity="time",
-            remedy="use the record before it or after it alone, or fill it with what is known",
+            count=len(gaps),
+            value="s" * (len(gaps) > 1),
+            length=1000.0 * worst.length,
+            start=worst.start,
+            usual=1000.0 * worst.usual,
         )
     return AxisGroup(axes, time, block, step)
 
@@ -223,10 +220,10 @@ def _group(
 def _stamps(table: pd.DataFrame, source: str) -> Array:
     if table.index.dtype.kind not in "fiu":
         raise DataError(
-            f"the table's index holds {table.index.dtype}, and not seconds",
+            "sensors.table-index-holds-not-seconds",
             file=source,
             quantity="time",
-            remedy="set the index to numbers, the time in s on the unit's clock",
+            dtype=table.index.dtype,
         )
     return np.asarray(table.index.to_numpy(), dtype=np.float64)
 
@@ -238,11 +235,7 @@ def _numbers(column: pd.Series, name: str, source: str) -> Array:
         bad = pd.to_numeric(column, errors="coerce").isna().to_numpy() & column.notna().to_numpy()
         row = int(np.argmax(bad))
         raise DataError(
-            f"{column.iloc[row]!r} is no number",
-            file=source,
-            row=row + 1,
-            quantity=name,
-            remedy="write NaN where an axis has no sample, and a number elsewhere",
+            "sensors.no-number", file=source, row=row + 1, quantity=name, iloc=column.iloc[row]
         ) from None
 
 
@@ -269,19 +262,19 @@ def _judge_force(
         what = f"its specific force before the crash is {length:.3f} in length: gravity in g"
         remedy = "state the unit g in the record's header or in the case, or multiply by 9.80665"
         if max(triad.uncertainty.axis("bias")) < BIAS_SPEAKS:
-            raise DataError(what, file=source, quantity="accel", remedy=remedy)
+            raise DataError(
+                "sensors.message", file=source, quantity="accel", message=what, remedy_text=remedy
+            )
         found.append(
-            Finding(f"{what}, or a bias", file=source, quantity="accel", remedy=f"if g: {remedy}")
+            Finding("sensors.or-bias", file=source, quantity="accel", what=what, remedy=remedy)
         )
     elif length < NO_GRAVITY:
         found.append(
             Finding(
-                f"its specific force before the crash is {length:.2f} m/s² in length: gravity is "
-                "not in it",
+                "sensors.specific-force-before-crash-length",
                 file=source,
                 quantity="accel",
-                remedy="where the channels were zeroed before the impact, add the specific force "
-                "at rest back; else check the units",
+                length=length,
             )
         )
     return found
@@ -296,12 +289,12 @@ def _judge_rate(
     if largest > (5.0 * limit if stated else FASTEST_TURN):
         bound = f"its range of {limit:.4g} rad/s" if stated else "what a vehicle does"
         raise DataError(
-            f"rates up to {largest:.4g} are far beyond {bound}; as deg/s they would be "
-            f"{largest / DEGREES:.4g} rad/s",
+            "sensors.rates-up-far-beyond-they",
             file=source,
             quantity="gyro",
-            remedy="state the unit deg/s in the record's header or in the case, or multiply by "
-            "π/180",
+            largest=largest,
+            bound=bound,
+            largest_2=largest / DEGREES,
         )
     return _over_range(source, triad, groups, "rad/s", "deg/s instead of rad/s?")
 
@@ -319,10 +312,13 @@ def _over_range(
     axis = int(np.argmax(peak / limits))
     return [
         Finding(
-            f"{'xyz'[axis]} reaches {peak[axis]:.4g} {unit}, and the stated range is "
-            f"{limits[axis]:.4g} {unit}",
+            "sensors.reaches-stated-range",
             file=source,
             quantity="full_scale",
-            remedy=f"check the units of the table and of the range ({hint})",
+            value="xyz"[axis],
+            peak=peak[axis],
+            unit=unit,
+            limits=limits[axis],
+            hint=hint,
         )
     ]

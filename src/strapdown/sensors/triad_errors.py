@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Triad = tuple[float, float, float]
 Matrix = tuple[Triad, Triad, Triad]
@@ -189,28 +189,22 @@ def _numbers(value: Any) -> list[float]:
 def _check_range(name: str, value: Any) -> None:
     for number in _numbers(value):
         if math.isnan(number) or (math.isinf(number) and name not in POSITIVE):
-            raise _refused(name, f"{number} is no finite number", "give a finite number")
+            raise _refused(name, "sensors.no-finite-number", number=number)
         if name in POSITIVE and number <= 0.0:
-            raise _refused(name, f"{number:g} is not positive", "leave it out where there is none")
+            raise _refused(name, "sensors.not-positive", number=number)
         if name in NOT_NEGATIVE and number < 0.0:
-            raise _refused(name, f"{number:g} is negative", "give zero or more")
+            raise _refused(name, "sensors.negative", number=number)
         if name == "scale" and number <= -1.0:
-            raise _refused(name, f"{number:g} leaves no signal", "give more than -1")
+            raise _refused(name, "sensors.leaves-no-signal", number=number)
 
 
 def _check_matrix(misalignment: Sequence[Sequence[float]]) -> None:
     for i, row in enumerate(misalignment):
         if row[i] != 0.0:
-            raise _refused(
-                "misalignment",
-                f"element ({i + 1}, {i + 1}) is {row[i]:g}",
-                "the diagonal is the scale factor's: give it as scale",
-            )
+            raise _refused("misalignment", "sensors.element", i=i + 1, at_row=row[i])
         if sum(abs(x) for x in row) >= 1.0:
             raise _refused(
-                "misalignment",
-                f"row {i + 1} sums to {sum(abs(x) for x in row):g} rad",
-                "give small angles; turn the axes of the log for a mounting",
+                "misalignment", "sensors.row-sums-rad", i=i + 1, sum=sum(abs(x) for x in row)
             )
 
 
@@ -227,20 +221,14 @@ def _check_curve(errors: TriadErrors) -> None:
         if n2 == 0.0 and n3 == 0.0:
             continue
         if math.isinf(full):
-            raise _refused(
-                "full_scale", "a nonlinearity is relative to it, and there is none", "give it"
-            )
+            raise _refused("full_scale", "sensors.nonlinearity-relative-none")
         places = [-1.0, 1.0]
         if n3 != 0.0 and abs(n2) < abs(3.0 * n3):
             places.append(-n2 / (3.0 * n3))
         least = min(1.0 + s + 2.0 * n2 * x + 3.0 * n3 * x * x for x in places)
         if least <= 0.0:
-            raise _refused(
-                "nonlinearity",
-                f"the slope falls to {least:.3g} of nominal within the range",
-                "a sensor that reads two inputs alike cannot be compensated: give less",
-            )
+            raise _refused("nonlinearity", "sensors.slope-falls-nominal-within-range", least=least)
 
 
 def _refused(name: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError(what, quantity=name, remedy=remedy)
+    return ConfigError("sensors.message", quantity=name, message=what, remedy_text=remedy)

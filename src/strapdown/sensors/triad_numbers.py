@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import Triad
 from strapdown.tables.checks import is_number
 
@@ -27,7 +27,11 @@ def triple(given: Any, quantity: str, remedy: str, file: str | None = None) -> T
         x = y = z = math.nan
     if isinstance(given, str) or not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
         raise ConfigError(
-            f"{given!r} are not three finite numbers", file=file, quantity=quantity, remedy=remedy
+            "sensors.message",
+            file=file,
+            quantity=quantity,
+            message=f"{given!r} are not three finite numbers",
+            remedy_text=remedy,
         )
     return x, y, z
 
@@ -47,8 +51,5 @@ def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> N
     """
     if not finite(given) or given < 0.0:
         raise ConfigError(
-            f"{given!r} is no standard deviation",
-            file=file,
-            quantity=quantity,
-            remedy=f"give one number in {unit}, zero or more",
+            "sensors.no-standard-deviation-2", file=file, quantity=quantity, given=given, unit=unit
         )

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import Triad, TriadLike
 from strapdown.tables.checks import is_number
 
@@ -74,36 +74,22 @@ class TriadUncertainty:
             if f.name != "bandwidth":
                 numbers = numbers * 3 if len(numbers) == 1 else numbers
             if len(numbers) != (1 if f.name == "bandwidth" else 3):
-                raise ConfigError(
-                    f"{given!r} has not the right shape",
-                    quantity=f.name,
-                    remedy="give one number, or three: x, y, z",
-                )
+                raise ConfigError("sensors.not-right-shape", quantity=f.name, given=given)
             if any(math.isnan(x) or x < 0.0 for x in numbers) or (
                 f.name not in FACTS and any(math.isinf(x) for x in numbers)
             ):
                 raise ConfigError(
-                    f"{given!r} is no standard deviation or range",
-                    quantity=f.name,
-                    remedy="give zero or more, finite",
+                    "sensors.no-standard-deviation-or-range", quantity=f.name, given=given
                 )
             if f.name in WHERE_ZERO_IS_NOTHING and 0.0 in numbers:
-                raise ConfigError(
-                    f"{given!r} leaves nothing to measure with",
-                    quantity=f.name,
-                    remedy="give more than zero, or leave it out where it is not known",
-                )
+                raise ConfigError("sensors.leaves-nothing-measure", quantity=f.name, given=given)
             value = tuple(float(x) for x in numbers)
             object.__setattr__(self, f.name, value[0] if f.name == "bandwidth" else value)
         if any(
             n > 0.0 and math.isinf(r)
             for n, r in zip(self.axis("nonlinearity_2"), self.axis("full_scale"), strict=True)
         ):
-            raise ConfigError(
-                "a nonlinearity is relative to it, and there is none",
-                quantity="full_scale",
-                remedy="give it",
-            )
+            raise ConfigError("sensors.nonlinearity-relative-none", quantity="full_scale")
 
     def axis(self, name: str) -> Triad:
         """Return a per-axis attribute as three numbers."""
@@ -135,6 +121,4 @@ def _numbers(given: Any, name: str) -> tuple[float, ...]:
             raise TypeError
         return tuple(float(x) for x in numbers)
     except TypeError:
-        raise ConfigError(
-            f"{given!r} is no number", quantity=name, remedy="give one number, or three: x, y, z"
-        ) from None
+        raise ConfigError("sensors.no-number-2", quantity=name, given=given) from None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.delay import Delay, EvenSignal, find_delay
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.low_pass import time_constant
 from strapdown.sensors.triad_channels import TriadChannels
@@ -109,12 +109,12 @@ def clocks_by_correlation(
         if abs(off) > CONTRADICTION * sd:
             findings.append(
                 Finding(
-                    f"its trigger lies {1e3 * off:.4g} ms from where the {what} put it, with a "
-                    f"standard deviation of {1e3 * sd:.2g} ms",
+                    "sensors.trigger-lies-ms-put-standard",
                     file=u.unit.name,
                     quantity="trigger",
-                    remedy="the correlation is used; check which instant the trigger marks, and "
-                    "trigger_sd",
+                    off=1000.0 * off,
+                    what=what,
+                    sd=1000.0 * sd,
                 )
             )
     return clocks, findings
@@ -123,11 +123,10 @@ def clocks_by_correlation(
 def _trigger(unit: CrashUnit) -> float:
     if unit.trigger is None or not math.isfinite(unit.trigger):
         raise DataError(
-            "it has no trigger" if unit.trigger is None else f"its trigger is {unit.trigger}",
+            "sensors.no-trigger" if unit.trigger is None else "sensors.trigger",
             file=unit.name,
             quantity="trigger",
-            remedy="give the instant of the common trigger on this unit's clock, in s, or "
-            "synchronise by correlation with a reference unit that has one",
+            trigger=unit.trigger,
         )
     check_sd(unit.trigger_sd, "trigger_sd", "s", unit.name)
     return unit.trigger
@@ -139,11 +138,12 @@ def _trigger_within(u: UnitChannels) -> float:
     start, end = min(c.start for c in parts), max(c.end for c in parts)
     if not start - OUTSIDE <= trigger <= end + OUTSIDE:
         raise DataError(
-            f"its trigger at {trigger:.6g} s is not within its record, which has {start:.6g} s to "
-            f"{end:.6g} s",
+            "sensors.trigger-not-within-record",
             file=u.unit.name,
             quantity="trigger",
-            remedy="give the instant on this unit's own clock, in s: trigger_s of a case",
+            trigger=trigger,
+            start=start,
+            end=end,
         )
     return trigger
 
@@ -175,10 +175,11 @@ def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
             errors.append(f"{what}: {error.finding.what}")
     if not found:
         raise DataError(
-            f"it cannot be laid over {reference.unit.name}: {'; '.join(errors) or 'no triads'}",
+            "sensors.cannot-laid-over",
             file=u.unit.name,
             quantity="time",
-            remedy="give its trigger and synchronise by trigger, or take another reference unit",
+            name=reference.unit.name,
+            errors="; ".join(errors) or "no triads",
         )
     return min(found, key=lambda f: f[0].sd)
 

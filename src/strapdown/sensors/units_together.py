@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.triad_channels import TriadChannels
 from strapdown.sensors.triad_numbers import finite
@@ -33,36 +33,36 @@ def check_options(
         There is no unit, two have one name, or an option is not understood.
     """
     if not units:
-        raise ConfigError("there is no unit", quantity="units", remedy="give one or more")
+        raise ConfigError("sensors.no-unit-2", quantity="units")
     names = [u.name for u in units]
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
-        raise ConfigError(
-            f"two units are called {twice[0]!r}",
-            quantity="name",
-            remedy="give each unit a name of its own",
-        )
+        raise ConfigError("sensors.two-units-called", quantity="name", twice=twice[0])
     if method not in METHODS:
         raise ConfigError(
-            f"{method!r} is no way to synchronise",
+            "sensors.no-way-synchronise",
             quantity="method",
-            remedy=nearest(str(method), METHODS),
+            method=method,
+            word=str(method),
+            known=METHODS,
         )
     if sampling not in SAMPLINGS:
         raise ConfigError(
-            f"{sampling!r} is no kind of sampling",
+            "sensors.no-kind-sampling-2",
             quantity="sampling",
-            remedy=nearest(str(sampling), SAMPLINGS),
+            sampling=sampling,
+            word=str(sampling),
+            known=SAMPLINGS,
         )
     if not (finite(rate) and rate > 0.0):
-        raise ConfigError(
-            f"{rate!r} Hz is no rate", quantity="rate", remedy="give samples per second, as 200"
-        )
+        raise ConfigError("sensors.hz-no-rate-2", quantity="rate", rate=rate)
     if reference is not None and reference not in names:
         raise ConfigError(
-            f"there is no unit {reference!r}",
+            "sensors.no-unit-3",
             quantity="reference",
-            remedy=nearest(reference, names),
+            reference=reference,
+            word=reference,
+            known=names,
         )
 
 
@@ -83,10 +83,11 @@ def check_rate(rate: float, steps: Sequence[float]) -> None:
     fastest = 1.0 / min(steps)
     if rate > MOST_FASTER * fastest:
         raise ConfigError(
-            f"{rate:g} Hz is more than {MOST_FASTER:g} times the {fastest:.5g} Hz of the fastest "
-            "record",
+            "sensors.hz-more-than-times-hz",
             quantity="rate",
-            remedy=f"use {fastest:.5g} Hz or less: nothing is known between samples",
+            rate=rate,
+            most_faster=MOST_FASTER,
+            fastest=fastest,
         )
 
 
@@ -114,20 +115,20 @@ def compare_sizes(
         for other, more in turning:
             if size > 0.0 and DEGREES_APART[0] < more / size < DEGREES_APART[1]:
                 raise DataError(
-                    f"its rates are {more / size:.3g} times those of {one} on the same body, and "
-                    "deg/s would be 57.3 times as many",
+                    "sensors.rates-times-those-same-body",
                     file=other,
                     quantity="gyro",
-                    remedy="state the unit deg/s in the record's header or in the case, or "
-                    "multiply by π/180",
+                    more=more / size,
+                    one=one,
                 )
     forces = [(force[-1].source, _spread(force[-1])) for _, force in units if force]
     return [
         Finding(
-            f"its specific force varies {more / size:.3g} times as much as that of {one}",
+            "sensors.specific-force-varies-times-much",
             file=other,
             quantity="accel",
-            remedy=f"check that {one} is in m/s² and not in g",
+            more=more / size,
+            one=one,
         )
         for one, size in forces
         for other, more in forces

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -64,11 +64,10 @@ def with_filled_axes(unit: CrashUnit) -> CrashUnit:
         if len(set(missing.values())) > 1:
             name = next(n for n, m in missing.items() if m)
             raise DataError(
-                f"it has no {ACCEL[missing[name][0]]}, and another range of the unit has",
+                "sensors.no-another-range-unit",
                 file=f"{unit.name}, {name}",
                 quantity=ACCEL[missing[name][0]],
-                remedy="give the axis in all ranges, or in none; or leave out the range that "
-                "lacks it",
+                accel=ACCEL[missing[name][0]],
             )
         forces = tuple(_filled(t, ACCEL) for t in forces)
     if gyro is not None and unit.assumed.turn_sd_deg is not None:
@@ -130,14 +129,15 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
         rollover = "; whether it rolled over cannot be told" if "roll" in kept else ""
         found.append(
             Finding(
-                f"it has no {what}: it is taken that the vehicle turned by 0 ± "
-                f"{_said(assumed.sd_of('turn_sd_deg'), kept, TURNS)} deg (1 sd) in "
-                f"{_listed(kept)} {over}{why}",
+                "sensors.no-taken-vehicle-turned-sd",
                 file=unit.name,
                 quantity="gyro",
-                remedy="a vehicle that turned more is not where the path says, nor came the force "
-                f"from where it says; turning before and after is in no bound{rollover}. Give a "
-                "gyro, or borrow one with gyro_from",
+                what=what,
+                said=_said(assumed.sd_of("turn_sd_deg"), kept, TURNS),
+                listed=_listed(kept),
+                over=over,
+                why=why,
+                rollover=rollover,
             )
         )
     absent = unit.accelerometers[0].absent
@@ -148,13 +148,14 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
         ]
         found.append(
             Finding(
-                f"it has no {' and no '.join(names)}: it is taken that the vehicle changed its "
-                f"velocity by 0 ± {_said(assumed.sd_of('delta_v_sd'), kept, AXES)} m/s (1 sd) "
-                f"along {_listed(kept)} {over}, and that gravity's part stayed that at rest{why}",
+                "sensors.no-taken-vehicle-changed-velocity",
                 file=unit.name,
                 quantity=names[0],
-                remedy="a change of velocity that was not recorded is in no resultant and in no "
-                "direction of force; give the axis from another part of the vehicle",
+                names=" and no ".join(names),
+                said=_said(assumed.sd_of("delta_v_sd"), kept, AXES),
+                listed=_listed(kept),
+                over=over,
+                why=why,
             )
         )
     return found

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.sensors.axis_voting import AxisEvent, AxisVote
 from strapdown.sensors.health_log import WORDS
 
@@ -78,7 +78,13 @@ def _event(
             if event.kind == "disagree"
             else "look at its cable, its power and its mounting; the others go on without it"
         )
-    finding = Finding(what, row=before + event.row + 1, quantity=channels[0], remedy=remedy)
+    finding = Finding(
+        "sensors.message",
+        row=before + event.row + 1,
+        quantity=channels[0],
+        message=what,
+        remedy_text=remedy,
+    )
     return VoteEvent(
         event.kind, channels, when, since, event.size, event.chi_square, event.limit, finding
     )

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.imu_uncertainty import BiasDrift
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.tables.checks import is_number
@@ -72,11 +72,7 @@ class VotingRule:
         }
         for name, fine in good.items():
             if not fine:
-                raise ConfigError(
-                    f"{getattr(self, name)!r} will not do",
-                    quantity=name,
-                    remedy="give seconds, shares and metres that are positive and finite",
-                )
+                raise ConfigError("sensors.will-not-do", quantity=name, value=getattr(self, name))
 
 
 @dataclass(frozen=True, eq=False)

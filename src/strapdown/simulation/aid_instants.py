@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.antenna import antenna_motion
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import GEODETIC, VELOCITY
@@ -31,9 +31,12 @@ def instants(motion: EarthMotion, rate: float) -> Array:
     count = math.floor(rate * motion.duration * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST:
         raise ConfigError(
-            f"{rate:g} Hz gives {count} rows in {motion.duration:g} s",
+            "simulation.hz-gives-rows",
             quantity="rate",
-            remedy=f"use a rate that gives 2 to {_MOST}",
+            rate=rate,
+            count=count,
+            duration=motion.duration,
+            most=_MOST,
         )
     return np.minimum(np.arange(count) / rate, motion.duration)
 
@@ -54,9 +57,10 @@ def check_numbers(sensor: object, *names: str, above: bool = False) -> None:
         value = np.asarray(getattr(sensor, name), dtype=np.float64)
         if not np.isfinite(value).all() or (value < 0.0).any() or (above and (value == 0.0).any()):
             raise ConfigError(
-                f"{getattr(sensor, name)!r} is out of range",
+                "simulation.out-range",
                 quantity=name,
-                remedy=f"give numbers {'above zero' if above else 'of zero or more'}",
+                value=getattr(sensor, name),
+                value_2="above zero" if above else "of zero or more",
             )
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import Triad
 
 Array = NDArray[np.float64]
@@ -158,5 +158,8 @@ def _middle(camera: Camera) -> Array:
 
 def _refused(camera: Camera, name: str, value: object, remedy: str) -> ConfigError:
     return ConfigError(
-        f"camera '{camera.name}': {value} is out of range", quantity=name, remedy=remedy
+        "simulation.message",
+        quantity=name,
+        message=f"camera '{camera.name}': {value} is out of range",
+        remedy_text=remedy,
     )

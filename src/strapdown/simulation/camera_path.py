@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.camera import Camera
 
 Array = NDArray[np.float64]
@@ -67,19 +67,18 @@ def path_from_cameras(
     acts by the velocity of the path over 20 frames.
     """
     if not central > 0.0:
-        raise ConfigError(
-            f"{central:g} px leaves no image", quantity="central", remedy="give more than zero"
-        )
+        raise ConfigError("simulation.px-leaves-no-image", quantity="central", central=central)
     top, side = cameras
     time, seen, _ = _readings(tracks_top, top, marker, central)
     other, also, whole = _readings(tracks_side, side, marker, central)
     time, seen, matched, part = _matched(time, seen, other, also, whole)
     if time.size == 0:
         raise DataError(
-            f"'{top.name}' and '{side.name}' never see '{marker}' together",
+            "simulation.never-see-together",
             quantity="time",
-            remedy="film at the same time, use a marker that both see, or a larger part of the "
-            "image",
+            name=top.name,
+            name_2=side.name,
+            marker=marker,
         )
     views = [top.directions(seen), side.directions(matched)]
     # An interpolated reading has the errors of two.
@@ -110,19 +109,22 @@ def _readings(
     columns = [f"{marker}_u", f"{marker}_v"]
     if any(c not in tracks.columns for c in columns):
         raise DataError(
-            f"camera '{camera.name}' has no marker '{marker}'",
+            "simulation.camera-no-marker",
             quantity="marker",
-            remedy=f"give one of {', '.join(str(c)[:-2] for c in tracks.columns[::2])}",
+            name=camera.name,
+            marker=marker,
+            columns=[str(c)[:-2] for c in tracks.columns[::2]],
         )
     pixels = tracks[columns].to_numpy(dtype=np.float64)
     off = pixels - 0.5 * np.asarray(camera.size, dtype=np.float64)
     used = np.hypot(off[:, 0], off[:, 1]) <= central
     if not used.any():
         raise DataError(
-            f"camera '{camera.name}' does not see marker '{marker}' within {central:g} px of the "
-            "middle",
+            "simulation.camera-does-not-see-marker",
             quantity="marker",
-            remedy="turn the camera to it, or use a larger part of the image",
+            name=camera.name,
+            marker=marker,
+            central=central,
         )
     on = np.flatnonzero(used)
     return (
@@ -165,11 +167,7 @@ def _triangulated(views: list[Array], cameras: tuple[Camera, Camera]) -> tuple[A
                 np.einsum("nij,nik->njk", wa, wa), np.einsum("nij,ni->nj", wa, wb)[..., None]
             )[..., 0]
         except np.linalg.LinAlgError:
-            raise ConfigError(
-                "the cameras look along one line",
-                quantity="cameras",
-                remedy="place them where they see the marker from different sides",
-            ) from None
+            raise ConfigError("simulation.cameras-look-along-line", quantity="cameras") from None
         depths = [(place - np.asarray(c.position)) @ c.axes[2] for c in cameras]
         weight = 1.0 / np.repeat(np.stack(depths, axis=1), 2, axis=1)
     residuals = np.einsum("nij,nj->ni", a, place) - b

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import frames, rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.error_draws import child
 from strapdown.sensors.triad_errors import Triad
 from strapdown.simulation.camera import Camera, project
@@ -69,11 +69,7 @@ def film(
         There is no marker or no place, or fewer than two frames; the message names the camera.
     """
     if not markers:
-        raise ConfigError(
-            f"camera '{camera.name}' has nothing to look at",
-            quantity="markers",
-            remedy="give one marker or more",
-        )
+        raise ConfigError("simulation.camera-nothing-look", quantity="markers", name=camera.name)
     begin = 0.0 if start is None else start
     stop = motion.duration if end is None else end
     late = camera.clock_offset - impact
@@ -81,10 +77,12 @@ def film(
     last = math.floor((stop + late) * camera.rate + 1e-6)
     if not (0.0 <= begin < stop <= motion.duration and last > first):
         raise ConfigError(
-            f"camera '{camera.name}': from {begin:g} s to {stop:g} s there are no two frames of a "
-            f"motion of {motion.duration:g} s",
+            "simulation.camera-no-two-frames-motion",
             quantity="start, end",
-            remedy="let it begin at zero or later, and end before the motion does",
+            name=camera.name,
+            begin=begin,
+            stop=stop,
+            duration=motion.duration,
         )
     stamps = np.arange(first, last + 1) / camera.rate
     place, q_nb = _scene(motion, np.clip(stamps - late, 0.0, motion.duration), impact)
@@ -140,11 +138,7 @@ def _scene(motion: Any, time: Array, impact: float) -> tuple[Array, Array]:
         origin = motion.position(np.array([impact]))
         return motion.position(time) - origin, motion.attitude(time)
     if not hasattr(motion, "trajectory"):
-        raise ConfigError(
-            "the motion does not know where it is",
-            quantity="motion",
-            remedy="give one with a position or a trajectory",
-        )
+        raise ConfigError("simulation.motion-does-not-know", quantity="motion")
     here = motion.trajectory(np.array([impact]))[GEODETIC].to_numpy()
     place = motion.trajectory(time)[GEODETIC].to_numpy()
     # From the level at the vehicle to that of the scene, through the Earth's axes.

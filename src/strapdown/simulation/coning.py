@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.flat_motion import FlatMotion
 
 Array = NDArray[np.float64]
@@ -59,15 +59,11 @@ class Coning(FlatMotion):
             if not 0.0 < value < most:
                 below = f" and below {most:g} {unit}" if np.isfinite(most) else ""
                 raise ConfigError(
-                    f"{value:g} {unit} makes no cone",
-                    quantity=name,
-                    remedy=f"use a number above zero{below}",
+                    "simulation.makes-no-cone", quantity=name, value=value, unit=unit, below=below
                 )
         length = float(np.linalg.norm(self.axis))
         if not (np.isfinite(length) and length > 0.0):
-            raise ConfigError(
-                f"{self.axis} has no direction", quantity="axis", remedy="use (0, 0, 1)"
-            )
+            raise ConfigError("simulation.no-direction", quantity="axis", axis=self.axis)
 
     def rate(self, time: ArrayLike) -> Array:
         """Body rate.

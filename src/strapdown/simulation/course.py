@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.minimum_jerk import Track
 
 
@@ -116,13 +116,9 @@ def lay_course(
         There is none, or one cannot be done; the message says which, counted from 1.
     """
     if not 0.0 <= speed < math.inf:
-        raise ConfigError(
-            f"a vehicle cannot begin with {speed:g} m/s",
-            quantity="speed",
-            remedy="use zero or more",
-        )
+        raise ConfigError("simulation.vehicle-cannot-begin", quantity="speed", speed=speed)
     if not manoeuvres:
-        raise ConfigError("there is none", quantity="manoeuvres", remedy="name at least one")
+        raise ConfigError("simulation.none", quantity="manoeuvres")
     course = Course(limits, [(0.0, speed)])
     for number, (name, manoeuvre) in enumerate(manoeuvres, start=1):
         try:
@@ -130,7 +126,10 @@ def lay_course(
         except ConfigError as error:
             f = error.finding
             raise ConfigError(
-                f.what, quantity=f"manoeuvre {number}, {name}, {f.quantity}", remedy=f.remedy
+                "simulation.message",
+                quantity=f"manoeuvre {number}, {name}, {f.quantity}",
+                message=f.what,
+                remedy_text=f.remedy,
             ) from None
     return course.time, _track(course.speed), _track(course.turn_rate), _track(course.climb)
 
@@ -148,4 +147,4 @@ def check_length(value: float, name: str = "duration") -> None:
 
 def unfit(what: str, remedy: str, quantity: str) -> ConfigError:
     """What a manoeuvre raises; `lay_course` adds which it is."""
-    return ConfigError(what, quantity=quantity, remedy=remedy)
+    return ConfigError("simulation.message", quantity=quantity, message=what, remedy_text=remedy)

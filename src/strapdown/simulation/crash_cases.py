@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation.crash_course import CrashScenario
 from strapdown.simulation.crash_scenarios import CRASHES
@@ -86,9 +86,12 @@ class CrashCase:
         for name in wanted:
             if name not in (*known, "ALL"):
                 raise ConfigError(
-                    f"'{self.name}' has no recorder '{name}'",
+                    "simulation.no-recorder",
                     quantity="--units",
-                    remedy=nearest(name, [*known, "all"]),
+                    name=self.name,
+                    name_2=name,
+                    word=name,
+                    known=[*known, "all"],
                 )
         taken = tuple(r for n, r in known.items() if n in wanted or "ALL" in wanted)
         there = {r.design.name for r in taken}
@@ -96,10 +99,10 @@ class CrashCase:
             lender = recorder.design.gyro_from
             if lender is not None and lender not in there:
                 raise ConfigError(
-                    f"{recorder.design.name} has no gyro and borrows that of {lender}, which is "
-                    "not among them",
+                    "simulation.no-gyro-borrows-not-among",
                     quantity="--units",
-                    remedy=f"name {lender}, too",
+                    name=recorder.design.name,
+                    lender=lender,
                 )
         return taken
 
@@ -223,6 +226,6 @@ def find_case(name: str) -> CrashCase:
     """
     if name not in CASES:
         raise ConfigError(
-            f"'{name}' is no simulated crash", quantity="crash", remedy=nearest(name, CASES)
+            "simulation.no-simulated-crash", quantity="crash", name=name, word=name, known=CASES
         )
     return CASES[name]

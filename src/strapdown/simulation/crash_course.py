@@ -11,7 +11,7 @@ import numpy as np
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.earth_motion import Origin
 
@@ -68,13 +68,9 @@ class Setting:
     def __post_init__(self) -> None:
         for name in ("stand", "coast", "friction", "after"):
             if not 0.0 <= getattr(self, name) < math.inf:
-                raise ConfigError(
-                    f"it is {getattr(self, name):g}", quantity=name, remedy="give zero or more"
-                )
+                raise ConfigError("simulation.value", quantity=name, value=getattr(self, name))
         if not 0.0 < self.towing < math.inf:
-            raise ConfigError(
-                f"it is {self.towing:g} m/s²", quantity="towing", remedy="give more than zero"
-            )
+            raise ConfigError("simulation.towing", quantity="towing", towing=self.towing)
 
 
 class CrashCourse:
@@ -92,9 +88,7 @@ class CrashCourse:
     def approach(self, speed: float) -> None:
         """Come to a speed from rest, and coast."""
         if not 0.0 <= speed < math.inf:
-            raise ConfigError(
-                f"a speed of {speed:g} m/s", quantity="entry_speed", remedy="give zero or more"
-            )
+            raise ConfigError("simulation.speed", quantity="entry_speed", speed=speed)
         if speed > 0.0:
             length = speed / self.setting.towing
             self.push(length, (speed, 0.0, 0.0))

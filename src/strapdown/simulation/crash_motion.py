@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
 from strapdown.simulation.euler_motion import (
     euler_attitude,
@@ -61,16 +61,12 @@ class HaversinePulse:
             value = tuple(float(x) for x in getattr(self, name))
             if len(value) != 3 or not all(math.isfinite(x) for x in value):
                 raise ConfigError(
-                    f"{getattr(self, name)!r} are not three finite numbers",
-                    quantity=name,
-                    remedy="give north, east, down in m/s, and roll, pitch, heading in deg/s",
+                    "simulation.not-three-finite-numbers", quantity=name, value=getattr(self, name)
                 )
             object.__setattr__(self, name, value)
         if not (0.0 <= self.start < math.inf and 0.0 < self.length < math.inf):
             raise ConfigError(
-                f"a pulse of {self.length:g} s from {self.start:g} s",
-                quantity="start, length",
-                remedy="let it begin at zero or later, and last longer than zero",
+                "simulation.pulse", quantity="start, length", length=self.length, start=self.start
             )
 
     @property
@@ -143,10 +139,11 @@ class CrashMotion(EarthMotion):
         for k, pulse in enumerate(self.pulses):
             if pulse.end > self.duration * (1.0 + _ROUNDING):
                 raise ConfigError(
-                    f"a pulse of {pulse.length:g} s from {pulse.start:g} s is not within a motion "
-                    f"of {self.duration:g} s",
+                    "simulation.pulse-not-within-motion",
                     quantity=f"pulse {k + 1}, start, length",
-                    remedy="let it end before the motion does, or let the motion last longer",
+                    length=pulse.length,
+                    start=pulse.start,
+                    duration=self.duration,
                 )
 
     @property

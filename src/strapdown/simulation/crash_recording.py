@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.error_draws import Seed, child
 from strapdown.simulation.between_samples import mean_over
@@ -127,23 +127,27 @@ def _bounds(
     stop = motion.duration if end is None else float(end)
     if sampling not in SAMPLINGS:
         raise ConfigError(
-            f"'{sampling}' is no kind of sampling",
+            "simulation.no-kind-sampling",
             quantity="sampling",
-            remedy=f"use {' or '.join(SAMPLINGS)}",
+            sampling=sampling,
+            samplings=SAMPLINGS,
         )
     if not 0.0 <= begin < stop <= motion.duration:
         raise ConfigError(
-            f"recorder '{design.name}': a record from {begin:g} s to {stop:g} s is not within a "
-            f"motion of {motion.duration:g} s",
+            "simulation.recorder-record-not-within-motion",
             quantity="start, end",
-            remedy="let it begin at zero or later, and end before the motion does",
+            name=design.name,
+            begin=begin,
+            stop=stop,
+            duration=motion.duration,
         )
     if not 0.0 <= impact <= motion.duration:
         raise ConfigError(
-            f"recorder '{design.name}': an impact at {impact:g} s is not within a motion of "
-            f"{motion.duration:g} s",
+            "simulation.recorder-impact-not-within-motion",
             quantity="impact",
-            remedy="give it on the motion's clock",
+            name=design.name,
+            impact=impact,
+            duration=motion.duration,
         )
     return begin, stop
 
@@ -227,10 +231,13 @@ def _stamps(
     last = math.floor(truth.clock(stop) * triad.rate + SLACK)
     if last - first < 1:
         raise ConfigError(
-            f"recorder '{design.name}', {triad.part}: {triad.rate:g} Hz gives fewer than two "
-            f"samples from {begin:g} s to {stop:g} s",
+            "simulation.recorder-hz-gives-fewer-than",
             quantity="rate",
-            remedy="record for longer, or at a higher rate",
+            name=design.name,
+            part=triad.part,
+            rate=triad.rate,
+            begin=begin,
+            stop=stop,
         )
     stamps = np.arange(first, last + 1) / triad.rate
     at = (stamps - truth.clock_offset) / (1.0 + 1e-6 * truth.clock_drift_ppm)

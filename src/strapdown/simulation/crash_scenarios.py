@@ -8,7 +8,7 @@ matter of the mounting (`MountedMotion`).
 
 from __future__ import annotations
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.simulation.crash_course import CrashScenario
 from strapdown.simulation.front_impacts import frontal_impact, oblique_impact, pole_impact
 from strapdown.simulation.near_crashes import door_slam, hard_braking, kerb, pothole
@@ -48,6 +48,6 @@ def find_crash(name: str) -> CrashScenario:
     """
     if name not in CRASHES:
         raise ConfigError(
-            f"'{name}' is no simulated crash", quantity="crash", remedy=nearest(name, CRASHES)
+            "simulation.no-simulated-crash", quantity="crash", name=name, word=name, known=CRASHES
         )
     return CRASHES[name]

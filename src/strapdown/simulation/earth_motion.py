@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.ellipsoids import Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 from strapdown.tables import trajectory_table
 
@@ -49,22 +49,18 @@ class Origin:
 
     def __post_init__(self) -> None:
         if not all(math.isfinite(x) for x in (self.lat_deg, self.lon_deg, self.alt)):
-            raise ConfigError(
-                "a coordinate is not finite", quantity="place", remedy="give three numbers"
-            )
+            raise ConfigError("simulation.coordinate-not-finite", quantity="place")
         if abs(self.lat_deg) > 90.0:
             raise ConfigError(
-                f"a latitude of {self.lat_deg:.9g} deg is beyond the pole",
-                quantity="lat_deg",
-                remedy="latitude and longitude seem to be swapped: latitude comes first"
+                "simulation.latitude-beyond-pole"
                 if abs(self.lon_deg) <= 90.0
-                else "give geodetic latitude within -90 to 90 deg, north positive",
+                else "simulation.latitude-beyond-pole-2",
+                quantity="lat_deg",
+                lat_deg=self.lat_deg,
             )
         if abs(self.lon_deg) > 360.0:
             raise ConfigError(
-                f"a longitude of {self.lon_deg:.9g} deg is more than a full turn",
-                quantity="lon_deg",
-                remedy="give longitude within -180 to 360 deg, east positive",
+                "simulation.longitude-more-than-full-turn", quantity="lon_deg", lon_deg=self.lon_deg
             )
 
     def place(self, moved: Array) -> Array:
@@ -176,9 +172,9 @@ class EarthMotion(ABC):
         k = self.kinematics(_instants(time))
         if k.swinging is None:
             raise ConfigError(
-                f"a {type(self).__name__} does not know its angular acceleration",
+                "simulation.does-not-know-angular-acceleration",
                 quantity="angular acceleration",
-                remedy="use a CrashMotion or a StationaryMotion",
+                name=type(self).__name__,
             )
         out = np.empty((len(k.moved), 3))
         swing(
@@ -240,9 +236,7 @@ class EarthMotion(ABC):
         far = ~(np.abs(place[:, 2]) <= FARTHEST)
         if far.any():
             raise ConfigError(
-                f"the motion comes to a height of {place[far, 2][0]:.6g} m",
-                quantity="alt",
-                remedy="stay within 1000 km of the ellipsoid: gravity is not known farther",
+                "simulation.motion-comes-height", quantity="alt", place=place[far, 2][0]
             )
         rate, force = np.empty((len(k.moved), 3)), np.empty((len(k.moved), 3))
         feel(
@@ -265,11 +259,7 @@ class EarthMotion(ABC):
 def check_duration(duration: float) -> None:
     """Refuse what is no length of time."""
     if not 0.0 < duration < math.inf:
-        raise ConfigError(
-            f"a motion cannot last {duration:g} s",
-            quantity="duration",
-            remedy="use a number above zero",
-        )
+        raise ConfigError("simulation.motion-cannot-last", quantity="duration", duration=duration)
 
 
 def _euler(k: Kinematics) -> Array:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.crash_course import CHOSEN, PITCH, CrashCourse, CrashScenario, Setting
 from strapdown.simulation.plane_impact import YAW_GYRATION, strike, velocity_change
 
@@ -128,9 +128,9 @@ def oblique_impact(
     """
     if not abs(direction_deg) <= 80.0:
         raise ConfigError(
-            f"a force from {direction_deg:g} deg does not come from the front",
+            "simulation.force-does-not-come-front",
             quantity="direction_deg",
-            remedy="stay within 80 deg, or use side_impact",
+            direction_deg=direction_deg,
         )
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.euler_motion import Quaternion, euler_attitude, euler_body_rate
 from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.minimum_jerk import STILL, Track
@@ -53,9 +53,7 @@ class Gesture(FlatMotion):
     def __post_init__(self) -> None:
         if not 0.0 < self.duration < np.inf:
             raise ConfigError(
-                f"a motion cannot last {self.duration:g} s",
-                quantity="duration",
-                remedy="use a number above zero",
+                "simulation.motion-cannot-last", quantity="duration", duration=self.duration
             )
 
     def rate(self, time: ArrayLike) -> Array:

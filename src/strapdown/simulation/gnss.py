@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.antenna import antenna_motion
 from strapdown.sensors.error_draws import Seed, child, gauss_markov, normal
 from strapdown.sensors.triad_errors import ZERO, Triad, TriadLike
@@ -85,9 +85,10 @@ class GnssReceiver:
     def __post_init__(self) -> None:
         if self.on_excess not in ON_EXCESS:
             raise ConfigError(
-                f"'{self.on_excess}' is nothing that a receiver does",
+                "simulation.nothing-receiver-does",
                 quantity="on_excess",
-                remedy=f"use one of {', '.join(ON_EXCESS)}",
+                on_excess=self.on_excess,
+                on_excess_2=ON_EXCESS,
             )
         for f in fields(self):
             given = getattr(self, f.name)
@@ -98,9 +99,9 @@ class GnssReceiver:
             value = np.repeat(value, 3) if triad and value.size == 1 else value
             if value.shape != ((3,) if triad else (1,)):
                 raise ConfigError(
-                    f"{given!r} has not the right shape",
+                    "simulation.not-right-shape" if triad else "simulation.not-right-shape-2",
                     quantity=f.name,
-                    remedy="give one number, or three" if triad else "give one number",
+                    given=given,
                 )
             signed = f.name in ("antenna", "time_offset")
             positive = f.name in ("rate", "correlation_time")
@@ -111,11 +112,10 @@ class GnssReceiver:
                 or (positive and (value == 0.0).any())
             ):
                 raise ConfigError(
-                    f"{given!r} is out of range",
+                    "simulation.out-range-2" if signed else "simulation.out-range-3",
                     quantity=f.name,
-                    remedy="give a finite number"
-                    if signed
-                    else f"give a number {'above zero' if positive else 'of zero or more'}",
+                    given=given,
+                    value="above zero" if positive else "of zero or more",
                 )
             kept = tuple(value.tolist()) if triad else float(value[0])
             object.__setattr__(self, f.name, kept)
@@ -158,9 +158,12 @@ def simulate_gnss(
     count = math.floor(receiver.rate * motion.duration * (1.0 + 1e-12)) + 1
     if not 2 <= count <= _MOST_FIXES:
         raise ConfigError(
-            f"{receiver.rate:g} Hz gives {count} fixes in {motion.duration:g} s",
+            "simulation.hz-gives-fixes",
             quantity="rate",
-            remedy=f"use a rate that gives 2 to {_MOST_FIXES}",
+            rate=receiver.rate,
+            count=count,
+            duration=motion.duration,
+            most_fixes=_MOST_FIXES,
         )
     instants = np.minimum(np.arange(count) / receiver.rate, motion.duration)
     place, velocity = _antenna(motion, instants, receiver)

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.error_draws import child
 from strapdown.simulation.gnss import moved_places
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
@@ -55,9 +55,10 @@ class GnssFault(ABC):
     def __post_init__(self) -> None:
         if not self.begin < self.end:
             raise ConfigError(
-                f"a fault from {self.begin:g} to {self.end:g} s lasts no time",
+                "simulation.fault-lasts-no-time",
                 quantity="begin, end",
-                remedy="give the begin before the end",
+                begin=self.begin,
+                end=self.end,
             )
 
     @abstractmethod
@@ -71,7 +72,7 @@ class GnssFault(ABC):
         if not (is_number(value) and math.isfinite(value) and low <= value <= high):
             upper = f" to {high:g}" if math.isfinite(high) else " or more, finite"
             raise ConfigError(
-                f"{value!r} will not do", quantity=name, remedy=f"give {low:g}{upper}"
+                "simulation.will-not-do", quantity=name, value=value, low=low, upper=upper
             )
 
 
@@ -139,9 +140,7 @@ class GrowingBias(GnssFault):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.rate) != 3 or not all(is_number(x) and math.isfinite(x) for x in self.rate):
-            raise ConfigError(
-                f"{self.rate!r} is no rate", quantity="rate", remedy="give three numbers in m/s"
-            )
+            raise ConfigError("simulation.no-rate", quantity="rate", rate=self.rate)
 
     def broken(
         self, table: pd.DataFrame, within: Flags, random: np.random.Generator
@@ -231,11 +230,14 @@ def inject_gnss_faults(
         if not within.any() or (within.all() and isinstance(fault, Outage)):
             what = "every fix is" if within.any() else "there is no fix"
             raise ConfigError(
-                f"{what} between {fault.begin:g} and {fault.end:g} s",
+                "simulation.between",
                 file=source_of(table),
                 quantity=type(fault).__name__,
-                remedy=f"the table goes from {time[0]:.9g} to {time[-1]:.9g} s: give an interval "
-                "within it",
+                what=what,
+                begin=fault.begin,
+                end=fault.end,
+                time=time[0],
+                time_2=time[-1],
             )
         random = np.random.Generator(np.random.PCG64(child(seed, FAULT_SEED, k)))
         out = fault.broken(out, within, random)

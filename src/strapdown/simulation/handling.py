@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.gesture import Gesture, gesture
 
@@ -43,9 +43,7 @@ class Handling(FlatMotion):
     def __post_init__(self) -> None:
         if not 5.0 <= self.duration < np.inf:
             raise ConfigError(
-                f"no gesture fits into {self.duration:g} s",
-                quantity="duration",
-                remedy="use at least 5 s",
+                "simulation.no-gesture-fits-into", quantity="duration", duration=self.duration
             )
 
     @cached_property

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.error_chain import apply, jitter
 from strapdown.sensors.error_draws import Seed, child
 from strapdown.sensors.low_pass import mean_of_filtered
@@ -199,23 +199,29 @@ def sample_accelerometer(
 def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
     if sampling not in SAMPLINGS:
         raise ConfigError(
-            f"'{sampling}' is no kind of sampling",
+            "simulation.no-kind-sampling",
             quantity="sampling",
-            remedy=f"use {' or '.join(SAMPLINGS)}",
+            sampling=sampling,
+            samplings=SAMPLINGS,
         )
     if not (np.isfinite(rate) and rate * motion.duration >= 1.0):
         raise ConfigError(
-            f"{rate:g} Hz gives fewer than two samples in {motion.duration:g} s",
+            "simulation.hz-gives-fewer-than-two",
             quantity="rate",
-            remedy=f"use at least {1.0 / motion.duration:.3g} Hz",
+            rate=rate,
+            duration=motion.duration,
+            duration_2=1.0 / motion.duration,
         )
     # The last sample still belongs where rounding puts the product just under a whole number.
     samples = np.floor(rate * motion.duration * (1.0 + 1e-12)) + 1.0
     if samples > MOST_SAMPLES:
         raise ConfigError(
-            f"{rate:g} Hz gives {samples:.8g} samples in {motion.duration:g} s",
+            "simulation.hz-gives-samples",
             quantity="rate",
-            remedy=f"use at most {MOST_SAMPLES / motion.duration:.3g} Hz",
+            rate=rate,
+            samples=samples,
+            duration=motion.duration,
+            most_samples=MOST_SAMPLES / motion.duration,
         )
     return np.arange(int(samples)) / rate
 

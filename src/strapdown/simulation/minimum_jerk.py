@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -67,21 +67,21 @@ class Track:
     def __post_init__(self) -> None:
         if not self.times or len(self.times) != len(self.values):
             raise ConfigError(
-                f"{len(self.times)} times and {len(self.values)} values",
+                "simulation.times-values",
                 quantity="track",
-                remedy="give one value for each time, and at least one",
+                count=len(self.times),
+                count_2=len(self.values),
             )
         if not np.isfinite([*self.times, *self.values]).all():
-            raise ConfigError(
-                "a time or a value is not finite", quantity="track", remedy="leave it out"
-            )
+            raise ConfigError("simulation.time-or-value-not-finite", quantity="track")
         falls = np.flatnonzero(np.diff(self.times) <= 0.0)
         if falls.size:
             k = int(falls[0])
             raise ConfigError(
-                f"{self.times[k + 1]:.9g} s does not come after {self.times[k]:.9g} s",
+                "simulation.does-not-come-after",
                 quantity="track",
-                remedy="give rising times",
+                times=self.times[k + 1],
+                times_2=self.times[k],
             )
 
     def evaluate(self, time: ArrayLike) -> tuple[Array, Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.crash_course import (
     CHOSEN,
     PITCH,
@@ -39,9 +39,10 @@ def hard_braking(
     """
     if not (entry_speed > 0.0 and 0.0 < deceleration < math.inf):
         raise ConfigError(
-            f"braking from {entry_speed:g} m/s at {deceleration:g} m/s²",
+            "simulation.braking",
             quantity="entry_speed, deceleration",
-            remedy="give both above zero",
+            entry_speed=entry_speed,
+            deceleration=deceleration,
         )
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)
@@ -122,9 +123,7 @@ def kerb(
     """
     if not 0.0 < entry_speed < math.inf:
         raise ConfigError(
-            f"a speed of {entry_speed:g} m/s does not lead over a kerb",
-            quantity="entry_speed",
-            remedy="give more than zero",
+            "simulation.speed-does-not-lead-over", quantity="entry_speed", entry_speed=entry_speed
         )
     course = CrashCourse(setting or Setting())
     course.approach(entry_speed)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
 from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.minimum_jerk import STILL, Track
@@ -92,17 +92,20 @@ class PathMotion(EarthMotion):
         steepest += sum(abs(w.amplitude) for w in self.pitch_waves)
         if not steepest <= MOST_PITCH:
             raise ConfigError(
-                f"the pitch goes up to {steepest:.6g} deg",
+                "simulation.pitch-goes-up",
                 quantity="pitch",
-                remedy=f"stay within {MOST_PITCH:g} deg",
+                steepest=steepest,
+                most_pitch=MOST_PITCH,
             )
 
         shortest = min([math.inf, *(w.period for w in self._waves)])
         if self.duration / shortest > _MOST_WAVES:
             raise ConfigError(
-                f"a wave of {shortest:.3g} s comes {self.duration / shortest:.3g} times",
+                "simulation.wave-comes-times",
                 quantity="period",
-                remedy=f"use {self.duration / _MOST_WAVES:.3g} s or more, or a shorter motion",
+                shortest=shortest,
+                duration=self.duration / shortest,
+                duration_2=self.duration / _MOST_WAVES,
             )
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.ellipsoids import Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import MOST_NORTHERN, Origin
 from strapdown.simulation.rate_integral import RateIntegral, integrate_rate
 
@@ -97,7 +97,8 @@ def _refuse_pole(place: Array) -> None:
     highest = float(np.degrees(np.abs(place[:, 0]).max(initial=0.0)))
     if not highest <= MOST_NORTHERN:
         raise ConfigError(
-            f"the vehicle comes to a latitude of {highest:.6g} deg",
+            "simulation.vehicle-comes-latitude",
             quantity="latitude",
-            remedy=f"stay within {MOST_NORTHERN:g} deg: at a pole there is no heading",
+            highest=highest,
+            most_northern=MOST_NORTHERN,
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.triad_errors import TriadErrors
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -44,7 +44,7 @@ class TriadDesign:
     def __post_init__(self) -> None:
         if not (math.isfinite(self.rate) and self.rate > 0.0):
             raise ConfigError(
-                f"{self.part}: {self.rate:g} Hz is no rate", quantity="rate", remedy="give it in Hz"
+                "simulation.hz-no-rate", quantity="rate", part=self.part, rate=self.rate
             )
 
 
@@ -79,9 +79,7 @@ class WarmUp:
             if not (math.isfinite(value) and value >= 0.0) or (
                 name == "time_constant" and value == 0.0
             ):
-                raise ConfigError(
-                    f"{value:g} is out of range", quantity=name, remedy="give zero or more, finite"
-                )
+                raise ConfigError("simulation.out-range-4", quantity=name, value=value)
 
     @property
     def left(self) -> float:
@@ -134,11 +132,7 @@ class RecorderDesign:
 
     def __post_init__(self) -> None:
         if not self.accelerometers:
-            raise ConfigError(
-                f"recorder '{self.name}' has none",
-                quantity="accelerometers",
-                remedy="give one or more, the lowest range first",
-            )
+            raise ConfigError("simulation.recorder-none", quantity="accelerometers", name=self.name)
         for name in ("trigger_sd", "high_g_bias"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise _out(self, name, "give zero or more")
@@ -198,7 +192,8 @@ class RecorderTruth:
 
 def _out(design: RecorderDesign, name: str, remedy: str) -> ConfigError:
     return ConfigError(
-        f"recorder '{design.name}': {getattr(design, name):g} is out of range",
+        "simulation.message",
         quantity=name,
-        remedy=remedy,
+        message=f"recorder '{design.name}': {getattr(design, name):g} is out of range",
+        remedy_text=remedy,
     )

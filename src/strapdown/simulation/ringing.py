@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -61,20 +61,14 @@ class Ringing:
         length = math.hypot(*direction)
         if len(direction) != 3 or not 0.0 < length < math.inf:
             raise ConfigError(
-                f"{self.direction!r} is no direction",
-                quantity="direction",
-                remedy="give forward, right, down, not all zero",
+                "simulation.no-direction-2", quantity="direction", direction=self.direction
             )
         object.__setattr__(self, "direction", tuple(x / length for x in direction))
         if not (math.isfinite(self.start) and math.isfinite(self.amplitude)):
-            raise ConfigError(
-                "it is not finite", quantity="start, amplitude", remedy="give s and m/s²"
-            )
+            raise ConfigError("simulation.not-finite", quantity="start, amplitude")
         for name in ("frequency", "decay"):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise ConfigError(
-                    f"{getattr(self, name):g} cannot be", quantity=name, remedy="use more than zero"
-                )
+                raise ConfigError("simulation.cannot", quantity=name, value=getattr(self, name))
 
     def displacement(self, time: ArrayLike) -> Array:
         """From its place on the rigid vehicle, in vehicle axes, (n, 3), m."""

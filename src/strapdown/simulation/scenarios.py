@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.coning import Coning
 from strapdown.simulation.hand_motions import INTENSIVE, PHONE, TABLE_TO_TABLE
@@ -192,6 +192,6 @@ def find_scenario(name: str) -> Scenario:
     """
     if name not in SCENARIOS:
         raise ConfigError(
-            f"'{name}' is no scenario", quantity="scenario", remedy=nearest(name, SCENARIOS)
+            "simulation.no-scenario", quantity="scenario", name=name, word=name, known=SCENARIOS
         )
     return SCENARIOS[name]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.flat_motion import FlatMotion
 
 Array = NDArray[np.float64]
@@ -74,19 +74,18 @@ class Sculling(FlatMotion):
             if not (0.0 < value <= most and np.isfinite(value)):
                 up = f" and at most {most:g} {unit}" if np.isfinite(most) else ""
                 raise ConfigError(
-                    f"{value:g} {unit} makes no sculling",
-                    quantity=name,
-                    remedy=f"use a number above zero{up}",
+                    "simulation.makes-no-sculling", quantity=name, value=value, unit=unit, up=up
                 )
         if not np.isfinite(self.phase):
-            raise ConfigError(f"{self.phase} is no angle", quantity="phase", remedy="use 0 or 90")
+            raise ConfigError("simulation.no-angle", quantity="phase", phase=self.phase)
         n, e = np.asarray(self.swing_axis), np.asarray(self.push_axis)
         length = float(np.linalg.norm(n) * np.linalg.norm(e))
         if not (np.isfinite(length) and length > 0.0 and abs(n @ e) <= 1e-9 * length):
             raise ConfigError(
-                f"{self.swing_axis} and {self.push_axis} do not stand across each other",
+                "simulation.do-not-stand-across-each",
                 quantity="push_axis",
-                remedy="use (1, 0, 0) and (0, 1, 0)",
+                swing_axis=self.swing_axis,
+                push_axis=self.push_axis,
             )
 
     @property

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.error_draws import child
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import is_number
@@ -58,15 +58,18 @@ class SensorFault:
     def __post_init__(self) -> None:
         if self.channel not in CHANNELS:
             raise ConfigError(
-                f"'{self.channel}' is no channel",
+                "simulation.no-channel",
                 quantity="channel",
-                remedy=nearest(str(self.channel), CHANNELS),
+                channel=self.channel,
+                word=str(self.channel),
+                known=CHANNELS,
             )
         if not self.begin < self.end:
             raise ConfigError(
-                f"a fault from {self.begin:g} to {self.end:g} s lasts no time",
+                "simulation.fault-lasts-no-time",
                 quantity="begin, end",
-                remedy="give the begin before the end",
+                begin=self.begin,
+                end=self.end,
             )
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
@@ -76,9 +79,7 @@ class SensorFault:
     def _checked(self, name: str, least: float = 0.0) -> None:
         value = getattr(self, name)
         if not is_number(value) or not least <= value < math.inf:
-            raise ConfigError(
-                f"{value!r} will not do", quantity=name, remedy=f"give {least:g} or more, finite"
-            )
+            raise ConfigError("simulation.will-not-do-2", quantity=name, value=value, least=least)
 
 
 @dataclass(frozen=True)
@@ -164,9 +165,7 @@ class Saturated(SensorFault):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not is_number(self.limit) or not self.limit > 0.0:
-            raise ConfigError(
-                f"{self.limit!r} is no range", quantity="limit", remedy="give more than zero"
-            )
+            raise ConfigError("simulation.no-range", quantity="limit", limit=self.limit)
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
         """As `SensorFault.broken`."""
@@ -192,9 +191,7 @@ class Burst(SensorFault):
         super().__post_init__()
         self._checked("size")
         if not is_number(self.share) or not 0.0 < self.share <= 1.0:
-            raise ConfigError(
-                f"{self.share!r} is no share", quantity="share", remedy="give zero to one"
-            )
+            raise ConfigError("simulation.no-share", quantity="share", share=self.share)
 
     def broken(self, values: Array, generator: np.random.Generator) -> Array:
         """As `SensorFault.broken`."""
@@ -234,9 +231,11 @@ def inject_faults(
         within = (time >= fault.begin) & (time < fault.end)
         if fault.channel not in out.columns or not within.any():
             raise ConfigError(
-                f"the table has no {fault.channel} between {fault.begin:g} and {fault.end:g} s",
+                "simulation.table-no-between",
                 quantity=type(fault).__name__,
-                remedy="name a channel and an interval that it has",
+                channel=fault.channel,
+                begin=fault.begin,
+                end=fault.end,
             )
         values = out[fault.channel].to_numpy(dtype=np.float64).copy()
         generator = np.random.Generator(np.random.PCG64(child(seed, FAULT_SEED, k)))

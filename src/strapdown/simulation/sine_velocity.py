@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin, check_duration
 from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_attitude import along_velocity
@@ -66,17 +66,19 @@ class SineVelocityMotion(EarthMotion):
         least = self.duration * _LEAST_PERIOD
         if not least <= self.period < math.inf:
             raise ConfigError(
-                f"the velocity is to change with a period of {self.period:g} s",
+                "simulation.velocity-change-period",
                 quantity="period",
-                remedy=f"use {least:.3g} s or more for a motion of {self.duration:g} s",
+                period=self.period,
+                least=least,
+                duration=self.duration,
             )
         cycle = np.linspace(0.0, min(self.period, self.duration), 4097)
         speed = np.hypot(*self._velocity(cycle)[:, :2].T)
         if speed.min() <= _LEAST * speed.max():
             raise ConfigError(
-                f"the horizontal speed falls to {speed.min():.3g} m/s, where a path has no heading",
+                "simulation.horizontal-speed-falls-path-no",
                 quantity="mean_velocity, amplitude",
-                remedy="let the vehicle move at every instant, or use StationaryMotion",
+                speed=speed.min(),
             )
 
     @property

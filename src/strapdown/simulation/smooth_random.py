@@ -9,7 +9,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.euler_motion import Quaternion, euler_attitude, euler_body_rate
 from strapdown.simulation.flat_motion import FlatMotion
 from strapdown.simulation.minimum_jerk import minimum_jerk
@@ -68,18 +68,21 @@ class SmoothRandom(FlatMotion):
     def __post_init__(self) -> None:
         if not (self.ramp > 0.0 <= self.rest and 2.0 * self.ramp <= self._moving < np.inf):
             raise ConfigError(
-                f"two rests of {self.rest:g} s and two ramps of {self.ramp:g} s do not fit into "
-                f"{self.duration:g} s",
+                "simulation.two-rests-two-ramps-do",
                 quantity="duration",
-                remedy=f"use at least {2.0 * (self.rest + self.ramp):g} s",
+                rest=self.rest,
+                ramp=self.ramp,
+                duration=self.duration,
+                rest_2=2.0 * (self.rest + self.ramp),
             )
         first, last = self._orders
         if not 1 <= first <= last:
             raise ConfigError(
-                f"no multiple of {1.0 / self._moving:.3g} Hz, one cycle in the moving time, lies "
-                f"between {self.band[0]:g} and {self.band[1]:g} Hz",
+                "simulation.no-multiple-hz-cycle-moving",
                 quantity="band",
-                remedy="use a wider band above zero, or a longer motion",
+                moving=1.0 / self._moving,
+                band=self.band[0],
+                band_2=self.band[1],
             )
 
     def rate(self, time: ArrayLike) -> Array:

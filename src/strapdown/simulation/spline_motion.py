@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import MOST_NORTHERN, EarthMotion, Kinematics, Origin
 from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.path_attitude import along_velocity
@@ -166,9 +166,10 @@ class SplineMotion(EarthMotion):
         highest = float(np.degrees(np.abs(at[:, 0]).max()))
         if highest > MOST_NORTHERN:
             raise ConfigError(
-                f"the path comes to a latitude of {highest:.6g} deg",
+                "simulation.path-comes-latitude",
                 quantity="lat_deg",
-                remedy=f"stay within {MOST_NORTHERN:g} deg: at a pole there is no heading",
+                highest=highest,
+                most_northern=MOST_NORTHERN,
             )
         velocity, acceleration = np.empty(moved.shape), np.empty(moved.shape)
         velocities(at, first, second, self.ellipsoid.parameters(), velocity, acceleration)
@@ -176,10 +177,11 @@ class SplineMotion(EarthMotion):
         worst = int(np.argmax(size))
         if size[worst] > self.most_acceleration:
             raise ConfigError(
-                f"the path takes {size[worst]:.3g} m/s² at {looks[worst]:.4g} s, more than the "
-                f"{self.most_acceleration:g} m/s² allowed",
+                "simulation.path-takes-more-than-allowed",
                 quantity="acceleration",
-                remedy="go slower there, or give more places around the bend",
+                size=size[worst],
+                looks=looks[worst],
+                most_acceleration=self.most_acceleration,
             )
         level = np.hypot(velocity[:, 0], velocity[:, 1])
         if self.euler is None:
@@ -188,10 +190,9 @@ class SplineMotion(EarthMotion):
             lost[:-1] |= along < _BEND * level[:-1] * level[1:]
             if lost.any():
                 raise ConfigError(
-                    f"the path stops or turns back at {looks[np.argmax(lost)]:.4g} s, and has no "
-                    "heading there",
+                    "simulation.path-stops-or-turns-back",
                     quantity="place",
-                    remedy="give places that lead round the bend",
+                    looks=looks[np.argmax(lost)],
                 )
         if self.euler is None:
             pitch = np.degrees(np.arctan2(np.abs(velocity[:, 2]), level))
@@ -203,44 +204,41 @@ class SplineMotion(EarthMotion):
 def _check_points(time: Array, place: Array) -> None:
     if time.ndim != 1 or len(time) < 2 or place.shape != (len(time), 3):
         raise ConfigError(
-            f"times of shape {time.shape} and places of shape {place.shape}",
+            "simulation.times-shape-places-shape",
             quantity="place",
-            remedy="give two places or more, each with its time",
+            shape=time.shape,
+            shape_2=place.shape,
         )
     if not (np.isfinite(time).all() and np.isfinite(place).all()):
-        raise ConfigError(
-            "a time or a coordinate is not finite", quantity="place", remedy="leave it out"
-        )
+        raise ConfigError("simulation.time-or-coordinate-not-finite", quantity="place")
     falls = np.flatnonzero(np.diff(time) <= 0.0)
     if falls.size:
         k = int(falls[0])
         raise ConfigError(
-            f"{time[k + 1]:.9g} s does not come after {time[k]:.9g} s",
+            "simulation.does-not-come-after-2",
             quantity=f"place {k + 2}, time",
-            remedy="give rising times",
+            time=time[k + 1],
+            time_2=time[k],
         )
     if time[0] != 0.0:
-        raise ConfigError(
-            f"it is {time[0]:.9g} s",
-            quantity="place 1, time",
-            remedy="count from the first place, at 0 s",
-        )
+        raise ConfigError("simulation.time", quantity="place 1, time", time=time[0])
     for k, (lat, lon, alt) in enumerate(place.tolist()):
         try:
             Origin(lat, lon, alt)
         except ConfigError as error:
             f = error.finding
             raise ConfigError(
-                f.what, quantity=f"place {k + 1}, {f.quantity}", remedy=f.remedy
+                "simulation.message",
+                quantity=f"place {k + 1}, {f.quantity}",
+                message=f.what,
+                remedy_text=f.remedy,
             ) from None
 
 
 def _check_euler(euler: Array, count: int) -> None:
     if euler.shape != (count, 3) or not np.isfinite(euler).all():
         raise ConfigError(
-            f"angles of shape {euler.shape}, or not finite",
-            quantity="euler",
-            remedy="give roll, pitch and heading in deg for each place",
+            "simulation.angles-shape-or-not-finite", quantity="euler", shape=euler.shape
         )
 
 
@@ -248,9 +246,11 @@ def _check_pitch(pitch: Array, time: Array) -> None:
     worst = int(np.argmax(pitch))
     if pitch[worst] > MOST_PITCH:
         raise ConfigError(
-            f"the pitch comes to {pitch[worst]:.4g} deg at {time[worst]:.4g} s",
+            "simulation.pitch-comes",
             quantity="pitch",
-            remedy=f"stay within {MOST_PITCH:g} deg",
+            pitch=pitch[worst],
+            time=time[worst],
+            most_pitch=MOST_PITCH,
         )
 
 

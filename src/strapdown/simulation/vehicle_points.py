@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import earth, frames, rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.tables import EULER, NED, VELOCITY
 
@@ -200,9 +200,7 @@ def rigid_arm(position: ArrayLike, count: int) -> Arm:
     r = np.asarray(position, dtype=np.float64)
     if r.shape != (3,) or not np.isfinite(r).all():
         raise ConfigError(
-            f"{position!r} are not three finite numbers",
-            quantity="position",
-            remedy="give forward, right, down in m, from the vehicle's origin",
+            "simulation.not-three-finite-numbers-2", quantity="position", position=position
         )
     still = np.zeros((count, 3))
     return Arm(np.tile(r, (count, 1)), still, still)
@@ -212,9 +210,7 @@ def in_axes_of(motion: EarthMotion, point: MovingPoint, epoch: float) -> PointKi
     """Turn what is in vehicle axes into those of the place of the origin at an epoch."""
     if not 0.0 <= epoch <= motion.duration:
         raise ConfigError(
-            f"{epoch:g} s is outside of a motion of {motion.duration:g} s",
-            quantity="epoch",
-            remedy="give an instant of the motion",
+            "simulation.outside-motion", quantity="epoch", epoch=epoch, duration=motion.duration
         )
     start = _degrees(motion, np.array([epoch]))[0]
     level = rotation.compose(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.earth_motion import EarthMotion, Kinematics, Origin
 from strapdown.simulation.euler_motion import euler_attitude, euler_body_rate
 from strapdown.simulation.minimum_jerk import Track
@@ -60,20 +60,12 @@ class Gait:
     def __post_init__(self) -> None:
         for name in ("swing", "stance", "strike_time"):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise ConfigError(
-                    "a gait needs a time above zero", quantity=name, remedy="give seconds"
-                )
+                raise ConfigError("simulation.gait-needs-time-above-zero", quantity=name)
         if not self.strike_time < 0.2 * self.swing:
-            raise ConfigError(
-                "the blow lasts more than a fifth of the swing",
-                quantity="strike_time",
-                remedy="give less, as 0.02 s",
-            )
+            raise ConfigError("simulation.blow-lasts-more-than-fifth", quantity="strike_time")
         if not max(abs(self.heel_off_deg), abs(self.toe_up_deg)) < MOST_PITCH:
             raise ConfigError(
-                f"the shoe pitches by {MOST_PITCH:g} deg or more",
-                quantity="pitch",
-                remedy="give less",
+                "simulation.shoe-pitches-or-more", quantity="pitch", most_pitch=MOST_PITCH
             )
 
 
@@ -137,17 +129,11 @@ class WalkingMotion(EarthMotion):
 
     def __post_init__(self) -> None:
         if not self.strides or not 0.0 < self.stand < math.inf:
-            raise ConfigError(
-                "a walk has a stride and a stand",
-                quantity="strides",
-                remedy="give a stride or more, and a stand of some seconds",
-            )
+            raise ConfigError("simulation.walk-stride-stand", quantity="strides")
         steep = max(max(s.gait.heel_off_deg, s.gait.toe_up_deg) for s in self.strides)
         if not steep + abs(self.pitch_deg) < MOST_PITCH + 8.0:
             raise ConfigError(
-                f"the unit pitches by {steep + abs(self.pitch_deg):.3g} deg",
-                quantity="pitch_deg",
-                remedy="mount it less steeply",
+                "simulation.unit-pitches", quantity="pitch_deg", steep=steep + abs(self.pitch_deg)
             )
 
     @property

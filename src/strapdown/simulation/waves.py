@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 Array = NDArray[np.float64]
 
@@ -38,14 +38,10 @@ class Wave:
     def __post_init__(self) -> None:
         if not 0.0 < self.period < math.inf:
             raise ConfigError(
-                f"a wave cannot have a period of {self.period:g} s",
-                quantity="period",
-                remedy="use a number above zero",
+                "simulation.wave-cannot-period", quantity="period", period=self.period
             )
         if not (math.isfinite(self.amplitude) and math.isfinite(self.phase_deg)):
-            raise ConfigError(
-                "its amplitude or phase is not finite", quantity="wave", remedy="give numbers"
-            )
+            raise ConfigError("simulation.amplitude-or-phase-not-finite", quantity="wave")
 
 
 def sum_waves(waves: Sequence[Wave], time: Array) -> tuple[Array, Array, Array]:

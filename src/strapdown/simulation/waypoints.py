@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.spline_motion import SplineMotion
 
 Array = NDArray[np.float64]
@@ -49,19 +49,11 @@ def through_waypoints(
     """
     rows = np.array(places, dtype=np.float64).reshape(-1, 3)
     if (times is None) == (speeds is None):
-        raise ConfigError(
-            "there are neither times nor speeds, or both",
-            quantity="places",
-            remedy="give each place a time, or each leg a speed",
-        )
+        raise ConfigError("simulation.neither-times-nor-speeds-or", quantity="places")
     same = np.flatnonzero(np.all(np.diff(rows, axis=0) == 0.0, axis=1))
     if same.size:
         k = int(same[0])
-        raise ConfigError(
-            "it is where the one before it is",
-            quantity=f"place {k + 2}",
-            remedy="leave it out: a path through it has no heading there",
-        )
+        raise ConfigError("simulation.before", quantity=f"place {k + 2}")
     stamps = _times(rows, speeds, ellipsoid) if speeds is not None else np.array(times, dtype=float)
     return SplineMotion(
         stamps,
@@ -75,17 +67,11 @@ def through_waypoints(
 def _times(places: Array, speeds: Sequence[float], ellipsoid: Ellipsoid) -> Array:
     if len(speeds) != len(places) - 1:
         raise ConfigError(
-            f"{len(speeds)} speeds for {len(places) - 1} legs",
-            quantity="speed",
-            remedy="give one for each leg",
+            "simulation.speeds-legs", quantity="speed", count=len(speeds), count_2=len(places) - 1
         )
     for k, speed in enumerate(speeds):
         if not 0.0 < speed < math.inf:
-            raise ConfigError(
-                f"it is {speed:g} m/s",
-                quantity=f"place {k + 2}, speed",
-                remedy="use a number above zero",
-            )
+            raise ConfigError("simulation.speed-2", quantity=f"place {k + 2}, speed", speed=speed)
     from strapdown._kernels.earth import radii
 
     times = [0.0]

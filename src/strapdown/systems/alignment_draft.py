@@ -14,7 +14,7 @@ from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.config.alignment_file import MAY_BE_EMPTY, STAGES
 from strapdown.config.slots import SLOTS, Slot, options_of
 from strapdown.config.toml_text import ASK, Asked, Page, inline, string
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.formats.recording import Recording
 from strapdown.sensors.axes_matrix import NAMED_AXES
 from strapdown.sensors.catalogue import SENSORS, load_sensor

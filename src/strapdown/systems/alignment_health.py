@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ChannelFault, check_imu_channels
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -56,12 +56,12 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
             worst = max(own, key=lambda f: f.last - f.first)
             said = worst.finding
             raise DataError(
-                f"{said.what}: {100.0 * lost / len(imu):.0f} % of the record cannot be aligned "
-                "with it",
+                "alignment.message",
                 file=said.file,
                 row=said.row,
                 quantity=said.quantity,
-                remedy=said.remedy if whole else _without(imu, worst.begin, worst.end),
+                message=f"{said.what}: {100.0 * lost / len(imu):.0f} % of the record cannot be aligned with it",
+                remedy_text=said.remedy if whole else _without(imu, worst.begin, worst.end),
             )
     return (*(f.finding for f in faults), *_made_up(imu))
 
@@ -86,10 +86,9 @@ def _made_up(imu: pd.DataFrame) -> tuple[Finding, ...]:
         return ()
     return (
         Finding(
-            f"no channel ever changes: all {len(imu)} samples are the same, and no sensor is "
-            "without noise",
+            "alignment.no-channel-ever-changes-all",
             file=source_of(imu),
             quantity="gyro, accel",
-            remedy="check that the log was recorded and not filled in, or held at its last sample",
+            count=len(imu),
         ),
     )

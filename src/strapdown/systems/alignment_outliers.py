@@ -10,7 +10,7 @@ import pandas as pd
 
 from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.prefilter import PrefilterReport
 from strapdown.prefilter.report import LEAVE_IT_OUT
 from strapdown.tables import ACCEL, GYRO
@@ -51,13 +51,14 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
         f = error.finding
         first = float(imu.index[rows[0]])
         raise DataError(
-            f"{f.what}; {len(rows)} samples of {channel} stand out as outliers, the first at "
-            f"{first:.6g} s",
+            "alignment.samples-stand-out-outliers-first",
             file=f.file,
             row=f.row,
             quantity=f.quantity,
-            remedy="take a pre-filter that replaces outliers (robust_fir), or look at the channel; "
-            f"else {f.remedy}",
+            reason=f,
+            count=len(rows),
+            channel=channel,
+            first=first,
         ) from None
 
 
@@ -69,11 +70,13 @@ def _faults(report: PrefilterReport) -> tuple[Finding, ...]:
 def _after_prefilter(error: DataError, said: Finding) -> DataError:
     f = error.finding
     return DataError(
-        f"{f.what}; the pre-filter said of {said.quantity} before: {said.what}",
+        "alignment.pre-filter-said-before",
         file=f.file,
         row=f.row if said.row is None else said.row,
         quantity=f.quantity,
-        remedy=f"{said.remedy}; else {f.remedy}",
+        reason=f,
+        of_what=said.quantity,
+        reason_2=said,
     )
 
 
@@ -84,11 +87,7 @@ def _with_unquiet(error: DataError, imu: pd.DataFrame) -> DataError:
         return error
     f = error.finding
     return DataError(
-        f"{f.what}; {said}",
-        file=f.file,
-        row=f.row,
-        quantity=f.quantity,
-        remedy=f"look at the record there, or cut it to where it is quiet; else {f.remedy}",
+        "alignment.reason-said", file=f.file, row=f.row, quantity=f.quantity, reason=f, said=said
     )
 
 

@@ -20,7 +20,7 @@ from strapdown.config.choice import make_choice
 from strapdown.config.navigation_modules import sensors_of
 from strapdown.config.slots import SLOTS
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.prefilter import Prefilter, PrefilterReport
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -203,10 +203,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
     kept = time <= time[0] + duration + 1e-6 * step
     if kept.sum() < 2:
         raise DataError(
-            f"{duration:g} s hold no two samples",
-            file=source_of(imu),
-            quantity="time",
-            remedy="align for longer",
+            "alignment.hold-no-two-samples", file=source_of(imu), quantity="time", duration=duration
         )
     out: pd.DataFrame = imu.loc[kept]
     out.attrs = dict(imu.attrs)
@@ -219,11 +216,10 @@ def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
     out.attrs = dict(imu.attrs)
     if len(out) < 2:
         raise DataError(
-            f"nothing is left for the fine alignment: the coarse one takes all "
-            f"{float(imu.index[-1] - imu.index[0]):.6g} s",
+            "alignment.nothing-left-fine-alignment-coarse",
             file=source_of(imu),
             quantity="coarse, duration_s",
-            remedy="give it less, or leave its duration out: then both use the whole record",
+            index=float(imu.index[-1] - imu.index[0]),
         )
     return out
 

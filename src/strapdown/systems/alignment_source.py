@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.formats import read_log
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
@@ -210,10 +210,13 @@ def _said(recording: Recording, gyro: Array, accel: Array) -> Sequence[Finding]:
             continue
         out.append(
             Finding(
-                f"turned further, by roll {roll:.4g}°, pitch {pitch:.4g}°, heading "
-                f"{heading:.4g}°, as the matrix in the configuration states",
+                "alignment.turned-further-roll-pitch-heading",
                 file=recording.name,
                 quantity=name,
+                severity="note",
+                roll=roll,
+                pitch=pitch,
+                heading=heading,
             )
         )
     return out

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from strapdown.attitude import AttitudeAlgorithm, make_algorithm, run_attitude
 from strapdown.attitude.cost import count_cost
 from strapdown.config import AttitudeSpec, specify
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import largest_differences
 from strapdown.evaluation.known import known_at
 from strapdown.evaluation.place_scores import score_places
 from strapdown.evaluation.reference_points import score_references
-from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.increments import increments_from_imu
 from strapdown.results.attitude_bench import AttitudeBench
 from strapdown.sensors.rest import find_rests
@@ -152,7 +152,7 @@ def bench_attitude(
     """
     sources = as_texts(source)
     if not sources:
-        raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+        raise ConfigError("attitude.nothing-named", quantity="source")
     for one in rates:
         refuse_no_rate(float(one))
     check_part(from_s, to_s, duration_s)
@@ -253,12 +253,10 @@ def _part_of(progress: Progress, k: int, count: int) -> Progress:
 def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
     algorithms = [make_algorithm(text) for text in texts]
     if not algorithms:
-        raise ConfigError("none is named", quantity="algorithms", remedy="name at least one")
+        raise ConfigError("attitude.none-named", quantity="algorithms")
     if len({a.label for a in algorithms}) < len(algorithms):
         raise ConfigError(
-            f"one is named twice: {', '.join(a.label for a in algorithms)}",
-            quantity="algorithms",
-            remedy="name each once, or give it different options",
+            "attitude.named-twice", quantity="algorithms", algorithms=[a.label for a in algorithms]
         )
     return algorithms
 
@@ -279,11 +277,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
     q_nb, initial, begin = initial_attitude(spec.initial, source, rests, findings)
     imu = imu[imu.index >= begin]
     if len(imu) < 2:
-        raise DataError(
-            f"fewer than two samples are left from {begin:.9g} s, where the attitude is known",
-            file=source.name,
-            remedy="give another --initial",
-        )
+        raise DataError("attitude.fewer-than-two-samples-left", file=source.name, begin=begin)
     if second is not None and source.truth is None:
         source = truth_of_second(source, second, imu, q_nb)
     findings = [*source.findings, *findings]

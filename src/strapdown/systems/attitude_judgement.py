@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.errors import Finding
 from strapdown.evaluation.differences import error_angles
-from strapdown.exceptions import Finding
 from strapdown.results.runs import AttitudeRun
 from strapdown.results.scores import Score
 from strapdown.systems.attitude_source import Source
@@ -70,11 +70,11 @@ def judge_turns(scores: list[Score]) -> list[Finding]:
         off = (score.turned_deg - score.expected_deg) / 360.0
         if abs(off) > 0.5:
             findings[score.against] = Finding(
-                f"'{score.against}' says {score.expected_deg / 360.0:g} turns, and the gyro turned "
-                f"{score.turned_deg / 360.0:.2f}",
+                "attitude.says-turns-gyro-turned",
                 quantity="reference",
-                remedy="check the sign (right-handed about the axis named), the number and the "
-                "axis; the error angle does not tell whole turns apart",
+                against=score.against,
+                expected_deg=score.expected_deg / 360.0,
+                turned_deg=score.turned_deg / 360.0,
             )
     return list(findings.values())
 
@@ -89,9 +89,12 @@ def judge_truth(source: Source, span: tuple[float, float]) -> list[Finding]:
         return []
     return [
         Finding(
-            f"it covers {covered:.4g} of {span[1] - span[0]:.4g} s; of the rest nothing is known",
+            "attitude.covers-rest-nothing-known",
             file=source.name,
             quantity="truth",
+            severity="note",
+            covered=covered,
+            span=span[1] - span[0],
         )
     ]
 
@@ -115,11 +118,10 @@ def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Findin
         if passed_pole(run):
             findings.append(
                 Finding(
-                    f"{_how_near(run)} ±90° pitch at "
-                    f"{run.diagnostics['closest_to_pole_time_s']:.6g} s, where its equations "
-                    "divide by zero; what it says from there on is not to be trusted",
+                    "attitude.pitch-equations-divide-zero-says",
                     quantity=run.algorithm,
-                    remedy="use dcm or quaternion, which have no such place",
+                    how_near=_how_near(run),
+                    diagnostics=run.diagnostics["closest_to_pole_time_s"],
                 )
             )
     turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))
@@ -129,11 +131,10 @@ def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Findin
     if turn[largest] > LARGE_STEP:
         findings.append(
             Finding(
-                f"a single step turns by {np.degrees(turn[largest]):.3g}° (at "
-                f"{increments.index[largest]:.6g} s): the rate says little of what happened "
-                "within it",
+                "attitude.single-step-turns-rate-says",
                 quantity="gyro",
-                remedy="use a higher rate",
+                turn_deg=np.degrees(turn[largest]),
+                index=increments.index[largest],
             )
         )
     return findings

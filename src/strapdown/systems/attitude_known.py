@@ -9,13 +9,13 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config import AttitudeSpec, ScenarioSpec
+from strapdown.errors import ConfigError, Finding
 from strapdown.evaluation.known import known_at
 from strapdown.evaluation.place_references import PlaceReference, is_place, parse_place
 from strapdown.evaluation.reference_points import references_from_words
 from strapdown.evaluation.rest_references import same_pose_candidates, tilt_references
 from strapdown.evaluation.second_log import align_second_log
 from strapdown.evaluation.second_log_truth import second_clock, truth_from_second_log
-from strapdown.exceptions import ConfigError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.recording import Recording
 from strapdown.results.rests import RestStretch, SamePose
@@ -80,11 +80,12 @@ def gather_references(
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled and usable else None)
         if tilts.empty:
             raise ConfigError(
-                "no rest with acceleration was found"
-                + (" after the one that the run is levelled from" if levelled else ""),
+                "attitude.message",
                 file=source.name,
                 quantity="--reference rests",
-                remedy="leave it out, or name reference points in words",
+                message="no rest with acceleration was found"
+                + (" after the one that the run is levelled from" if levelled else ""),
+                remedy_text="leave it out, or name reference points in words",
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return Told(
@@ -126,11 +127,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     if spec.reference_log_path is None:
         return source, None
     if spec.truth_path is not None:
-        raise ConfigError(
-            "an attitude truth was given, too",
-            quantity="--reference-log",
-            remedy="give one of the two",
-        )
+        raise ConfigError("attitude.attitude-truth-given-too", quantity="--reference-log")
     recording = read_log(spec.reference_log_path)
     aligned = align_second_log(source.imu, recording.imu)
     inside = (source.imu.index >= aligned.start) & (source.imu.index <= aligned.end)
@@ -178,10 +175,9 @@ def truth_of_second(source: Source, second: Second, imu: pd.DataFrame, q_nb: Arr
     if not rests:
         findings += (
             Finding(
-                "no rest was found in it, so that its bias is in the truth that it gives",
+                "attitude.no-rest-found-bias-truth",
                 file=second.recording.name,
                 quantity="gyro bias",
-                remedy="let the recording begin with two seconds of rest",
             ),
         )
     truth = truth_from_second_log(

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.errors import Finding
 from strapdown.evaluation.reference_points import score_references
-from strapdown.exceptions import Finding
 from strapdown.peers import PEERS, align_heading, run_peers
 from strapdown.results.runs import AttitudeRun, PeerRun
 from strapdown.systems.attitude_judgement import truth_score

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.config import LogSpec, ScenarioSpec, specify
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.formats.references import read_reference_words
 from strapdown.simulation import SCENARIOS, find_scenario
 
@@ -77,17 +77,13 @@ def source_spec(
         There is no such thing, or something was said that the other kind needs.
     """
     if trials < 1:
-        raise ConfigError(f"{trials} is no number of trials", quantity="--trials", remedy="use 1")
+        raise ConfigError("attitude.no-number-trials", quantity="--trials", trials=trials)
     name = text.strip().lower()
     if not name:
-        raise ConfigError("nothing is named", quantity="source", remedy="name a log or a scenario")
+        raise ConfigError("attitude.nothing-named", quantity="source")
     if name in SCENARIOS:
         if given := [key for key, value in reading.items() if value is not None]:
-            raise ConfigError(
-                f"{', '.join(given)}: a scenario is not read from a file",
-                quantity=name,
-                remedy="leave that out",
-            )
+            raise ConfigError("attitude.scenario-not-read-file", quantity=name, given=given)
         first = 0 if seed is None else seed
         highest = max((float(r) for r in rates), default=100.0)
         return [
@@ -102,19 +98,11 @@ def source_spec(
             for k in range(trials)
         ]
     if seed is not None:
-        raise ConfigError(
-            "a recorded log has no noise to be drawn", quantity="seed", remedy="leave it out"
-        )
+        raise ConfigError("attitude.recorded-log-no-noise-drawn", quantity="seed")
     if sensor is not None:
-        raise ConfigError(
-            "a recorded log has the sensor that it has", quantity="sensor", remedy="leave it out"
-        )
+        raise ConfigError("attitude.recorded-log-sensor", quantity="sensor")
     if trials > 1:
-        raise ConfigError(
-            "a recorded log is what it is, and is not drawn again",
-            quantity="--trials",
-            remedy="name several logs instead",
-        )
+        raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
     if not exists(text) and not Path(text).suffix and len(Path(text).parts) == 1:
         find_scenario(name)  # says which names there are
     said = {key: value for key, value in reading.items() if value is not None}
@@ -134,12 +122,7 @@ def one_of_each(
     for source in sources:
         if source in found:
             name = source.name if isinstance(source, ScenarioSpec) else source.path
-            raise ConfigError(
-                "it is named twice, and one trial does not count as two",
-                file=name,
-                quantity="source",
-                remedy="name each log once; of a scenario use --trials for more seeds",
-            )
+            raise ConfigError("attitude.named-twice-trial-does-not", file=name, quantity="source")
         found.append(source)
     return found
 
@@ -162,28 +145,16 @@ def sort_references(items: Sequence[str]) -> tuple[tuple[str, ...], str | None]:
         path = Path(item)
         if not exists(item):
             if " " not in item.strip() and path.suffix:
-                raise ConfigError(
-                    "there is no such file",
-                    file=item,
-                    quantity="reference",
-                    remedy="check the path, or say it in words: 'end same as start'",
-                )
+                raise ConfigError("attitude.no-such-file", file=item, quantity="reference")
             words.append(item)
         elif path.is_dir():
-            raise ConfigError(
-                "it is a folder",
-                file=item,
-                quantity="reference",
-                remedy="name one file",
-            )
+            raise ConfigError("attitude.folder", file=item, quantity="reference")
         elif (listed := read_reference_words(path)) is not None:
             words += listed
         elif truth is None:
             truth = str(path)
         else:
             raise ConfigError(
-                f"two attitude truths were given: {truth} and {item}",
-                quantity="reference",
-                remedy="give one; reference points may be as many as you like",
+                "attitude.two-attitude-truths-given", quantity="reference", truth=truth, item=item
             )
     return tuple(words), truth

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from strapdown.attitude import Quaternion, run_attitude
 from strapdown.bundle.seal import sha256
 from strapdown.config import AttitudeSpec, LogSpec, ScenarioSpec
+from strapdown.errors import DataError, Finding
 from strapdown.evaluation.differences import error_angles
-from strapdown.exceptions import DataError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.recording import Origin, ReadOptions
 from strapdown.formats.references import read_truth
@@ -211,12 +211,14 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
     if inside.sum() < 2:
         log = source.imu.index
         raise DataError(
-            f"{int(inside.sum())} of its instants lie within the log: it runs from "
-            f"{truth.index[0]:.9g} to {truth.index[-1]:.9g} s, and the log from {log[0]:.9g} to "
-            f"{log[-1]:.9g} s",
+            "attitude.instants-lie-within-log-runs",
             file=path.name,
             quantity="time",
-            remedy="bring both to one clock",
+            inside=int(inside.sum()),
+            index=truth.index[0],
+            index_2=truth.index[-1],
+            log=log[0],
+            log_2=log[-1],
         )
     return replace(
         source,

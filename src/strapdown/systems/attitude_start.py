@@ -13,8 +13,8 @@ from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.config import AttitudeSpec, LogSpec
 from strapdown.constants import GYRO_SUMS, GYRO_UNITS
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.known import known_at
-from strapdown.exceptions import ConfigError, DataError, Finding
 from strapdown.formats import read_log
 from strapdown.formats.unit_words import factor_of, parse_unit
 from strapdown.results.inputs import InputFiles
@@ -58,10 +58,7 @@ def find_gyro_bias(
         found = find_rests(other.imu)
         if not found:
             raise DataError(
-                "no stationary stretch of a second or more was found in it",
-                file=other.name,
-                quantity="gyro bias",
-                remedy="give a log of the sensor lying still, or the bias itself",
+                "attitude.no-stationary-stretch-second-or", file=other.name, quantity="gyro bias"
             )
         longest = max(found, key=lambda r: r.end - r.start)
         files = input_files("gyro-bias", spec.gyro_bias_path, other.files)
@@ -74,11 +71,7 @@ def find_gyro_bias(
     if choice in ("rest", "rests"):
         if not rests:
             raise DataError(
-                "no stationary stretch of a second or more was found",
-                file=source.name,
-                quantity="gyro bias",
-                remedy="give the bias itself, as in --gyro-bias '4.5,0.1,1.1 deg/s', or a log of "
-                "the sensor lying still",
+                "attitude.no-stationary-stretch-second-or-2", file=source.name, quantity="gyro bias"
             )
         if choice == "rests" and len(rests) > 1:
             course = gyro_bias_from_rests(rests)
@@ -134,18 +127,11 @@ def _stated_bias(text: str) -> tuple[list[float], str]:
         if not np.isfinite(numbers).all():
             raise ValueError
     except ValueError:
-        raise ConfigError(
-            f"'{text}' is no bias",
-            quantity="--gyro-bias",
-            remedy="give none, rest, rests, three numbers and a unit about the body's forward, "
-            "right and down axis ('-4.5,-0.1,-1.1 deg/s'), or a log of the sensor lying still",
-        ) from None
+        raise ConfigError("attitude.no-bias", quantity="--gyro-bias", text=text) from None
     unit = parse_unit((match.group(4) or "rad/s").strip(), "gyro")
     if unit in GYRO_SUMS:
         raise ConfigError(
-            f"'{unit}' is an increment, and a bias is a rate",
-            quantity="--gyro-bias",
-            remedy=f"state it in a unit of rates: {', '.join(GYRO_UNITS)}",
+            "attitude.increment-bias-rate", quantity="--gyro-bias", unit=unit, gyro_units=GYRO_UNITS
         )
     return numbers, unit
 
@@ -190,23 +176,18 @@ def initial_attitude(
 
 def _first_truth(source: Source, start: float) -> tuple[Array, float]:
     if source.truth is None:
-        raise ConfigError(
-            "the log has no truth to take it from",
-            file=source.name,
-            quantity="--initial",
-            remedy="give --reference TRUTH.csv, or use level, zero or 'roll,pitch,heading'",
-        )
+        raise ConfigError("attitude.log-no-truth-take", file=source.name, quantity="--initial")
     stamps = source.imu.index.to_numpy(dtype=np.float64)
     # Scored or not, an attitude that is known is one to start from.
     known = known_at(source.truth, np.ones(len(source.truth), dtype=bool), stamps)
     good = np.flatnonzero(known.counts)
     if not good.size:
         raise ConfigError(
-            f"the truth is nowhere known at a sample between {stamps[0]:.9g} and "
-            f"{stamps[-1]:.9g} s",
+            "attitude.truth-nowhere-known-sample-between",
             file=source.name,
             quantity="--initial",
-            remedy="use level, zero or 'roll,pitch,heading', or another window",
+            stamps=stamps[0],
+            stamps_2=stamps[-1],
         )
     begin = float(stamps[good[0]])
     return known.q_nb[good[0]], begin
@@ -217,21 +198,16 @@ def _levelled(
 ) -> Array:
     if not at_rest:
         raise ConfigError(
-            "levelling needs an accelerometer and a log that begins at rest",
+            "attitude.levelling-needs-accelerometer-log-begins",
             file=source.name,
             quantity="--initial",
-            remedy="begin at a rest with --from, or give 'roll,pitch,heading' in deg",
         )
     assert rests[0].accel_mean is not None
     roll, pitch = level(rests[0].accel_mean)
     if abs(roll) > 90.0:
         findings.append(
             Finding(
-                f"levelled upside down (roll {roll:.1f}°)",
-                file=source.name,
-                quantity="accel",
-                remedy="if it lay the right way up, its acceleration has the other sign, as on "
-                "iOS: state the unit as --accel-unit -g or -m/s2",
+                "attitude.levelled-upside-down-roll", file=source.name, quantity="accel", roll=roll
             )
         )
     return rotation.quaternion_from_euler([roll, pitch, 0.0])
@@ -243,9 +219,5 @@ def _three_angles(text: str) -> list[float]:
     except ValueError:
         angles = []
     if len(angles) != 3 or not (np.abs(angles) <= 1e6).all():
-        raise ConfigError(
-            f"'{text}' is no attitude",
-            quantity="--initial",
-            remedy="use truth, level, zero, or roll,pitch,heading in degrees, as in 0,0,90",
-        )
+        raise ConfigError("attitude.no-attitude", quantity="--initial", text=text)
     return angles

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from strapdown.attitude import AttitudeAlgorithm, attitude_history
 from strapdown.attitude.algorithm import Steps, steps_of
+from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.known import Errors, Known
 from strapdown.evaluation.reference_points import reference_errors
-from strapdown.exceptions import ConfigError, DivergenceError, Finding
 from strapdown.increments import increments_from_imu
 from strapdown.systems.attitude_shares import OwnTruth
 from strapdown.systems.progress import Progress
@@ -59,9 +59,7 @@ class Grounds:
 def refuse_no_rate(rate: float) -> None:
     """Raise ConfigError unless a rate in Hz is positive and finite."""
     if not (np.isfinite(rate) and rate > 0.0):
-        raise ConfigError(
-            f"{rate:g} Hz is no rate", quantity="--rates", remedy="use positive numbers"
-        )
+        raise ConfigError("attitude.hz-no-rate", quantity="--rates", rate=rate)
 
 
 def choose_factors(
@@ -97,17 +95,23 @@ def choose_factors(
         factor = max(1, round(full / rate))
         if steps // factor < 2:
             raise ConfigError(
-                f"{rate:g} Hz leaves fewer than two steps of {steps / full:.4g} s",
+                "attitude.hz-leaves-fewer-than-two",
                 quantity="--rates",
-                remedy=f"use at least {2.0 * full / steps:.3g} Hz",
+                rate=rate,
+                steps=steps / full,
+                full=2.0 * full / steps,
             )
         factors.add(factor)
         if abs(full / factor / rate - 1.0) > 0.02:
             nearest = "the log's own rate" if factor == 1 else f"what one sample in {factor} gives"
             findings.append(
                 Finding(
-                    f"{rate:g} Hz was asked for; {full / factor:.4g} Hz is {nearest}",
+                    "attitude.hz-asked-hz",
                     quantity="--rates",
+                    severity="note",
+                    rate=rate,
+                    full=full / factor,
+                    nearest=nearest,
                 )
             )
     return tuple(sorted(factors))

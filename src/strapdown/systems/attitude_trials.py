@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config import LogSpec, ScenarioSpec
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.results.answer import Trials
 from strapdown.results.attitude_bench import AttitudeBench
 
@@ -164,11 +164,7 @@ def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:
             numbers = pd.DataFrame([[float(row[name]) for name in _NUMBERS] for row in taken])
             rows.append(cell | dict(zip(_NUMBERS, numbers.max(), strict=True)))
     if not rows:
-        raise ConfigError(
-            "no rate is common to all trials",
-            quantity="--rates",
-            remedy="name rates that all of them can have",
-        )
+        raise ConfigError("attitude.no-rate-common-all-trials", quantity="--rates")
     return pd.DataFrame(rows)[list(first.columns)]
 
 
@@ -189,9 +185,10 @@ def not_judged(known: Sequence[bool], names: Sequence[str]) -> tuple[Finding, ..
         return ()
     return tuple(
         Finding(
-            "nothing is known of its attitude: there the algorithms' own errors are judged",
+            "attitude.nothing-known-attitude-algorithms-own",
             file=name,
             quantity="reference",
+            severity="note",
         )
         for there, name in zip(known, names, strict=True)
         if not there

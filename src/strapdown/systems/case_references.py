@@ -14,7 +14,7 @@ from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.reference_path import PathComparison, compare_with_reference
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.systems.case_severity import main_event
 
 __all__ = ["ReferenceAnswer", "compare_reference"]
@@ -101,18 +101,19 @@ def compare_reference(
         start, end = event.time_zero, event.end
     else:
         raise ConfigError(
-            f"{unit.name} has no event, and no span is stated",
+            "crash.no-event-no-span-stated",
             quantity=f"references, {spec.name}, over_s",
-            remedy="write over_s = [start, end] in s from the trigger",
+            name=unit.name,
         )
     try:
         change = delta_v(unit.acceleration, start, end, across_gaps=True)
     except DataError as error:
         raise DataError(
-            f"the reference '{spec.name}': {error.finding.what}",
+            "crash.reference",
             file=unit.name,
             quantity="over_s",
-            remedy="give a span within the record, in s from the trigger",
+            name=spec.name,
+            reason=error.finding,
         ) from None
     _, rest_sd = unit.at_point.resting_force(gravity)
     bound = body_delta_v_bound(unit.at_point.effects, change.weights, rest_sd=rest_sd)

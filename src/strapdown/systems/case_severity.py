@@ -8,7 +8,7 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
 from strapdown.crash.severity_model import InjuryRisk, SeverityModel, injury_risk
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 __all__ = ["SeverityAnswer", "case_severity", "main_event"]
 

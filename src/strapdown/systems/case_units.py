@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from strapdown.config.crash_case import AssumedSpec, TriadSpec, UnitSpec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.sensors.assumed import Assumed
@@ -90,6 +90,10 @@ def _triad(
     except ConfigError as error:
         found = error.finding
         raise ConfigError(
-            found.what, file=f"{unit.name}, {name}", quantity=found.quantity, remedy=found.remedy
+            "crash.message",
+            file=f"{unit.name}, {name}",
+            quantity=found.quantity,
+            message=found.what,
+            remedy_text=found.remedy,
         ) from None
     return RecordedTriad(table, uncertainty, name)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from strapdown.exceptions import Finding, StrapdownError
+from strapdown.errors import Finding, StrapdownError
 
 __all__ = ["in_case_words", "saying_case_words"]
 

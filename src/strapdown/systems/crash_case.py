@@ -12,7 +12,7 @@ from strapdown.crash.event_rule import EventRule
 from strapdown.crash.gnss_start import GnssEntry
 from strapdown.crash.monte_carlo import PathSamples, sample_paths
 from strapdown.crash.path import CrashPath
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.gnss_files import files_of_fixes, read_gnss
@@ -249,9 +249,10 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
         return sample_paths(path, runs=runs, seed=seed), []
     return sample_paths(path, runs=most, seed=seed), [
         Finding(
-            f"{runs} runs of {len(path.time)} samples would need more than half a gigabyte; "
-            f"{most} were made",
+            "crash.runs-samples-would-need-more",
             quantity="options, monte_carlo_runs",
-            remedy="take a lower rate_hz or a shorter window_s",
+            runs=runs,
+            count=len(path.time),
+            most=most,
         )
     ]

@@ -9,7 +9,7 @@ from typing import Any
 from strapdown.crash.entry import Entry
 from strapdown.crash.event_rule import EventRule
 from strapdown.crash.gnss_start import GnssEntry
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.triad_numbers import FARTHEST, finite, triple
@@ -48,10 +48,7 @@ def check_crash_options(
     place = triple(point, "point", "give forward, right, down in m from the vehicle's origin")
     if math.hypot(*place) > FARTHEST:
         raise ConfigError(
-            f"{place} is {math.hypot(*place):.4g} m from the vehicle's origin",
-            quantity="point",
-            remedy="give it in m (mm divided by 1000), from the origin that the positions of the "
-            "units count from",
+            "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
         )
     if window is not None:
         _check_window(window)
@@ -68,11 +65,14 @@ def check_crash_options(
         if name in names and not isinstance(given, Mapping):
             raise _kind(given, f"preparation, {name}", remedy)
         if name not in names and isinstance(given, Mapping):
-            raise ConfigError(f"there is no unit {name!r}", quantity="preparation", remedy=remedy)
+            raise ConfigError(
+                "crash.message",
+                quantity="preparation",
+                message=f"there is no unit {name!r}",
+                remedy_text=remedy,
+            )
     if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
-        raise ConfigError(
-            f"{peak_window!r} is no length", quantity="peak_window", remedy="give s, as 0.030"
-        )
+        raise ConfigError("crash.no-length", quantity="peak_window", peak_window=peak_window)
     if not isinstance(rule, EventRule):
         raise _kind(rule, "rule", "give an EventRule, or leave it out for 49 CFR 563")
     if not isinstance(gravity, int | float):
@@ -83,16 +83,9 @@ def check_crash_options(
 
 def _check_units(units: object) -> None:
     if isinstance(units, CrashUnit):
-        raise ConfigError(
-            "it is one unit, and a list is needed",
-            file=units.name,
-            quantity="units",
-            remedy="give [unit]",
-        )
+        raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
     if units is None or (isinstance(units, Sequence) and not units):
-        raise DataError(
-            "there is none", quantity="units", remedy="give the record of at least one unit"
-        )
+        raise DataError("crash.none-4", quantity="units")
     if not isinstance(units, Sequence) or isinstance(units, str):
         raise _kind(units, "units", "give a list of CrashUnit")
     for unit in units:
@@ -106,12 +99,13 @@ def _check_window(window: Any) -> None:
     except (TypeError, ValueError):
         begin = end = math.nan
     if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
-        raise ConfigError(
-            f"{window!r} is no window",
-            quantity="window",
-            remedy="give its start and its end in s from the trigger, as (-0.1, 0.75)",
-        )
+        raise ConfigError("crash.no-window-2", quantity="window", window=window)
 
 
 def _kind(given: object, quantity: str, remedy: str) -> ConfigError:
-    return ConfigError(f"this is of kind {type(given).__name__}", quantity=quantity, remedy=remedy)
+    return ConfigError(
+        "crash.message",
+        quantity=quantity,
+        message=f"this is of kind {type(given).__name__}",
+        remedy_text=remedy,
+    )

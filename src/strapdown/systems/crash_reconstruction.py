@@ -23,7 +23,7 @@ from strapdown.crash.unit_reconstruction import (
     UnitReconstruction,
     reconstruct_unit,
 )
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
@@ -96,9 +96,7 @@ class CrashReconstruction:
             if unit.name == name:
                 return unit
         raise ConfigError(
-            f"there is no unit '{name}'",
-            quantity="unit",
-            remedy=f"use one of {', '.join(u.name for u in self.units)}",
+            "crash.no-unit", quantity="unit", name=name, units=[u.name for u in self.units]
         )
 
 
@@ -215,9 +213,7 @@ def reconstruct_crash(
 
 def _no_mean(units: Sequence[AtPoint]) -> Finding:
     return Finding(
-        "the units disagree, so that no mean is told; each is told by itself",
+        "crash.units-disagree-no-mean-told",
         file=", ".join(u.name for u in units),
         quantity="combine",
-        remedy="find the fault by what is said of their axes, mountings and positions, or state "
-        "the uncertainties that they really have",
     )

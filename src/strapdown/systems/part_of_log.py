@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["check_part", "part_of_log"]
 
@@ -24,25 +24,18 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
     """
     for flag, value in (("--from", from_s), ("--to", to_s), ("--duration", duration_s)):
         if value is not None and not np.isfinite(value):
-            raise ConfigError(
-                f"{value} is no number", quantity=flag, remedy="give a finite number of seconds"
-            )
+            raise ConfigError("io.no-number-5", quantity=flag, value=value)
     if to_s is not None and duration_s is not None:
         raise ConfigError(
-            f"it ends at {to_s:.9g} s, or after {duration_s:.9g} s: both are said",
+            "io.ends-or-after-both-said",
             quantity="--to, --duration",
-            remedy="keep one of the two",
+            to_s=to_s,
+            duration_s=duration_s,
         )
     if duration_s is not None and not duration_s > 0.0:
-        raise ConfigError(
-            f"{duration_s:g} s is no duration", quantity="--duration", remedy="give seconds above 0"
-        )
+        raise ConfigError("io.no-duration", quantity="--duration", duration_s=duration_s)
     if from_s is not None and to_s is not None and not from_s < to_s:
-        raise ConfigError(
-            f"{to_s:.9g} s is not after --from {from_s:.9g} s",
-            quantity="--to",
-            remedy="give a later stamp of the log",
-        )
+        raise ConfigError("io.not-after", quantity="--to", to_s=to_s, from_s=from_s)
 
 
 def part_of_log(
@@ -87,12 +80,13 @@ def part_of_log(
     if kept.sum() < 2:
         ends = to_s is not None or duration_s is not None
         raise ConfigError(
-            f"{int(kept.sum())} samples lie {_words(from_s, last if ends else None)}; the log "
-            f"runs from {time[0]:.9g} to {time[-1]:.9g} s",
+            "io.samples-lie-log-runs",
             file=name,
             quantity="time",
-            remedy="give another part, in the log's own stamps: --from and --to or --duration; in "
-            "a file from_s and to_s or duration_s under [log]",
+            kept=int(kept.sum()),
+            words=_words(from_s, last if ends else None),
+            time=time[0],
+            time_2=time[-1],
         )
     if kept.all():
         return imu

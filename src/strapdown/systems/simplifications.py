@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from strapdown import earth, rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.running_integral import running_integral
+from strapdown.errors import DivergenceError
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
-from strapdown.exceptions import DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import Mechanization, NorthEastDown, Tadic, run_mechanization
 from strapdown.nav_state import NavState

@@ -11,7 +11,7 @@ import pandas as pd
 
 from strapdown.config import TrajectorySpec, motions
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import (
     EarthMotion,
@@ -262,4 +262,11 @@ def _with_key(error: ConfigError, name: str) -> ConfigError:
     f = error.finding
     parts = (f.quantity or "").split(", ")
     words = [_KEYS.get(part, part).replace("place ", "waypoint ") for part in parts]
-    return ConfigError(f.what, file=name, row=f.row, quantity=", ".join(words), remedy=f.remedy)
+    return ConfigError(
+        "simulation.message",
+        file=name,
+        row=f.row,
+        quantity=", ".join(words),
+        message=f.what,
+        remedy_text=f.remedy,
+    )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import (
     as_array,
     check_rows,
@@ -127,11 +127,12 @@ def barometer_from_pressure(
                 remedy = f"this looks like {unit}: multiply by {factor:g}"
                 break
         raise DataError(
-            f"{p[row]:.6g} Pa is no pressure of open air",
+            "tables.message",
             file=source,
             row=row + 1,
             quantity="pressure_pa",
-            remedy=remedy,
+            message=f"{p[row]:.6g} Pa is no pressure of open air",
+            remedy_text=remedy,
         )
     spread = as_array(each_row(pressure_sd_pa, p), None, "pressure_sd_pa", source)
     return barometer_table(time, standard_height(p), -standard_slope(p) * spread, source)
@@ -155,11 +156,11 @@ def check_barometer(table: pd.DataFrame) -> None:
     if beyond.size:
         row = int(beyond[0])
         raise DataError(
-            f"{height[row]:.6g} m is no height of a barometer",
+            "tables.no-height-barometer"
+            if height[row] > HIGHEST
+            else "tables.no-height-barometer-2",
             file=source_of(table),
             row=row + 1,
             quantity="height",
-            remedy="these look like pressures in Pa: make the table with barometer_from_pressure"
-            if height[row] > HIGHEST
-            else "give heights in m, upward positive",
+            height=height[row],
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import checked_values, each_row, joined, source_of
 
 BODY_VELOCITY = ["vx", "vy", "vz", "vx_sd", "vy_sd", "vz_sd"]
@@ -64,9 +64,9 @@ def check_body_velocity(table: pd.DataFrame) -> None:
     if len(beyond):
         row, column = (int(i) for i in beyond[0])
         raise DataError(
-            f"{velocity[row, column]:.6g} m/s is faster than such an instrument measures",
+            "tables.faster-than-such-instrument-measures",
             file=source_of(table),
             row=row + 1,
             quantity=BODY_VELOCITY[column],
-            remedy="give m/s: mm/s are divided by 1000; drop rows that are no velocities",
+            velocity=velocity[row, column],
         )

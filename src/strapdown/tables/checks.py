@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -26,10 +26,10 @@ def as_array(values: ArrayLike, columns: int | None, name: str, source: str | No
     wanted = 1 if columns is None else 2
     if array.ndim != wanted or (columns is not None and array.shape[1] != columns):
         raise DataError(
-            f"it is no array of numbers of shape ({'n,' if columns is None else f'n, {columns}'})",
+            "tables.no-array-numbers-shape",
             file=source,
             quantity=name,
-            remedy="pass one row a sample",
+            value="n," if columns is None else f"n, {columns}",
         )
     return array
 
@@ -38,11 +38,7 @@ def check_same_length(source: str | None, **arrays: Array) -> None:
     """One row a sample in each."""
     if len({len(a) for a in arrays.values()}) > 1:
         lengths = ", ".join(f"{name} {len(a)}" for name, a in arrays.items())
-        raise DataError(
-            f"the arrays have different lengths: {lengths}",
-            file=source,
-            remedy="pass one row a sample in each",
-        )
+        raise DataError("tables.arrays-different-lengths", file=source, lengths=lengths)
 
 
 def joined(
@@ -98,13 +94,13 @@ def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
     if beyond.size:
         row = int(beyond[0])
         raise DataError(
-            f"a latitude of {lat[row]:.9g} deg is beyond the pole",
+            "tables.latitude-beyond-pole"
+            if np.all(np.abs(lon) <= 90.0)
+            else "tables.latitude-beyond-pole-2",
             file=source,
             row=row + 1,
             quantity="lat",
-            remedy="latitude and longitude seem to be swapped: exchange the columns"
-            if np.all(np.abs(lon) <= 90.0)
-            else "give geodetic latitude in degrees, north positive, within -90 to 90",
+            lat=lat[row],
         )
 
 
@@ -122,11 +118,12 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
         rows = np.flatnonzero(bad.any(axis=1))
         more = f"; {rows.size} rows up to row {rows[-1] + 1} have such" if rows.size > 1 else ""
         raise DataError(
-            f"not a finite number ({values[row, column]}){more}",
+            "tables.not-finite-number",
             file=source,
             row=row + 1,
             quantity=columns[column],
-            remedy="drop the row, or fill it before the table is made",
+            values=values[row, column],
+            more=more,
         )
 
 
@@ -137,11 +134,11 @@ def check_positive_sd(table: pd.DataFrame, columns: Sequence[str], source: str |
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
         raise DataError(
-            f"{values[row, column]:.9g} is no standard deviation",
+            "tables.no-standard-deviation",
             file=source,
             row=row + 1,
             quantity=columns[column],
-            remedy="give a number above zero, and inf where nothing was measured",
+            values=values[row, column],
         )
 
 
@@ -152,11 +149,12 @@ def check_time(time: Array, source: str | None) -> None:
     if steps.size and not steps.min() > 0.0:
         row = int(np.argmax(steps <= 0.0)) + 1
         raise DataError(
-            f"time does not advance: {time[row - 1]:.9g} s is followed by {time[row]:.9g} s",
+            "tables.time-does-not-advance-followed",
             file=source,
             row=row + 1,
             quantity="time",
-            remedy="sort the rows and drop repeated stamps",
+            time=time[row - 1],
+            time_2=time[row],
         )
 
 
@@ -165,9 +163,11 @@ def check_columns(table: pd.DataFrame, columns: Sequence[str], source: str | Non
     missing = [c for c in columns if c not in table.columns]
     if missing:
         raise DataError(
-            f"missing columns: {', '.join(missing)}; it has {', '.join(map(str, table.columns))}",
+            "tables.missing-columns",
             file=source,
-            remedy=f"a table of this kind needs {', '.join(columns)}",
+            missing=missing,
+            columns=table.columns,
+            columns_2=columns,
         )
 
 
@@ -180,11 +180,7 @@ def source_of(table: object) -> str | None:
         It is no table.
     """
     if not isinstance(table, pd.DataFrame):
-        raise DataError(
-            f"a table is needed, and this is of kind {type(table).__name__}",
-            quantity="table",
-            remedy="a log that was read has its table as .imu, a run as .trajectory",
-        )
+        raise DataError("tables.table-needed-kind", quantity="table", name=type(table).__name__)
     source = table.attrs.get("source")
     return None if source is None else str(source)
 
@@ -227,10 +223,10 @@ def check_steps(table: pd.DataFrame, source: str | None) -> None:
     if overlap.size:
         row = int(overlap[0])
         raise DataError(
-            f"a step of {dt[row]:.9g} s ending at {time[row]:.9g} s is not positive, or begins "
-            "before the last one ended",
+            "tables.step-ending-not-positive-or",
             file=source,
             row=row + 1,
             quantity="dt",
-            remedy="the index is the end of each step, and dt its length in seconds",
+            dt=dt[row],
+            time=time[row],
         )

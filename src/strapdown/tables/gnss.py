@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.frames import place_difference
 from strapdown.tables.checks import (
     check_columns,
@@ -118,12 +118,11 @@ def check_gnss(table: pd.DataFrame) -> None:
     if unknown.size:
         row = int(unknown[0])
         raise DataError(
-            f"a quality of {quality[row]:g} is unknown",
+            "tables.quality-unknown",
             file=source,
             row=row + 1,
             quantity="quality",
-            remedy="use the indicators of NMEA 0183 GGA: 0 no fix, 1 autonomous, 2 differential, "
-            "4 and 5 carrier phase",
+            quality=quality[row],
         )
     _check_velocity_fits(table, source)
 
@@ -135,11 +134,11 @@ def _check_sd(table: pd.DataFrame, source: str | None) -> None:
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
         raise DataError(
-            f"{values[row, column]:.9g} is no standard deviation",
+            "tables.no-standard-deviation-2",
             file=source,
             row=row + 1,
             quantity=columns[column],
-            remedy="give zero or more, and inf where the receiver does not measure it",
+            values=values[row, column],
         )
 
 
@@ -186,12 +185,12 @@ def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
         return
     row = int(np.flatnonzero(good)[np.flatnonzero(clear)[0]])
     raise DataError(
-        f"the velocity ({np.hypot(*told.T)[0]:.4g} m/s) is not that of the places, which move at "
-        f"{np.hypot(*track.T)[0]:.4g} m/s",
+        "tables.message",
         file=source,
         row=row + 1,
         quantity="lat, lon" if "latitude" in remedy else "VN, VE",
-        remedy=remedy,
+        message=f"the velocity ({np.hypot(*told.T)[0]:.4g} m/s) is not that of the places, which move at {np.hypot(*track.T)[0]:.4g} m/s",
+        remedy_text=remedy,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import checked_values, each_row, joined, source_of, values_of
 
 HEADING = ["heading", "heading_sd"]
@@ -72,31 +72,33 @@ def check_heading(table: pd.DataFrame) -> None:
     if beyond.size:
         row = int(beyond[0])
         raise DataError(
-            f"a heading of {heading[row]:.6g} deg is more than a turn",
+            "tables.heading-more-than-turn",
             file=source,
             row=row + 1,
             quantity="heading",
-            remedy="give degrees clockwise from north, 0 to 360; hundredths are divided by 100",
+            heading=heading[row],
         )
     wide = np.flatnonzero(np.isfinite(sd) & (sd > MOST_SD))
     if wide.size:
         row = int(wide[0])
         raise DataError(
-            f"a standard deviation of {sd[row]:.6g} deg says nothing of a heading",
+            "tables.standard-deviation-says-nothing-heading",
             file=source,
             row=row + 1,
             quantity="heading_sd",
-            remedy="give it in deg, and inf where nothing was measured",
+            sd=sd[row],
         )
     leaps = np.abs(np.diff(heading))
     in_radians = np.ptp(heading) <= 1.001 * TURN if len(heading) else False
     if in_radians and np.ptp(heading) > FILLED * TURN and leaps.max() > LEAPT * TURN:
         row = int(np.argmax(leaps)) + 1
         raise DataError(
-            f"all headings are within {heading.min():.4g} to {heading.max():.4g}, and leap from "
-            f"{heading[row - 1]:.4g} to {heading[row]:.4g}, as radians do",
+            "tables.all-headings-within-leap-radians",
             file=source,
             row=row + 1,
             quantity="heading",
-            remedy="give degrees: multiply by 57.29578",
+            heading=heading.min(),
+            heading_2=heading.max(),
+            heading_3=heading[row - 1],
+            heading_4=heading[row],
         )

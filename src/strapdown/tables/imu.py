@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import (
     as_array,
     check_columns,
@@ -99,11 +99,10 @@ def check_imu(table: pd.DataFrame) -> None:
     check_columns(table, GYRO, source)
     if table.attrs.get("sampling") not in SAMPLINGS:
         raise DataError(
-            f"attrs['sampling'] is {table.attrs.get('sampling')!r}",
+            "tables.attrs-sampling",
             file=source,
             quantity="sampling",
-            remedy="say 'instantaneous' (rate at the stamp) or 'mean' (over the interval "
-            "that ends there)",
+            get=table.attrs.get("sampling"),
         )
     columns = list(GYRO)
     for triad in (ACCEL, MAG):
@@ -113,10 +112,10 @@ def check_imu(table: pd.DataFrame) -> None:
         columns += there
     if len(table) < 2:
         raise DataError(
-            f"{len(table)} sample: attitude is the integral of a rate, and needs at least two",
+            "tables.sample-attitude-integral-rate-needs",
             file=source,
             quantity="time",
-            remedy="record for longer, or check that the right file was given",
+            count=len(table),
         )
     check_time(index_of(table), source)
     check_rows(values_of(table, columns), columns, source)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import (
     as_array,
     check_rows,
@@ -92,11 +92,7 @@ def odometer_from_distance(
         `check_odometer`.
     """
     if not is_number(quantum) or not 0.0 < quantum < math.inf:
-        raise ConfigError(
-            f"{quantum!r} is no length of a count",
-            quantity="quantum",
-            remedy="give the way of one count in m: circumference of the wheel over its pulses",
-        )
+        raise ConfigError("tables.no-length-count", quantity="quantum", quantum=quantum)
     stamps, way = as_array(time, None, "time", source), as_array(distance, None, "distance", source)
     check_same_length(source, time=stamps, distance=way)
     check_time(stamps, source)
@@ -107,12 +103,13 @@ def odometer_from_distance(
     if wild.size == 1 and len(speed) > 1:
         row = int(wild[0]) + 1
         raise DataError(
-            f"from {way[row - 1]:.9g} to {way[row]:.9g} m in {dt[row - 1]:.4g} s: the counter was "
-            "set back, or has overflowed",
+            "tables.counter-set-back-or-overflowed",
             file=source,
             row=row + 1,
             quantity="distance",
-            remedy="add what was counted before to the rows from there on",
+            way=way[row - 1],
+            way_2=way[row],
+            dt=dt[row - 1],
         )
     sd = quantum / (math.sqrt(6.0) * dt)
     return odometer_table(0.5 * (stamps[1:] + stamps[:-1]), speed, sd, source)
@@ -136,11 +133,11 @@ def check_odometer(table: pd.DataFrame) -> None:
     if beyond.size:
         row = int(beyond[0])
         raise DataError(
-            f"{speed[row]:.6g} m/s is faster than a wheel rolls",
+            "tables.faster-than-wheel-rolls"
+            if np.abs(speed).max() < 3.6 * FASTEST
+            else "tables.faster-than-wheel-rolls-2",
             file=source_of(table),
             row=row + 1,
             quantity="speed",
-            remedy="this looks like km/h: divide by 3.6"
-            if np.abs(speed).max() < 3.6 * FASTEST
-            else "give the speed in m/s; drop rows that are no speeds",
+            speed=speed[row],
         )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import as_array, check_columns, source_of
 from strapdown.tables.columns import EULER, REFERENCE
 
@@ -70,26 +70,24 @@ def check_references(table: pd.DataFrame) -> None:
         kind = row["kind"]
         if kind not in needs:
             raise DataError(
-                f"unknown kind {kind!r}",
+                "tables.unknown-kind",
                 file=source,
                 row=number,
                 quantity="kind",
-                remedy=f"use one of {', '.join(REFERENCE_KINDS)}",
+                kind=kind,
+                reference_kinds=REFERENCE_KINDS,
             )
         for name in needs[kind]:
             if not np.isfinite(float(row[name])):
                 raise DataError(
-                    f"a reference of kind '{kind}' needs it, and it is missing",
+                    "tables.reference-kind-needs-missing",
                     file=source,
                     row=number,
                     quantity=name,
-                    remedy=f"kind '{kind}' needs {', '.join(needs[kind])}",
+                    kind=kind,
+                    needs=needs[kind],
                 )
         if kind == "turns" and row["axis"] not in ("x", "y", "z"):
             raise DataError(
-                f"the axis is {row['axis']!r}",
-                file=source,
-                row=number,
-                quantity="axis",
-                remedy="use x, y or z: the body's forward, right and down axis",
+                "tables.axis", file=source, row=number, quantity="axis", at_row=row["axis"]
             )

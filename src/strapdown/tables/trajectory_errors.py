@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.tables.checks import checked_values, joined, values_of
 from strapdown.tables.columns import EULER, NED, VELOCITY
 
@@ -85,9 +85,9 @@ def check_trajectory_sd(table: pd.DataFrame) -> None:
     if negative.any():
         row, column = (int(i) for i in np.argwhere(negative)[0])
         raise DataError(
-            f"a standard deviation of {values[row, column]:.9g} is negative",
+            "tables.standard-deviation-negative",
             file=table.attrs.get("source"),
             row=row + 1,
             quantity=TRAJECTORY_ERROR[column],
-            remedy="give standard deviations, and not errors or variances with a sign",
+            values=values[row, column],
         )

@@ -13,7 +13,7 @@ from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.no_slip import NoSlip
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 #: Pitch of the body by the force along it, deg/g: nose up as it gains speed.
 DIVE = 3.0

@@ -13,7 +13,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_scale
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.sensors.antenna import antenna_motion

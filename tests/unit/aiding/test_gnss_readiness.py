@@ -16,7 +16,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_clock import check_overlap, find_time_offset, time_offset
 from strapdown.aiding.gnss_delay import find_velocity_delay, velocity_delay
 from strapdown.aiding.gnss_readiness import gnss_readiness
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
 from strapdown.simulation.gnss_faults import Frozen, Outage, Outliers, inject_gnss_faults

@@ -16,7 +16,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
 from strapdown.aiding.zero_rate import ZeroRate
 from strapdown.aiding.zero_velocity import ZeroVelocity
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 RATE_SD, FORCE_SD = 0.01, 0.1
 STEP = 0.01

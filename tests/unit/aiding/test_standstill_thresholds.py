@@ -10,7 +10,7 @@ import pytest
 from strapdown.aiding.correlated import longer_by
 from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS, WIDTH, otsu
 from strapdown.aiding.zero_velocity import ZeroVelocity
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 STEP = 0.005
 

@@ -21,7 +21,7 @@ from strapdown.aiding.no_slip import NoSlip
 from strapdown.aiding.odometer import Odometer
 from strapdown.aiding.zero_rate import ZeroRate
 from strapdown.aiding.zero_velocity import ZeroVelocity
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.barometer import PressureHeight, simulate_barometer
 from strapdown.simulation.body_velocity import VelocityLog, simulate_body_velocity
 from strapdown.simulation.heading import Compass, simulate_heading

@@ -17,7 +17,7 @@ from stands import SITE, changed, chi_square, ideal, phi, rocking, unit
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.carry import carry
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 
 def true_at(truth, row, covariance=None):

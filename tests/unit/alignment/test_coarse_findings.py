@@ -18,7 +18,7 @@ from strapdown.alignment.known_heading import KnownHeading
 from strapdown.alignment.levelling_alone import Levelling
 from strapdown.alignment.site import Site
 from strapdown.alignment.two_vector import TwoVector
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.minimum_jerk import Track

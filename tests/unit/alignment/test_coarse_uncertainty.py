@@ -17,7 +17,7 @@ from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.alignment.known_heading import KnownHeading
 from strapdown.alignment.levelling_alone import Levelling
 from strapdown.alignment.two_vector import TwoVector
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.triad_uncertainty import TriadUncertainty

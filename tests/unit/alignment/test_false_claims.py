@@ -18,7 +18,7 @@ from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.known_heading import KnownHeading
 from strapdown.alignment.north import latitude_findings
 from strapdown.alignment.outliers import outlier_findings
-from strapdown.exceptions import DataError, DivergenceError
+from strapdown.errors import DataError, DivergenceError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu

@@ -19,7 +19,7 @@ from strapdown.alignment.fine_result import FINE_COLUMNS
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_models import ERROR_MODELS
 from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

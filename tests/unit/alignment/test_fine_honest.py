@@ -18,7 +18,7 @@ from strapdown import rotation
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.known_heading import KnownHeading
 from strapdown.alignment.site import Site
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, simulate_imu

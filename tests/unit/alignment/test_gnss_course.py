@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
 
 from strapdown.alignment.gnss_course import GnssCourse
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.sensors.triad_uncertainty import TriadUncertainty

@@ -7,7 +7,7 @@ import pytest
 
 from strapdown import bench_attitude, rotation
 from strapdown.alignment.levelling import level
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.tables import imu_table
 

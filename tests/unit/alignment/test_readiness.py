@@ -16,7 +16,7 @@ from stands import SITE, ideal, rocking, still, unit
 from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.alignment.readiness import READINESS, coarse_readiness, durations_of
 from strapdown.alignment.two_vector import TwoVector
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables import attitude_table
 
 

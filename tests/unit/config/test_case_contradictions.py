@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from good_case import TEXT, read
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 SPEED = "speed_km_per_h = 25.2"
 KIND = 'kind = "speed"'

@@ -13,7 +13,7 @@ from good_case import TEXT, read, write
 
 from strapdown.bundle.configuration_paths import names_file
 from strapdown.config import CaseSpec, read_case_spec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 
 def test_every_quantity_comes_in_the_unit_of_its_field(tmp_path):

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from good_case import TEXT, write
 
 from strapdown.config import CaseSpec, read_case_spec
-from strapdown.exceptions import ConfigError, StrapdownError
+from strapdown.errors import ConfigError, StrapdownError
 
 #: Longer messages would fill a screen.
 LONGEST = 4000

@@ -15,7 +15,7 @@ from strapdown.config.navigation_file import (
 )
 from strapdown.config.slots import SLOTS, options_of
 from strapdown.config.spec import TableSpec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 ROOT = Path(__file__).parents[3]
 START = """[start]

@@ -9,7 +9,7 @@ import pytest
 
 from strapdown.config.navigation_file import read_navigation_spec
 from strapdown.config.navigation_modules import make_filter, sensors_of
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 FILE = """[log]
 path = "log.csv"

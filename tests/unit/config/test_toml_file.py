@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from strapdown.config.toml_file import place_of, read_toml
-from strapdown.exceptions import ConfigError, Finding, nearest
+from strapdown.errors import ConfigError, Finding, nearest
 
 SLIPS = {
     "speed = 25,6": "25.6, not 25,6",

@@ -25,7 +25,7 @@ from strapdown.crash.gnss_start import GnssEntry, start_from_gnss
 from strapdown.crash.monte_carlo import sample_paths
 from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.sample_effects import MISSING_AXIS, NO_TURNING
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.assumed import Assumed, assumed_shapes
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty

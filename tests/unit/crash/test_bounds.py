@@ -20,7 +20,7 @@ from strapdown.crash.leg import VELOCITY
 from strapdown.crash.monte_carlo import sample_paths
 from strapdown.crash.reference_path import compare_with_reference
 from strapdown.crash.unit_reconstruction import reconstruct_unit
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse

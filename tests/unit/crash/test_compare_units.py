@@ -20,7 +20,7 @@ from strapdown.crash.unit_differences import (
     velocity_increments,
 )
 from strapdown.crash.window_weights import window_weights
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.prepared_unit import Levelling, PreparedUnit
 from strapdown.sensors.triad_uncertainty import TriadUncertainty

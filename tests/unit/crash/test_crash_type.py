@@ -10,7 +10,7 @@ from strapdown.crash.crash_type import classify_crash, classify_crashes, side_of
 from strapdown.crash.delta_v import event_delta_v
 from strapdown.crash.events import detect_events
 from strapdown.crash.tipping import PASSENGER_CAR, TippingBody
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 SMALL = 0.01 * np.eye(3)
 

@@ -22,7 +22,7 @@ from strapdown.crash.events import detect_events
 from strapdown.crash.recorder_delta_v import maximum_delta_v, recorder_delta_v
 from strapdown.crash.trajectory_delta_v import trajectory_delta_v
 from strapdown.crash.window_weights import resolved_weights, window_weights
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.tables import imu_table
 from strapdown.tables.trajectory import trajectory_table
 

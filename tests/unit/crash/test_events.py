@@ -14,7 +14,7 @@ from pulses import KMH, Pulse, means, stamps
 from strapdown.crash.acceleration import Acceleration
 from strapdown.crash.event_rule import PART_563, EventRule
 from strapdown.crash.events import detect_events
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 FRONT = Pulse((-7.2, 0.0, 0.0))
 

@@ -29,7 +29,7 @@ from entry_case import (
 
 from strapdown.crash.entry_priors import EntryPriors, FixCorrelation
 from strapdown.crash.gnss_entry import entry_state_from_gnss
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 from strapdown.simulation import ImuErrors, TriadErrors, car, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse

@@ -12,7 +12,7 @@ from strapdown.crash.entry_priors import FixCorrelation
 from strapdown.crash.gnss_start import CONTRIBUTOR, GnssEntry, start_from_gnss
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.prepare import prepare_unit
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.synchronise import synchronise
 from strapdown.simulation.crash_course import Setting

@@ -16,7 +16,7 @@ from strapdown.crash.indices.moving_means import largest_mean, moving_means
 from strapdown.crash.indices.olc import olc
 from strapdown.crash.indices.phaseless import four_pole
 from strapdown.crash.indices.thiv import thiv
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 G = 9.80665
 STEP = 1e-4

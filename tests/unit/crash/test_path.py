@@ -17,7 +17,7 @@ from strapdown.crash.leg import PLACE, VELOCITY
 from strapdown.crash.monte_carlo import sample_paths
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.unit_effects import unit_effects
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.prepared_unit import Levelling

@@ -24,7 +24,7 @@ from strapdown.crash.pdof_convention import (
 )
 from strapdown.crash.pdof_interval import pdof_interval
 from strapdown.crash.pdof_sensitivity import pdof_by_shift, pdof_by_window
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 
 @pytest.mark.parametrize(

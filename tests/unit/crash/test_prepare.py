@@ -14,7 +14,7 @@ import pytest
 from strapdown.crash.at_point import at_point
 from strapdown.crash.compare_units import compare_units
 from strapdown.crash.prepare import prepare_unit
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.prepared_unit import FROM_GRAVITY
 from strapdown.sensors.synchronise import synchronise

@@ -10,7 +10,7 @@ import pytest
 from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
 from strapdown.crash.severity_file import load_severity_model
 from strapdown.crash.severity_model import SeverityModel, Term, injury_risk
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 MPH = 0.44704
 

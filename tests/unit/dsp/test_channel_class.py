@@ -12,7 +12,7 @@ from strapdown.dsp.channel_class import (
     cfc_noise_factor,
     cfc_response,
 )
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 # Corridor of SAE J211-1 and ISO 6487:2015 for a channel of each class: frequency in Hz, upper and
 # lower limit in dB, straight in the logarithm of the frequency between; no lower limit beyond -30

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.dsp.decimation import decimate, low_pass_design, mean_samples
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 STEP = 1e-4
 RATE = 200.0

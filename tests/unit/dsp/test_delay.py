@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.dsp.delay import EvenSignal, find_delay
 from strapdown.dsp.lag_correlation import lag_correlation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 
 def crash(t):

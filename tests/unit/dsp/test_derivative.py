@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.dsp.derivative import SlidingFit, derivative, widest_fit
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 STEP = 5e-3
 

@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.dsp.decimation import decimate
 from strapdown.dsp.fir_decimation import fir_decimation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 STEP = 1e-3
 

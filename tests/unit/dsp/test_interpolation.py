@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.dsp.interpolation import interpolate, interpolated_means
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 
 def test_polynomials_of_degree_5_are_exact_on_uneven_stamps():

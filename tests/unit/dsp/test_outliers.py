@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.dsp.outliers import KEPT, REPLACED, OutlierDesign
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 N = 100_000
 APART = 400

@@ -11,7 +11,7 @@ from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.influence_tukey import Tukey
 from strapdown.estimation.influences import INFLUENCES
 from strapdown.estimation.joseph import Joseph
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 H, ONE = np.ones((1, 1)), np.ones(1)
 

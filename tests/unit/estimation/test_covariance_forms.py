@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.update_rule import Step
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 
 FORMS = sorted(COVARIANCES)
 

@@ -24,7 +24,7 @@ from strapdown.estimation.sensor_blocks import (
     gyro_scale,
 )
 from strapdown.estimation.sensor_states import stack
-from strapdown.exceptions import DivergenceError
+from strapdown.errors import DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS, NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error

@@ -12,7 +12,7 @@ from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.influence_igg3 import Igg3
 from strapdown.estimation.influence_tukey import Tukey
 from strapdown.estimation.influences import INFLUENCES
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 ALL = [made() for made in INFLUENCES.values()]
 ROBUST = [f for f in ALL if f.name != "none"]

@@ -25,7 +25,7 @@ from strapdown.estimation.sensor_blocks import (
     lever_arm,
 )
 from strapdown.estimation.sensor_states import stack
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.frames import C_ne
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.state_error import state_error

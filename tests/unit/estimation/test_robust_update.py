@@ -13,7 +13,7 @@ from strapdown.estimation.paper_update import PaperUpdate
 from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.ud import BiermanThornton
 from strapdown.estimation.update_rules import UPDATE_RULES
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 ALL = sorted(INFLUENCES)
 ROBUST = [name for name in ALL if name != "none"]

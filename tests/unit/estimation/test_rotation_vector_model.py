@@ -15,7 +15,7 @@ from strapdown.estimation.sensor_blocks import (
     gyro_bias,
     gyro_scale,
 )
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error

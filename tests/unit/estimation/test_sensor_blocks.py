@@ -22,7 +22,7 @@ from strapdown.estimation.sensor_blocks import (
 )
 from strapdown.estimation.standard_states import standard_states
 from strapdown.estimation.states import StateLayout
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import apply
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty

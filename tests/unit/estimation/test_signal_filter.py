@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.signal_filter import SignalFilter
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 STEP = 1e-3
 

@@ -16,7 +16,7 @@ from strapdown.evaluation.heading_light import (
     heading_light,
     recent_scatter,
 )
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.record import NavigationRecord
 
 SECONDS = 200

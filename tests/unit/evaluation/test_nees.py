@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from strapdown.evaluation.nees import band_of_mean, bounds, normalised_squares
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 
 def test_squares_are_those_of_the_inverse_also_with_units_far_apart():

@@ -14,7 +14,7 @@ from strapdown.evaluation.reference_points import (
     references_from_words,
     score_references,
 )
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
 from strapdown.report.attitude_words import standing

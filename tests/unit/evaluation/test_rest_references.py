@@ -19,7 +19,7 @@ from strapdown.evaluation.rest_references import (
     tilt_references,
     tilt_sd_deg,
 )
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.references import read_reference_words
 from strapdown.results import AttitudeRun, RestStretch
 from strapdown.tables import attitude_table, imu_table

@@ -16,7 +16,7 @@ from strapdown.evaluation.trajectory_differences import (
     trajectory_differences,
 )
 from strapdown.evaluation.trajectory_summary import summarise_differences
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.frames import (
     ecef_from_geodetic,
     geodetic_from_ecef,

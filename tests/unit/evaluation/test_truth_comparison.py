@@ -11,7 +11,7 @@ from strapdown.evaluation.truth_comparison import (
     compare_with_truth,
     state_errors,
 )
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState

@@ -18,7 +18,7 @@ from strapdown.evaluation.withheld import (
     spans_to_withhold,
     without_spans,
 )
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.record import Span
 
 LENGTH = 20.0

@@ -21,7 +21,7 @@ from strapdown.evaluation.withheld_smoothed import (
     score_of_smoothed,
     score_withheld_smoothed,
 )
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.frames import place_difference
 from strapdown.navigation.damping import DAMPINGS
 from strapdown.navigation.record import Span

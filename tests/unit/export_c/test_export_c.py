@@ -16,7 +16,7 @@ from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude import ALGORITHMS, make_algorithm, run_attitude
 from strapdown.attitude.cost import memory, step_kernel
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.export_c import export_c
 from strapdown.export_c.interface import SHAPES
 from strapdown.export_c.kernels import Kernels

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.aid_table import read_aid_table
 
 SPEED = {"speed": "m/s", "speed_sd": "m/s"}

@@ -7,7 +7,7 @@ import pytest
 
 from strapdown.aiding.aid import TableAid
 from strapdown.aiding.aids import AIDS
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.aid_tables import AID_READERS
 
 ROWS = np.column_stack([np.arange(5.0), np.full(5, 36.0), np.full(5, 0.36)])

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import read_log
 from strapdown.formats.clocks import (
     GPS,

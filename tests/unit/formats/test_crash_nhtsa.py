@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.nhtsa import read_nhtsa

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_names import read_channel_name
 from strapdown.formats.crash_records import CRASH_READERS, read_crash_record
 from strapdown.formats.crash_text import clean, unique

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import read_log
 from strapdown.formats.control_points import read_control_points
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from strapdown import frames
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.gnss_comma2k19 import RECEIVERS
 from strapdown.formats.gnss_files import GnssOptions, files_of_fixes, read_gnss
 

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.tables import GNSS, check_gnss
 from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD

@@ -8,7 +8,7 @@ from operator import xor
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY_SD
 

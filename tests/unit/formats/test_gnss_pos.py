@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import frames, rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.tables.columns import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 

@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from synthetic_logs import make
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import read_log
 from strapdown.formats.inference import Signals, infer_signals
 from strapdown.formats.inference.clock import infer_time_faults, infer_time_unit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_joined, read_log
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO

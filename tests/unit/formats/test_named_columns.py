@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.named_columns import read_reference_path
 from strapdown.tables import NED
 

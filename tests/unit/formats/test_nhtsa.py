@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.formats.nhtsa_select import accelerations, imu_of
 

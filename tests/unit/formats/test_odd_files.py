@@ -8,7 +8,7 @@ import pytest
 from scipy.io import savemat
 
 from strapdown import bench_attitude, rotation, simulate
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.references import read_truth

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from strapdown import frames, rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import READERS, read_log, read_raw
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, QUATERNION

@@ -13,7 +13,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import READERS, join, read_log, read_raw
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import ReadOptions, read_log, read_raw
 from strapdown.tables import ACCEL, GYRO
 

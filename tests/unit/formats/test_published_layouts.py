@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats import READERS, read_log
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.recording import ReadOptions

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.columns import parse_axes, parse_column_option, read_name
 from strapdown.formats.recording import ReadOptions

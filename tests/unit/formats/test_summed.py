@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.columns import read_name, says_increment
 from strapdown.formats.summed import intervals

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of, with_clock
 from strapdown.formats.decimal_rows import write_decimals

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
 from strapdown.tables import TRAJECTORY

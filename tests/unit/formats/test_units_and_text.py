@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import ReadOptions

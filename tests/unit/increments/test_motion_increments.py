@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.increments import (
     imu_from_increments,
     increments_from_imu,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.increments import motion_accuracy, motion_increments
 from strapdown.increments.accuracy import ORDERS
 from strapdown.simulation import Coning, Sculling

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.increments import IncrementStream, motion_increments
 from strapdown.tables import ACCEL, GYRO, imu_table
 

@@ -13,7 +13,7 @@ from tests.town_drive import ARM, fixes, motion
 
 from strapdown.config.navigation_file import navigation_spec
 from strapdown.config.navigation_modules import sensors_of
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.live.clock import MachineClock
 from strapdown.live.received import live_spec, write_received

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.contracts.test_chain_cuts import assert_same, drive, driving, navigation, tables
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.live.latency import LatencyTape
 from strapdown.live.replay import Replay, parse_pace
 from strapdown.navigation.recorder import FullRecorder

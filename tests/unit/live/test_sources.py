@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.live.clock import MachineClock
 from strapdown.live.sources import LineSource, open_source
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.ellipsoids import WGS84
-from strapdown.exceptions import ConfigError, DataError, DivergenceError
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavTracker, NorthEastDown, Tadic, run_mechanization
 from strapdown.nav_state import NavState

@@ -15,7 +15,7 @@ from ecef_motion import OverThePole, in_earth_axes
 from strapdown import earth, rotation
 from strapdown._kernels import wander as kernel
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
-from strapdown.exceptions import ConfigError, DivergenceError
+from strapdown.errors import ConfigError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import (
     MECHANIZATIONS,

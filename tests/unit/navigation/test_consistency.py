@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.consistency import consistency_of, consistency_of_all, whiteness
 
 sys.path.insert(0, str(Path(__file__).parent))

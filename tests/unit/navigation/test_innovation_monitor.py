@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.innovation_monitor import InnovationMonitor
 
 

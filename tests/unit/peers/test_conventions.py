@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import StrapdownError
+from strapdown.errors import StrapdownError
 from strapdown.peers import PEERS, align_heading
 from strapdown.tables import EULER, MAG, QUATERNION, imu_table
 

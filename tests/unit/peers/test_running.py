@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.peers import AIDINGS, PEERS, available_peers, run_peers
 from strapdown.tables import MAG, QUATERNION, imu_table
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import csd, welch
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.increments import motion_increments
 from strapdown.prefilter import Grid, RobustFir, Summed
 from strapdown.sensors.catalogue import load_sensor

@@ -5,7 +5,7 @@ import pytest
 
 from strapdown.estimation.influence_none import LeastSquares
 from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.prefilter import RobustFir, RobustWd
 from strapdown.tables import imu_table
 

@@ -13,7 +13,7 @@ import pytest
 from strapdown.bundle.json_text import to_json
 from strapdown.config.crash_case import AssumedSpec, ReferenceSpec
 from strapdown.config.crash_case_file import read_case_spec
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
 from strapdown.report.changed_case import changed_case
 from strapdown.report.crash_case import file_name

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.report.chart import Chart
 from strapdown.report.document import Animation, Document, KeyFigure, KeyFigures, Picture
 from strapdown.report.document_data import draw_stills

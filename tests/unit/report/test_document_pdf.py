@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 import strapdown
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.report.document import (
     Document,
     Facts,

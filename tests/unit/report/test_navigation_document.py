@@ -10,7 +10,7 @@ import pytest
 from plotly.offline import get_plotlyjs
 from tests.unit.report.navigation_records import one_epoch, record, shifted, told, without_aids
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.report.document import ChartBlock, Items, KeyFigures, Paragraph, TableBlock
 from strapdown.report.document_html import document_page
 from strapdown.report.navigation_document import navigation_document

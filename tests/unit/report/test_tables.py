@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from strapdown.cli.attitude_tables import print_bench
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, attitude_page, write_attitude

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.assumed import Assumed, assumed_shapes
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.synchronise import synchronise

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.formats.columns import parse_axes
 from strapdown.sensors.axes_matrix import (
     NAMED_AXES,

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import chi2
 
 from strapdown.constants import STANDARD_GRAVITY as G
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors import catalogue
 from strapdown.sensors.catalogue import GRADES, SENSORS, load_sensor
 from strapdown.sensors.triad_errors import TriadErrors

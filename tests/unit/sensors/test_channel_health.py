@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.channel_health import check_channel, check_peers
 from strapdown.sensors.redundant_channels import compare_redundant
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.error_chain import apply, compensate
 from strapdown.sensors.transfer_curve import input_of, transfer
 from strapdown.sensors.triad_errors import TriadErrors

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.equal_runs import equal_runs, longest_by_chance
 from strapdown.sensors.error_chain import apply

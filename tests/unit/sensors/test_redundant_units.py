@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.rotation import dcm_from_euler
 from strapdown.sensors.axis_voting import AxisVoting
 from strapdown.sensors.catalogue import SENSORS, load_sensor

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.results import RestStretch
 from strapdown.sensors.rest_bias import gyro_bias_at, gyro_bias_from_rests, without_gyro_bias
 from strapdown.tables import GYRO, imu_table

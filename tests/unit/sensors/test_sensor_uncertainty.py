@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_priors import crash_priors
 from strapdown.sensors.sensor_uncertainty import uncertainty_of

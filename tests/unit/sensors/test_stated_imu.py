@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.catalogue_keys import ALLAN_OF_GAUSS_MARKOV
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.sensor_uncertainty import uncertainty_of
 from strapdown.sensors.stated_uncertainty import stated_uncertainty

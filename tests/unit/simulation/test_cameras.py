@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from pushed_motion import Pushed
 
 from strapdown import frames, rotation
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.simulation.camera_path import path_from_cameras
 from strapdown.simulation.cameras import Camera, film, paper_cameras
 from strapdown.simulation.earth_motion import Origin

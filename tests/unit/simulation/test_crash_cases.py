@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.case_recording import SPEED_SD, record_case
 from strapdown.simulation.crash_cases import CASES, find_case
 from strapdown.simulation.crash_recording import record_crash

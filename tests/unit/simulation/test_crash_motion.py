@@ -18,7 +18,7 @@ from earth_truth import course, felt, turned_twice
 
 from strapdown import frames, rotation
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.sine_velocity import SineVelocityMotion

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from pushed_motion import Pushed
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.error_chain import compensate
 from strapdown.sensors.triad_errors import TriadErrors

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import CRASHES, Origin, Setting, find_crash
 from strapdown.simulation.crash_course import CrashCourse
 from strapdown.simulation.front_impacts import frontal_impact, oblique_impact, pole_impact

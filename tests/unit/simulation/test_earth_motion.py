@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from earth_truth import course, felt
 
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import (
     ImuErrors,
     Origin,

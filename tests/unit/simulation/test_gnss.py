@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.frames import place_difference
 from strapdown.simulation import Origin, StationaryMotion, car
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse

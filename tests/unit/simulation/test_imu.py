@@ -10,7 +10,7 @@ import pytest
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as G
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import (
     SCENARIOS,
     ImuErrors,

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import (
     SCENARIOS,
     Coning,

@@ -19,7 +19,7 @@ from earth_truth import DIGITS, course, gravitation, turns
 from test_crash_motion import CRASH, MANY, exact_angles, exact_velocity
 
 from strapdown import earth, frames, rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.simulation import (
     MountedMotion,

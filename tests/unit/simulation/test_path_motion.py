@@ -18,7 +18,7 @@ from earth_truth import course, felt
 from exact_motions import mp_track
 
 from strapdown.ellipsoids import WGS84, find_ellipsoid
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import (
     ImuErrors,
     Origin,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import Ringing
 
 PAPER = Ringing(0.15, 98.0665, 195.0, 0.03, (1.0, 0.0, 0.0))

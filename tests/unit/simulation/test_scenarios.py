@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import (
     SCENARIOS,
     ImuErrors,

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from earth_truth import felt
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation import (
     ImuErrors,
     Origin,

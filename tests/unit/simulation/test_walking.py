@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.frames import ned_from_geodetic
 from strapdown.simulation import GAITS, Origin, Stride, WalkingMotion, walk
 from strapdown.tables import places_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.cli.align_options import spec_of_flags
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.report.alignment_charts import attitude_chart
 from strapdown.report.alignment_trust import bounds_hold, trust
 from strapdown.report.alignment_values import rate_words

@@ -10,7 +10,7 @@ from strapdown.alignment.carry import carried_attitude, carry
 from strapdown.alignment.coarse_alignments import COARSE_ALIGNMENTS
 from strapdown.alignment.site import Site
 from strapdown.config.alignment_file import alignment_spec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

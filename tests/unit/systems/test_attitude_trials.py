@@ -9,7 +9,7 @@ from scipy import stats
 
 from strapdown import bench_attitude, simulate
 from strapdown.config import LogSpec, ScenarioSpec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.systems.attitude_trials import rank, trial_names, worst_sweep

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.systems.case_words import in_case_words, saying_case_words
 
 PYTHON = ("(", "preparation", "moving_at_impact", "Entry", "sampling=", "levelling=", "time=")

@@ -12,7 +12,7 @@ from strapdown import rotation
 from strapdown.config.coast import coast_spec
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.evaluation.plane_bound import PLANE_95
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.frames import ned_from_geodetic
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization

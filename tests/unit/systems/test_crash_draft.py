@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from strapdown import rotation
 from strapdown.config.crash_case_file import read_case_spec
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown import bench_attitude
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.tables import GYRO, imu_table
 

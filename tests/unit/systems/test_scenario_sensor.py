@@ -8,7 +8,7 @@ import pytest
 
 from strapdown import simulate, verify
 from strapdown.config import ScenarioSpec, specify
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import find_scenario, simulate_imu
 from strapdown.systems.attitude_source import simulate_scenario

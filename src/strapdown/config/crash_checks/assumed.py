@@ -5,7 +5,7 @@ from __future__ import annotations
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec
 from strapdown.config.crash_checks.written import Written
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["check_assumed"]
 
@@ -61,34 +61,18 @@ def _check_table(
             continue
         if not missing:
             raise written.contradiction(
-                (*at, name),
-                ("units", k, other),
-                "nothing is missing there that could be assumed",
-                "take it away, or the channel that is not to be trusted",
+                (*at, name), ("units", k, other), "config.nothing-missing-could-assumed"
             )
         sizes = given if isinstance(given, tuple) else (given,)
         if max(sizes) > most:
-            raise written.refuse(
-                (*at, name),
-                f"it is more than {most:g}, and nothing would be known",
-                "give what one of three crashes like this one goes beyond",
-            )
+            raise written.refuse((*at, name), "config.more-than-nothing-would-known", most=most)
     if not force and not turn:
-        raise written.contradiction(
-            at,
-            ("units", k, measured),
-            "nothing is missing of this unit",
-            "take away [units.assumed]",
-        )
+        raise written.contradiction(at, ("units", k, measured), "config.nothing-missing-unit")
     if not assumed.because.strip():
-        raise written.missing((*at, "because"), "a report must say why it may be assumed")
+        raise written.missing((*at, "because"), "config.missing-report-must-say-why")
     start, end = assumed.over_s
     if not 0.0 < end - start <= LONGEST:
-        raise written.refuse(
-            (*at, "over_s"),
-            f"it lasts {end - start:.4g} s",
-            "write over_s = [start, end], from the trigger; if it is in ms, over_ms",
-        )
+        raise written.refuse((*at, "over_s"), "config.lasts", end=end - start)
 
 
 def _forces_missing(k: int, unit: UnitSpec, written: Written) -> list[str]:
@@ -98,8 +82,7 @@ def _forces_missing(k: int, unit: UnitSpec, written: Written) -> list[str]:
             raise written.contradiction(
                 ("units", k, "accelerometers", n, "channels"),
                 ("units", k, "accelerometers", 0, "channels"),
-                "one range has an axis that the other has not",
-                "give the axis in all ranges, or leave out the range that lacks it",
+                "config.range-axis-other-not",
             )
     return first
 

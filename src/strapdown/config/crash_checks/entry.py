@@ -88,33 +88,19 @@ def _kind_for(name: str) -> str:
 def _sizes(entry: EntrySpec, written: Written) -> None:
     speed, sd = entry.speed_m_per_s, entry.speed_sd_m_per_s
     if speed is not None and abs(speed) > FASTEST:
-        raise written.refuse(
-            ("entry", "speed_m_per_s"),
-            f"that is {3.6 * speed:.4g} km/h",
-            "if it is in km/h, write speed_km_per_h",
-        )
+        raise written.refuse(("entry", "speed_m_per_s"), "config.km-h", speed=3.6 * speed)
     if entry.kind == "speed" and sd == 0.0:
-        raise written.refuse(
-            ("entry", "speed_sd_m_per_s"),
-            "no speed is known without error, and every bound of the path rests on it",
-            "give the standard deviation: two of three such measurements lie within it",
-        )
+        raise written.refuse(("entry", "speed_sd_m_per_s"), "config.no-speed-known-without-error")
     if sd is not None and sd > FASTEST / 3.0:
         raise written.refuse(
-            ("entry", "speed_sd_m_per_s"),
-            f"the speed would be known to {3.6 * sd:.4g} km/h",
-            "if it is in km/h, write speed_sd_km_per_h",
+            ("entry", "speed_sd_m_per_s"), "config.speed-would-known-km-h", sd=3.6 * sd
         )
     for name in ("heading_deg", "slip_deg"):
         if abs(getattr(entry, name)) > MOST_ANGLE:
-            raise written.refuse(
-                ("entry", name), "an angle is between -360 and 360 deg", "give it in degrees"
-            )
+            raise written.refuse(("entry", name), "config.angle-between")
     for name in ("heading_sd_deg", "slip_sd_deg"):
         if getattr(entry, name) > MOST_ANGLE / 2.0:
-            raise written.refuse(
-                ("entry", name), "more than half a turn is not known at all", "give it in degrees"
-            )
+            raise written.refuse(("entry", name), "config.more-than-half-turn-not")
 
 
 def _instant(spec: CaseSpec, written: Written) -> None:
@@ -125,13 +111,7 @@ def _instant(spec: CaseSpec, written: Written) -> None:
     if window is not None and window[0] < window[1] and not window[0] <= time <= window[1]:
         first, second = (at, over) if written.has(*at) else (over, at)
         raise written.contradiction(
-            first,
-            second,
-            "the path runs from the entry, which is not in its window",
-            "widen window_s until it holds the entry, or correct time_s",
-            default=time,
+            first, second, "config.path-runs-entry-not-window", default=time
         )
     if not math.isclose(time, 0.0) and abs(time) > 600.0:
-        raise written.refuse(
-            at, "the entry is minutes away from the trigger", "if it is in ms, write time_ms"
-        )
+        raise written.refuse(at, "config.entry-minutes-away-trigger")

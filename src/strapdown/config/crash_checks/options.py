@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.crash_checks.written import Written
-from strapdown.exceptions import nearest
 
 __all__ = ["check_options"]
 
@@ -30,8 +29,8 @@ def check_options(spec: CaseSpec, written: Written) -> None:
     if not GRAVITY[0] < options.gravity_m_per_s2 < GRAVITY[1]:
         raise written.refuse(
             ("options", "gravity_m_per_s2"),
-            f"gravity is {options.gravity_m_per_s2:.4g} m/s² nowhere on the ground",
-            "leave it out, or give that of the place",
+            "config.gravity-nowhere-ground",
+            gravity_m_per_s2=options.gravity_m_per_s2,
         )
     for k, name in enumerate(options.severity or ()):
         _model(k, name, options.severity or (), written)
@@ -41,29 +40,19 @@ def _windows(spec: CaseSpec, written: Written) -> None:
     at, peak_at = ("options", "window_s"), ("options", "peak_window_s")
     window, peak = spec.options.window_s, spec.options.peak_window_s
     if peak > LONGEST_PEAK:
-        raise written.refuse(
-            peak_at, f"no pulse of a crash lasts {peak:g} s", "if it is in ms, write peak_window_ms"
-        )
+        raise written.refuse(peak_at, "config.no-pulse-crash-lasts", peak=peak)
     if window is not None:
         start, end = window
         if not start < end:
-            raise written.refuse(at, "it ends before it begins", "write window_s = [start, end]")
+            raise written.refuse(at, "config.ends-before-begins")
         if end - start > LONGEST_WINDOW:
-            raise written.refuse(
-                at, f"it is {end - start:.4g} s long", "if it is in ms, write window_ms"
-            )
+            raise written.refuse(at, "config.long", end=end - start)
         if end <= 0.0:
-            raise written.refuse(
-                at, "it ends before the trigger, at 0 s", "times are from the trigger on"
-            )
+            raise written.refuse(at, "config.ends-before-trigger")
         if peak > end - start:
             first, second = (peak_at, at) if written.has(*peak_at) else (at, peak_at)
             raise written.contradiction(
-                first,
-                second,
-                "the peak is sought over a longer time than the path has",
-                "widen window_s, or shorten peak_window_s",
-                default=peak,
+                first, second, "config.peak-sought-over-longer-time", default=peak
             )
 
 
@@ -74,10 +63,9 @@ def _model(number: int, name: str, names: Sequence[str], written: Written) -> No
     if name not in SEVERITY_MODELS:
         raise written.refuse(
             ("options", "severity", number),
-            "there is no such severity model",
-            nearest(name, SEVERITY_MODELS),
+            "config.no-such-severity-model",
+            word=name,
+            known=SEVERITY_MODELS,
         )
     if name in names[:number]:
-        raise written.refuse(
-            ("options", "severity", number), "it is named twice", "name each model once"
-        )
+        raise written.refuse(("options", "severity", number), "config.named-twice")

@@ -42,11 +42,7 @@ def check_places(spec: CaseSpec, written: Written) -> None:
     sds = [(("units", k, "position_sd_m"), u.position_sd_m) for k, u in enumerate(spec.units)]
     for at, sd in [*sds, (("entry", "antenna_sd_m"), spec.entry.antenna_sd_m)]:
         if sd > MOST_SD:
-            raise written.refuse(
-                at,
-                f"a place that is known to {sd:g} m is on no vehicle in particular",
-                "give it in m; if it is in mm, let the key end in _mm",
-            )
+            raise written.refuse(at, "config.place-known-no-vehicle-particular", sd=sd)
 
 
 def _sizes(vehicle: VehicleSpec, written: Written) -> None:
@@ -55,52 +51,32 @@ def _sizes(vehicle: VehicleSpec, written: Written) -> None:
         for name in ("length_m", "width_m", "front_m"):
             if written.has(at, name):
                 raise written.contradiction(
-                    (at, name),
-                    (at, "outline_m"),
-                    "the outline tells it already",
-                    f"keep outline_m, or length, width and front: take away {name}",
+                    (at, name), (at, "outline_m"), "config.outline-tells-already", name=name
                 )
         _outline(vehicle.outline_m, written)
     for name in ("length_m", "width_m"):
         size = getattr(vehicle, name)
         if not 0.3 <= size <= LONGEST:
-            raise written.refuse(
-                (at, name),
-                f"no vehicle on a road is {size:g} m in size",
-                "if it is in mm, let the key end in _mm",
-            )
+            raise written.refuse((at, name), "config.no-vehicle-road-size", size=size)
     if vehicle.front_m is not None and not 0.0 <= vehicle.front_m <= vehicle.length_m:
         raise written.contradiction(
             (at, "front_m"),
             (at, "length_m"),
-            "the origin of positions would lie outside of the vehicle",
-            "front_m is how far the front is ahead of the origin: from 0 to the length",
+            "config.origin-positions-would-lie-outside",
             default=vehicle.length_m,
         )
     if vehicle.mass_kg is not None and not LIGHTEST <= vehicle.mass_kg <= HEAVIEST:
-        raise written.refuse(
-            (at, "mass_kg"),
-            f"no vehicle has {vehicle.mass_kg:g} kg",
-            "give it in kg: tonnes times 1000",
-        )
+        raise written.refuse((at, "mass_kg"), "config.no-vehicle-kg", mass_kg=vehicle.mass_kg)
 
 
 def _outline(corners: Sequence[Corner], written: Written) -> None:
     at = ("vehicle", "outline_m")
     if len(corners) < 3:
-        raise written.refuse(
-            at, f"{len(corners)} corners enclose nothing", "give at least three, in order around it"
-        )
+        raise written.refuse(at, "config.corners-enclose-nothing", count=len(corners))
     if max(math.dist(a, b) for a in corners for b in corners[:1]) > LONGEST:
-        raise written.refuse(
-            at, "it is larger than any vehicle", "if it is in mm, write outline_mm"
-        )
+        raise written.refuse(at, "config.larger-than-any-vehicle")
     if abs(_area(corners)) < SMALLEST:
-        raise written.refuse(
-            at,
-            f"it encloses {abs(_area(corners)):.2g} m²",
-            "give the corners in order around the vehicle: [[forward, right], …]",
-        )
+        raise written.refuse(at, "config.encloses", area=abs(_area(corners)))
 
 
 def _area(corners: Sequence[Corner]) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from strapdown.config.crash_case import TriadSpec, UnitSpec
 from strapdown.config.crash_checks.written import Written
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError, StrapdownError, nearest
+from strapdown.errors import ConfigError, StrapdownError
 
 __all__ = ["check_ranges", "check_sensor"]
 
@@ -33,11 +33,7 @@ def check_sensor(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> 
         uncertainty is not known, stands twice in two units, or has no number that it can have.
     """
     if triad.sensor is None and not triad.uncertainty:
-        raise written.missing(
-            (*at, "sensor"),
-            "nothing says how good it is, and no bound could be told; [….uncertainty] may take "
-            "its place",
-        )
+        raise written.missing((*at, "sensor"), "config.missing-nothing-says-how-good")
     if triad.sensor is not None:
         _known_sensor(at, kind, triad.sensor, written)
     _known_keys(at, kind, triad.uncertainty, written)
@@ -60,8 +56,9 @@ def check_ranges(k: int, unit: UnitSpec, written: Written) -> None:
             raise written.contradiction(
                 ("units", k, "accelerometers", n, *_range_key(triads[n])),
                 ("units", k, "accelerometers", n - 1, *_range_key(triads[n - 1])),
-                f"a range of {_in_g(before)} g stands before one of {_in_g(after)} g",
-                "put the lowest range first: the others take over where it ends",
+                "config.range-g-stands-before-g",
+                in_g=_in_g(before),
+                in_g_2=_in_g(after),
             )
 
 
@@ -71,9 +68,7 @@ def _known_sensor(at: KeyPath, kind: str, name: str, written: Written) -> None:
 
     path = (*at, "sensor")
     if name.lower() not in SENSORS and not name.lower().endswith(".toml"):
-        raise written.refuse(
-            path, "there is no such sensor", f"{nearest(name, SENSORS)} Or name a .toml file."
-        )
+        raise written.refuse(path, "config.no-such-sensor", word=name, known=SENSORS)
     try:
         sensor = load_sensor(name)
     except StrapdownError as error:
@@ -84,15 +79,11 @@ def _known_sensor(at: KeyPath, kind: str, name: str, written: Written) -> None:
             f.remedy or "mend that file",
         ) from None
     except (RecursionError, OSError, ValueError) as error:
-        raise written.refuse(
-            path, f"it cannot be read: {type(error).__name__}", "mend that file"
-        ) from None
+        raise written.refuse(path, "config.cannot-read", name=type(error).__name__) from None
     if not any(figure.key.startswith(f"{kind}.") for figure in sensor.sources):
         has = "accelerometers" if kind == "gyro" else "a gyro"
         lacks = "gyro" if kind == "gyro" else "accelerometers"
-        raise written.refuse(
-            path, f"it has {has}, and no {lacks}", "name the sensor that recorded these channels"
-        )
+        raise written.refuse(path, "config.no", has=has, lacks=lacks)
 
 
 def _known_keys(
@@ -106,14 +97,14 @@ def _known_keys(
     for name, given in stated.items():
         path = (*at, "uncertainty", name)
         if name not in known:
-            raise written.file.refuse(path, "there is no such key", nearest(name[:100], known))
+            raise written.file.refuse(path, "config.no-such-key", word=name[:100], known=known)
         quantity = known[name].quantity
         if quantity in by:
             raise written.contradiction(
                 path,
                 (*at, "uncertainty", by[quantity]),
-                f"both state the {quantity.replace('_', ' ')}",
-                "keep one of the two",
+                "config.both-state",
+                replace=quantity.replace("_", " "),
             )
         by[quantity] = name
         _fits(path, quantity, given, written)
@@ -123,13 +114,11 @@ def _fits(path: KeyPath, quantity: str, given: float | Triple, written: Written)
     numbers = given if isinstance(given, tuple) else (given,)
     error: ConfigError | None = None
     if min(numbers) < 0.0:
-        error = written.refuse(path, "it is negative", "give its size, zero or more")
+        error = written.refuse(path, "config.negative-2")
     elif quantity in ("full_scale", "bandwidth") and min(numbers) == 0.0:
-        error = written.refuse(
-            path, "zero leaves nothing to measure with", "leave the key out where it is not known"
-        )
+        error = written.refuse(path, "config.zero-leaves-nothing-measure")
     elif quantity == "bandwidth" and len(numbers) != 1:
-        error = written.refuse(path, "all axes have one bandwidth", "give one number")
+        error = written.refuse(path, "config.all-axes-bandwidth")
     if error is not None:
         raise error
 

@@ -43,24 +43,17 @@ def check_references(spec: CaseSpec, written: Written) -> None:
                 )
         needed = _NEEDED[reference.kind]
         if getattr(reference, needed) is None:
-            raise written.missing((*at, needed), f"kind is {reference.kind}")
+            raise written.missing((*at, needed), "config.missing-kind", kind=reference.kind)
         change = reference.delta_v_m_per_s
         if change is None:
             continue
         if abs(change) > MOST:
             raise written.refuse(
-                (*at, "delta_v_m_per_s"),
-                f"that is a change of {3.6 * change:.4g} km/h",
-                "if it is in km/h, write delta_v_km_per_h",
+                (*at, "delta_v_m_per_s"), "config.change-km-h", change=3.6 * change
             )
         if reference.axis == "resultant" and change < 0.0:
             raise written.contradiction(
-                (*at, "delta_v_m_per_s"),
-                (*at, "axis"),
-                "a resultant has no sign",
-                'give it without its sign, or name the axis: "forward" or "right"',
+                (*at, "delta_v_m_per_s"), (*at, "axis"), "config.resultant-no-sign"
             )
         if reference.over_s is not None and not reference.over_s[0] < reference.over_s[1]:
-            raise written.refuse(
-                (*at, "over_s"), "it ends before it begins", "write over_s = [start, end]"
-            )
+            raise written.refuse((*at, "over_s"), "config.ends-before-begins-2")

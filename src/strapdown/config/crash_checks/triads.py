@@ -9,7 +9,6 @@ from strapdown.config.crash_checks.ranges import check_ranges, check_sensor
 from strapdown.config.crash_checks.written import Written
 from strapdown.config.toml_lines import KeyPath
 from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
-from strapdown.exceptions import nearest
 
 __all__ = ["check_triads"]
 
@@ -48,26 +47,23 @@ def _channels(
     at: KeyPath, triad: TriadSpec, used: dict[tuple[str, str], KeyPath], written: Written
 ) -> None:
     if not triad.channels:
-        raise written.missing((*at, "channels"), "nothing says where its axes are recorded")
+        raise written.missing((*at, "channels"), "config.missing-nothing-says-axes-recorded")
     for axis, channel in triad.channels.items():
         path = (*at, "channels", axis)
         name = channel.removeprefix("-").strip()
         if not name:
-            raise written.refuse(path, "a sign is no channel", 'name it after the sign: "-accel_x"')
+            raise written.refuse(path, "config.sign-no-channel")
         if name == triad.time:
-            raise written.contradiction(
-                path, (*at, "time"), "time is no axis", "name the channel of the axis"
-            )
+            raise written.contradiction(path, (*at, "time"), "config.time-no-axis")
         before = used.setdefault((triad.path, name), path)
         if before != path:
             gyro = "gyro" in at and "gyro" in before
             raise written.contradiction(
                 path,
                 before,
-                "a channel lies along one axis of one triad",
-                'name the other channel; a gyro is lent to another unit by gyro_from = "…"'
+                "config.channel-lies-along-axis-triad"
                 if gyro
-                else "name the channel that was recorded along this axis",
+                else "config.channel-lies-along-axis-triad-2",
             )
 
 
@@ -80,12 +76,14 @@ def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
         if unit in _UNITS[_OTHER[kind]]:
             raise written.refuse(
                 (*at, "unit"),
-                f"it is a unit of {_NAMES[_OTHER[kind]]}, and this is {_NAMES[kind]}",
-                f"use one of {', '.join(_UNITS[kind])}, or move the channels to where they belong",
+                "config.unit",
+                names=_NAMES[_OTHER[kind]],
+                names_2=_NAMES[kind],
+                units=_UNITS[kind],
             )
     if triad.time_unit is not None:
         unit = unit_of(triad.time_unit) or triad.time_unit
         if unit not in TIME_UNITS:
             raise written.refuse(
-                (*at, "time_unit"), "it is no unit of time", nearest(triad.time_unit, TIME_UNITS)
+                (*at, "time_unit"), "config.no-unit-time", word=triad.time_unit, known=TIME_UNITS
             )

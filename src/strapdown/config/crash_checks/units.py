@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from strapdown.config.crash_case import CaseSpec, UnitSpec
 from strapdown.config.crash_checks.assumed import check_assumed
 from strapdown.config.crash_checks.written import Written
-from strapdown.exceptions import nearest
+from strapdown.errors import nearest
 
 __all__ = ["check_names", "check_units"]
 
@@ -35,9 +35,8 @@ def check_units(spec: CaseSpec, written: Written) -> None:
         if spec.options.clock == "trigger" and unit.trigger_sd_s > MOST_TRIGGER_SD:
             raise written.refuse(
                 ("units", k, "trigger_sd_s"),
-                f"a trigger that is known to {unit.trigger_sd_s:g} s ties no clocks together",
-                "if it is in ms, write trigger_sd_ms; or tie the clocks by what was felt: "
-                'clock = "correlation" in [options]',
+                "config.trigger-known-ties-no-clocks",
+                trigger_sd_s=unit.trigger_sd_s,
             )
         check_assumed(k, spec, written)
 
@@ -59,8 +58,7 @@ def check_names(several: str, names: Sequence[str], written: Written) -> None:
             raise written.contradiction(
                 (several, k, "name"),
                 (several, seen[same], "name"),
-                "two of one name cannot be told apart",
-                "name one of them otherwise",
+                "config.two-name-cannot-told-apart",
             )
         seen[same] = k
 
@@ -69,14 +67,10 @@ def _triggered(spec: CaseSpec, written: Written) -> None:
     without = [k for k, unit in enumerate(spec.units) if unit.trigger_s is None]
     if without and spec.options.clock == "trigger":
         raise written.missing(
-            ("units", without[0], "trigger_s"),
-            "the clocks are tied by the common trigger, which is where time is 0; or else write "
-            'clock = "correlation" in [options]',
+            ("units", without[0], "trigger_s"), "config.missing-clocks-tied-common-trigger"
         )
     if len(without) == len(spec.units):
-        raise written.missing(
-            ("units", 0, "trigger_s"), "no unit has one, and it is where time is 0"
-        )
+        raise written.missing(("units", 0, "trigger_s"), "config.missing-no-unit-time")
 
 
 def _placed(k: int, unit: UnitSpec, written: Written) -> None:
@@ -87,17 +81,9 @@ def _placed(k: int, unit: UnitSpec, written: Written) -> None:
         if not written.has("units", k, name):
             raise written.missing(("units", k, name), why)
     if any(abs(angle) > MOST_ANGLE for angle in unit.angles_deg):
-        raise written.refuse(
-            ("units", k, "angles_deg"),
-            "angles are between -360 and 360 deg",
-            "give roll, pitch, heading in degrees",
-        )
+        raise written.refuse(("units", k, "angles_deg"), "config.angles-between")
     if unit.angles_sd_deg > STEEPEST:
-        raise written.refuse(
-            ("units", k, "angles_sd_deg"),
-            "with more than 90 deg nothing is known of how it sits",
-            "give the standard deviation in degrees",
-        )
+        raise written.refuse(("units", k, "angles_sd_deg"), "config.more-than-nothing-known-how")
 
 
 def _gyro(k: int, spec: CaseSpec, written: Written) -> None:
@@ -106,19 +92,9 @@ def _gyro(k: int, spec: CaseSpec, written: Written) -> None:
     if lender is None:
         return
     if unit.gyro is not None:
-        raise written.contradiction(
-            at,
-            ("units", k, "gyro"),
-            "a unit with a gyro borrows none",
-            "take away one of the two",
-        )
+        raise written.contradiction(at, ("units", k, "gyro"), "config.unit-gyro-borrows-none")
     if lender == unit.name:
-        raise written.contradiction(
-            at,
-            ("units", k, "name"),
-            "a unit lends itself nothing",
-            "name another unit, one that has a gyro",
-        )
+        raise written.contradiction(at, ("units", k, "name"), "config.unit-lends-itself-nothing")
     lenders = [n for n, other in enumerate(spec.units) if other.name == lender]
     with_gyro = [other.name for other in spec.units if other.gyro is not None]
     known = nearest(lender, with_gyro) if with_gyro else "no unit of this case has a gyro"
@@ -133,15 +109,13 @@ def _gyro(k: int, spec: CaseSpec, written: Written) -> None:
 def _levelled(k: int, unit: UnitSpec, written: Written) -> None:
     level, sd = ("units", k, "levelling_deg"), ("units", k, "levelling_sd_deg")
     if unit.levelling_deg is not None and unit.levelling_sd_deg is None:
-        raise written.missing(sd, f"{written.said(*level)} says not how well it is known")
+        raise written.missing(sd, "config.missing-says-not-how-well", said=written.said(*level))
     if unit.levelling_deg is None and unit.levelling_sd_deg is not None:
-        raise written.missing(level, f"{written.said(*sd)} is of nothing")
+        raise written.missing(level, "config.missing-nothing", said=written.said(*sd))
     if unit.levelling_deg is not None and max(abs(a) for a in unit.levelling_deg) > STEEPEST:
-        raise written.refuse(
-            level, "roll and pitch before a crash are within 90 deg", "give them in degrees"
-        )
+        raise written.refuse(level, "config.roll-pitch-before-crash-within")
     if unit.levelling_sd_deg is not None and unit.levelling_sd_deg > STEEPEST:
-        raise written.refuse(sd, "with more than 90 deg nothing is known", "give it in degrees")
+        raise written.refuse(sd, "config.more-than-nothing-known")
 
 
 def _rest(k: int, spec: CaseSpec, written: Written) -> None:
@@ -150,19 +124,15 @@ def _rest(k: int, spec: CaseSpec, written: Written) -> None:
         return
     start, end = unit.rest_s
     if not start < end:
-        raise written.refuse(at, "it ends before it begins", "write rest_s = [start, end]")
+        raise written.refuse(at, "config.ends-before-begins-3")
     if end > 0.0:
-        raise written.refuse(
-            at,
-            f"it ends {end:g} s after the trigger, and the vehicle is struck there",
-            "give a time before the crash in which the vehicle stood, from the trigger: negative",
-        )
+        raise written.refuse(at, "config.ends-after-trigger-vehicle-struck", end=end)
     entry, speed = spec.entry, ("entry", "speed_m_per_s")
     if entry.kind == "speed" and entry.speed_m_per_s and end > entry.time_s:
         raise written.contradiction(
             at,
             ("entry", "time_s"),
-            f"the vehicle is said to stand when it drives: {written.said(*speed)}",
-            "give a rest that ends before the entry, or take it away",
+            "config.vehicle-said-stand-when-drives",
             default=entry.time_s,
+            said=written.said(*speed),
         )

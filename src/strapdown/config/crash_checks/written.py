@@ -10,7 +10,7 @@ from strapdown.config.case_wanted import what_to_write
 from strapdown.config.shown import shown, shown_key
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["Written"]
 

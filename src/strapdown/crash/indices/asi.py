@@ -11,7 +11,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.indices.moving_means import moving_means
 from strapdown.crash.indices.phaseless import four_pole
 from strapdown.crash.indices.pulse import checked
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["ASI_AVERAGES", "Asi", "asi"]
 
@@ -95,9 +95,11 @@ def asi(
         stamps, smooth = t, four_pole(t, a, FREQUENCY, cutoff)
     else:
         raise ConfigError(
-            f"'{average}' is no average of the ASI",
+            "crash.no-average-asi",
             quantity="average",
-            remedy=nearest(average, ASI_AVERAGES),
+            average=average,
+            word=average,
+            known=ASI_AVERAGES,
         )
     shares = smooth / (np.array(LIMITS_G) * STANDARD_GRAVITY)
     history = np.sqrt((shares * shares).sum(axis=1))

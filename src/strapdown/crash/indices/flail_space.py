@@ -12,7 +12,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.indices.crossings import cubic, first_reach
 from strapdown.crash.indices.moving_means import largest_mean
 from strapdown.crash.indices.pulse import checked, from_start, integrals
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 
 __all__ = ["FlailSpace", "flail_space"]
 
@@ -88,9 +88,7 @@ def flail_space(
     """
     for name, distance in (("forward", forward), ("sideways", sideways)):
         if not (math.isfinite(distance) and distance > 0.0):
-            raise ConfigError(
-                f"{distance} m is no space", quantity=name, remedy="give metres above zero"
-            )
+            raise ConfigError("crash.no-space", quantity=name, distance=distance)
     plane = np.asarray(accel, dtype=np.float64)
     t, a = checked(time, plane[:, :2] if plane.ndim == 2 else plane, 2, "accel")
     t, a = from_start(t, a, start, "start")
@@ -105,11 +103,11 @@ def flail_space(
     if not met:
         x, y = (float(v[np.argmax(np.abs(v))]) for v in velocity.T)
         found = Finding(
-            f"the occupant moves by less than {forward:g} m along and {sideways:g} m across until "
-            f"the record ends at {t[-1]:.6g} s: OIV is the vehicle's greatest change of velocity, "
-            "and ORA has no value",
+            "crash.occupant-moves-less-than-along",
             quantity="OIV",
-            remedy="take a longer record, if the impact is not over in it",
+            forward=forward,
+            sideways=sideways,
+            t=t[-1],
         )
         return FlailSpace(x, y, None, None, None, (found,))
     at = min(met)
@@ -118,11 +116,6 @@ def flail_space(
         rest, values = from_start(t, a, at, "ORA")
         ora = [largest_mean(rest, values[:, k], WINDOW)[0] / STANDARD_GRAVITY for k in (0, 1)]
     except DataError:
-        found = Finding(
-            f"the record ends less than 10 ms after the occupant's impact at {at:.6g} s: ORA has "
-            "no value",
-            quantity="ORA",
-            remedy="take a longer record",
-        )
+        found = Finding("crash.record-ends-less-than-ms", quantity="ORA", at=at)
         return FlailSpace(x, y, at, None, None, (found,))
     return FlailSpace(x, y, at, ora[0], ora[1])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.indices.pulse import checked
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 __all__ = ["Hic", "hic"]
 
@@ -64,11 +64,7 @@ def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
     and end at samples (49 CFR 571.208, S6.2). Every pair is looked at: nothing is searched for.
     """
     if not (math.isfinite(longest) and longest > 0.0):
-        raise ConfigError(
-            f"{longest} s is no length of a window",
-            quantity="longest",
-            remedy="give 0.015 for HIC15 or 0.036 for HIC36",
-        )
+        raise ConfigError("crash.no-length-window", quantity="longest", longest=longest)
     t, a = checked(time, accel, 3, "accel")
     total = running_integral(t, np.sqrt((a * a).sum(axis=1)) / STANDARD_GRAVITY)
     best = (0.0, 0, 1)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 
@@ -36,9 +36,10 @@ def moving_means(time: Array, values: Array, width: float) -> tuple[Array, Array
     last = time[-1] - width
     if last < time[0] - 1e-9 * width:
         raise DataError(
-            f"the record of {time[-1] - time[0]:.6g} s is shorter than the window of {width:g} s",
+            "crash.record-shorter-than-window",
             quantity="time",
-            remedy="give a longer record",
+            time=time[-1] - time[0],
+            width=width,
         )
     last = max(float(last), float(time[0]))
     starts = np.concatenate([time[time <= last], time[time >= time[0] + width] - width, [last]])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.indices.crossings import cubic, first_reach
 from strapdown.crash.indices.pulse import checked, from_start, integrals
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["Olc", "olc"]
 
@@ -78,11 +78,7 @@ def olc(
     0.300 - 0.065 = 0.235 m). Exact for acceleration that is linear between samples.
     """
     if not (math.isfinite(whole) and 0.0 <= free < whole):
-        raise ConfigError(
-            f"ways of {free} m and {whole} m",
-            quantity="free, whole",
-            remedy="give the free way and then the greater whole way, in m",
-        )
+        raise ConfigError("crash.ways", quantity="free, whole", free=free, whole=whole)
     t, a = from_start(*checked(time, accel_x, None, "accel_x"), start, "start")
     lost, ahead = integrals(t, -a)
     begin = first_reach(t, ahead, lost, free)
@@ -108,8 +104,5 @@ def olc(
 
 def _weak(reached: str, needed: float) -> Finding:
     return Finding(
-        f"the occupant moves by {reached} relative to the vehicle and not by {needed:g} m: OLC has "
-        "no value",
-        quantity="OLC",
-        remedy="give the whole pulse with x forward; a weak or a rear impact has none",
+        "crash.occupant-moves-relative-vehicle-not", quantity="OLC", reached=reached, needed=needed
     )

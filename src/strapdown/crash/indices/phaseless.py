@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.crash.indices.pulse import step_of
-from strapdown.exceptions import ConfigError, DataError, nearest
+from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]
 #: What the cut-off frequency belongs to.
@@ -50,14 +50,12 @@ def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole
 
     if cutoff not in CUTOFFS:
         raise ConfigError(
-            f"'{cutoff}' is no kind of cut-off", quantity="cutoff", remedy=nearest(cutoff, CUTOFFS)
+            "crash.no-kind-cut-off", quantity="cutoff", cutoff=cutoff, word=cutoff, known=CUTOFFS
         )
     step = step_of(time)
     if 1.0 / step < 10.0 * frequency:
         raise DataError(
-            f"a rate of {1.0 / step:.4g} Hz is less than ten times the filter's {frequency:g} Hz",
-            quantity="time",
-            remedy="take a faster record",
+            "crash.rate-hz-less-than-ten", quantity="time", step=1.0 / step, frequency=frequency
         )
     each = frequency / PASS_SHARE if cutoff == "whole" else frequency
     sections = butter(2, each, fs=1.0 / step, output="sos")

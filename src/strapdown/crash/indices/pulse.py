@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 
 Array = NDArray[np.float64]
 # Stamps are rounded; steps that differ by more than this share are not one rate.
@@ -37,32 +37,27 @@ def checked(
     wanted = (t.size,) if width is None else (t.size, width)
     if t.ndim != 1 or v.shape != wanted:
         raise DataError(
-            f"times have the shape {t.shape} and values {v.shape}; needed: {wanted}",
+            "crash.times-shape-values-needed",
             quantity=quantity,
-            remedy="give one row a sample, both of one record",
+            shape=t.shape,
+            shape_2=v.shape,
+            wanted=wanted,
         )
     if t.size < 2:
-        raise DataError(
-            f"{t.size} sample is no pulse", quantity=quantity, remedy="give the whole record"
-        )
+        raise DataError("crash.sample-no-pulse", quantity=quantity, size=t.size)
     for name, array in (("time", t), (quantity, v)):
         bad = np.flatnonzero(~np.isfinite(array).reshape(t.size, -1).all(axis=1))
         if bad.size:
             raise DataError(
-                f"not a finite number at sample {int(bad[0]) + 1}",
+                "crash.not-finite-number-sample",
                 row=int(bad[0]) + 1,
                 quantity=name,
-                remedy="cut the record there, or mend it first",
+                bad=int(bad[0]) + 1,
             )
     back = np.flatnonzero(np.diff(t) <= 0.0)
     if back.size:
         k = int(back[0]) + 1
-        raise DataError(
-            f"time goes from {t[k - 1]:.9g} to {t[k]:.9g} s",
-            row=k + 1,
-            quantity="time",
-            remedy="sort the record, or cut it there",
-        )
+        raise DataError("crash.time-goes", row=k + 1, quantity="time", t=t[k - 1], t_2=t[k])
     return t, v
 
 
@@ -80,10 +75,7 @@ def step_of(time: Array) -> float:
     if off.size:
         k = int(off[0])
         raise DataError(
-            f"the step of {steps[k]:.6g} s is not the mean one of {step:.6g} s",
-            row=k + 2,
-            quantity="time",
-            remedy="resample the record to one rate before a digital filter",
+            "crash.step-not-mean", row=k + 2, quantity="time", steps=steps[k], step=step
         )
     return step
 
@@ -98,10 +90,11 @@ def from_start(time: Array, values: Array, start: float, quantity: str) -> tuple
     """
     if not time[0] <= start < time[-1]:
         raise DataError(
-            f"the start at {start:.6g} s is not within the record ({time[0]:.6g} to "
-            f"{time[-1]:.6g} s)",
+            "crash.start-not-within-record",
             quantity=quantity,
-            remedy="give the instant of the first contact, on the record's clock",
+            start=start,
+            time=time[0],
+            time_2=time[-1],
         )
     k = int(np.searchsorted(time, start, side="right"))
     flat = values.reshape(values.shape[0], -1)

@@ -14,7 +14,7 @@ from strapdown.crash.indices.moving_means import largest_mean
 from strapdown.crash.indices.phaseless import four_pole
 from strapdown.crash.indices.pulse import checked, from_start, integrals
 from strapdown.dsp.running_integral import running_integral
-from strapdown.exceptions import ConfigError, DataError, Finding, nearest
+from strapdown.errors import ConfigError, DataError, Finding
 
 __all__ = ["PHD_AVERAGES", "Thiv", "thiv"]
 
@@ -119,10 +119,11 @@ def thiv(
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     if meeting is None:
         found = Finding(
-            f"the head flies less than {forward:g} m forward and {sideways:g} m sideways until "
-            f"the record ends at {after[-1]:.6g} s: it meets nothing, and THIV has no value",
+            "crash.head-flies-less-than-forward",
             quantity="THIV",
-            remedy="take a longer record; a weak or a rear impact has none",
+            forward=forward,
+            sideways=sideways,
+            after=after[-1],
         )
         return Thiv(None, None, None, None, None, float(speed.max()), (found,))
     at, surface = meeting
@@ -151,15 +152,15 @@ def _inputs(
 ) -> tuple[Array, Array, Array]:
     if phd_average not in PHD_AVERAGES:
         raise ConfigError(
-            f"'{phd_average}' is no average of the PHD",
+            "crash.no-average-phd",
             quantity="phd_average",
-            remedy=nearest(phd_average, PHD_AVERAGES),
+            phd_average=phd_average,
+            word=phd_average,
+            known=PHD_AVERAGES,
         )
     for name, distance in (("forward", forward), ("sideways", sideways)):
         if not (math.isfinite(distance) and distance > 0.0):
-            raise ConfigError(
-                f"{distance} m is no way to fly", quantity=name, remedy="give metres above zero"
-            )
+            raise ConfigError("crash.no-way-fly", quantity=name, distance=distance)
     plane = np.asarray(accel, dtype=np.float64)
     t, a = checked(time, plane[:, :2] if plane.ndim == 2 else plane, 2, "accel")
     rate = np.zeros(t.size) if yaw_rate is None else checked(time, yaw_rate, None, "yaw_rate")[1]
@@ -209,11 +210,6 @@ def _after_impact(
         rest, values = from_start(time, np.hypot(accel[:, 0], accel[:, 1]), at, "PHD")
         phd, begins = largest_mean(rest, values, WINDOW)
     except DataError:
-        found = Finding(
-            f"the record ends less than 10 ms after the head's impact at {at:.6g} s: PHD has no "
-            "value",
-            quantity="PHD",
-            remedy="take a longer record",
-        )
+        found = Finding("crash.record-ends-less-than-ms-2", quantity="PHD", at=at)
         return None, None, (found,)
     return phd / STANDARD_GRAVITY, begins, ()

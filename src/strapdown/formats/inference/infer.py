@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.find_columns import AXES, Column, find_columns
 from strapdown.formats.inference.arm import LARGEST as LARGEST_ARM
 from strapdown.formats.inference.arm import Arm, fit_arm

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapdown.aiding.gnss import Gnss
 from strapdown.alignment.fine_result import FineResult
 from strapdown.earth import radii_of_curvature
+from strapdown.errors import DataError, DivergenceError
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import ErrorModel
 from strapdown.estimation.influence_huber import Huber
@@ -20,7 +21,6 @@ from strapdown.estimation.paper_update import PaperUpdate
 from strapdown.estimation.quaternion_model import QuaternionModel
 from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.update_rule import UpdateRule
-from strapdown.exceptions import DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.navigation.damping import Damping, Feedback
 from strapdown.navigation.lost_covariance import LostCovarianceError

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from strapdown.config.coast import CoastSpec
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.simulation.course import Limits, Manoeuvre
 from strapdown.simulation.earth_motion import EarthMotion, Origin
 from strapdown.simulation.manoeuvres import Accelerate, Straight, Turn
@@ -93,19 +93,20 @@ def _coasting(spec: CoastSpec) -> list[Manoeuvre]:
     if rate != 0.0:
         if speed == 0.0 or to is not None:
             raise ConfigError(
-                "a turn goes with one speed above zero"
+                "outage.turn-goes-speed-above-zero"
                 if to is not None
-                else "a body that stands makes no turn of a vehicle",
+                else "outage.body-stands-makes-no-turn",
                 quantity="--turn-rate",
-                remedy="give --speed, in m/s, and no --to-speed",
             )
         if speed * abs(math.radians(rate)) > LIMITS.lateral:
             most = math.degrees(LIMITS.lateral / speed)
             raise ConfigError(
-                f"{rate:g} deg/s at {speed:g} m/s take more than {LIMITS.lateral:g} m/s² to the "
-                "side",
+                "outage.take-more-than-side",
                 quantity="--turn-rate",
-                remedy=f"give at most {most:.3g} deg/s, or less speed",
+                rate=rate,
+                speed=speed,
+                lateral=LIMITS.lateral,
+                most=most,
             )
         # With its ramps the turn is as long as the outage, and a second more.
         radius = speed / abs(math.radians(rate))
@@ -114,10 +115,13 @@ def _coasting(spec: CoastSpec) -> list[Manoeuvre]:
         least = 15.0 / 8.0 * abs(to - speed) / LIMITS.acceleration
         if outage < least:
             raise ConfigError(
-                f"from {speed:g} to {to:g} m/s in {outage:g} s takes more than "
-                f"{LIMITS.acceleration:g} m/s²",
+                "outage.takes-more-than",
                 quantity="--to-speed",
-                remedy=f"give an outage of at least {least:.3g} s, or another speed",
+                speed=speed,
+                to=to,
+                outage=outage,
+                acceleration=LIMITS.acceleration,
+                least=least,
             )
         return [Accelerate(to, outage)]
     return [Straight(outage)]

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec, aids_of
 from strapdown.config.navigation_modules import sensors_of
+from strapdown.errors import ConfigError
 from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.evaluation.withheld import WithheldScore, blinded, score_of, spans_to_withhold
-from strapdown.exceptions import ConfigError
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import Span
@@ -189,13 +189,16 @@ def _spans(
     if spec.at_s is not None:
         if not first - SETTLED <= spec.at_s <= end - spec.outage_s:
             raise ConfigError(
-                f"an outage of {spec.outage_s:g} s from {spec.at_s:.9g} s on is not within the "
-                f"run: navigation goes from {begun:.9g} s, and its fixes to {end:.9g} s",
+                "outage.outage-not-within-run-navigation"
+                if end - spec.outage_s > begun
+                else "outage.outage-not-within-run-navigation-2",
                 file=source.name,
                 quantity="--at",
-                remedy=f"begin between {begun:.9g} and {end - spec.outage_s:.9g} s"
-                if end - spec.outage_s > begun
-                else "give a shorter --outage",
+                outage_s=spec.outage_s,
+                at_s=spec.at_s,
+                begun=begun,
+                end=end,
+                end_2=end - spec.outage_s,
             )
         return (Span("outage", spec.at_s, spec.at_s + spec.outage_s),)
     log = float(index_of(source.imu)[0]) if spec.from_s is None else spec.from_s
@@ -203,24 +206,29 @@ def _spans(
     within = (max(first, log), end if to is None else min(end, to))
     if within != (first, end) and within[1] - within[0] < spec.outage_s <= end - first:
         raise ConfigError(
-            f"an outage of {spec.outage_s:g} s is longer than the "
-            f"{max(within[1] - within[0], 0.0):.4g} s between {within[0]:.9g} and "
-            f"{within[1]:.9g} s",
+            "outage.outage-longer-than-between",
             file=source.name,
             quantity="--from, --to, --duration",
-            remedy=f"give a longer part of what the run has, settled from {first:.9g} s on, to "
-            f"{end:.9g} s; or a shorter --outage",
+            outage_s=spec.outage_s,
+            within=max(within[1] - within[0], 0.0),
+            within_2=within[0],
+            within_3=within[1],
+            first=first,
+            end=end,
         )
     room = end - first
     if room < spec.outage_s:
         raise ConfigError(
-            f"an outage of {spec.outage_s:g} s is longer than the {max(room, 0.0):.4g} s of the "
-            f"run: its navigation, settled from {first:.9g} s on, ends at {end:.9g} s",
+            "outage.outage-longer-than-run-navigation"
+            if room > 1.0
+            else "outage.outage-longer-than-run-navigation-2",
             file=source.name,
             quantity="--outage",
-            remedy=f"give at most {room:.4g} s"
-            if room > 1.0
-            else "use a longer record: a filter needs half a minute to settle",
+            outage_s=spec.outage_s,
+            room=max(room, 0.0),
+            first=first,
+            end=end,
+            room_2=room,
         )
     places = spec.places if receivers else 1
     return spans_to_withhold(*within, spec.outage_s, places)
@@ -261,9 +269,7 @@ def _drift(
 
 def _aligns_anew(begin: float, end: float) -> ConfigError:
     return ConfigError(
-        f"from {begin:.9g} to {end:.9g} s it does not navigate alone: after a gap it aligns anew",
-        quantity="--at",
-        remedy="begin the outage elsewhere with --at, or bridge the gap (coast_s in [gaps])",
+        "outage.does-not-navigate-alone-after", quantity="--at", begin=begin, end=end
     )
 
 

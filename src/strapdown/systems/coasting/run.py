@@ -8,7 +8,7 @@ from pathlib import Path
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import sensors_of
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -88,9 +88,7 @@ def run_coast(
     """
     if navigation is None:
         if spec.sensor is None:
-            raise ConfigError(
-                "nothing says which sensor", quantity="sensor", remedy="name one of the catalogue"
-            )
+            raise ConfigError("outage.nothing-says-sensor", quantity="sensor")
         sensors = sensor_of(spec.sensor)
         sensor = load_sensor(spec.sensor)
         return CoastResult(

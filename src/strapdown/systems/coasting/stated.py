@@ -15,11 +15,11 @@ from strapdown.config.choice import make_choice
 from strapdown.config.coast import CoastSpec, CoastStartTable
 from strapdown.config.slots import SLOTS
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.errors import ConfigError
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.joseph import Joseph
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.stated_states import stated_states
-from strapdown.exceptions import ConfigError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
@@ -85,9 +85,10 @@ def sensor_of(name: str) -> ImuUncertainty:
     for triad in ("gyro", "accel"):
         if triad not in {figure.key.partition(".")[0] for figure in sensor.sources}:
             raise ConfigError(
-                f"'{sensor.name}' has no {'gyros' if triad == 'gyro' else 'accelerometers'}",
+                "outage.no",
                 quantity="sensor",
-                remedy="name one with gyros and accelerometers (strapdown modules)",
+                name=sensor.name,
+                value="gyros" if triad == "gyro" else "accelerometers",
             )
     return stated_imu(sensor, {}, {})
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from strapdown.config.toml_text import Asked, Page, instant, plain
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.event_rule import KMH
-from strapdown.exceptions import Finding
+from strapdown.errors import Finding
 from strapdown.systems.crash_draft.case_tables import (
     agreement,
     case_table,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from strapdown.config.toml_text import named_from
-from strapdown.exceptions import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.systems.crash_draft.draft import Draft, write_draft
@@ -47,12 +47,11 @@ def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
             real = file.resolve()
             if real in seen:
                 raise ConfigError(
-                    f"it is named twice: as {seen[real]} and as {given}"
-                    if seen[real] != str(given)
-                    else "it is named twice",
+                    "crash.named-twice" if seen[real] != str(given) else "crash.named-twice-2",
                     file=file.name,
                     quantity="RECORD",
-                    remedy="name each record once",
+                    seen=seen[real],
+                    given=given,
                 )
         seen |= {file.resolve(): str(given) for file in record.files or (Path(given),)}
         records.append(record)
@@ -113,8 +112,7 @@ def _nothing(
     told += [f"{s.what}: {s.why}" for s in skipped]
     shown = "; ".join(told[:8]) + ("; …" if len(told) > 8 else "")
     return DataError(
-        f"no accelerometer was made out ({shown or 'there is nothing in it'})",
+        "crash.no-accelerometer-made-out",
         file=", ".join(r.path.name for r in records[:3]),
-        remedy="give a record with accelerations in columns that stand side by side, x, y and z, "
-        "or say in the headings what they are: time_s, ax_g, ay_g, az_g",
+        value_shown=shown or "there is nothing in it",
     )

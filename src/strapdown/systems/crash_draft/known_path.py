@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from strapdown.config.toml_text import Page, instant, plain, string
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.named_columns import read_reference_path
 

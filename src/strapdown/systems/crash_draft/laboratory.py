@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.systems.crash_draft.parts import Clock, Part, Skipped
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_stamps import last_midnight
 from strapdown.formats.crash_units import factor_of
@@ -65,9 +65,11 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
     rows = max((len(v) for v in table.columns.values()), default=0)
     if rows < LEAST_SAMPLES:
         raise DataError(
-            f"{rows} sample{'' if rows == 1 else 's'}, too few for a crash",
+            "crash.sample-too-few-crash",
             file=record.path.name,
-            remedy=f"give the whole record: at least {LEAST_SAMPLES} samples",
+            rows=rows,
+            value="" if rows == 1 else "s",
+            least_samples=LEAST_SAMPLES,
         )
     clock, time = find_clock(table.columns, table.headings)
     if time is None:
@@ -142,16 +144,17 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
     k = int(back[0]) + 1
     stays = stamps[k] == stamps[k - 1]
     raise DataError(
-        (
+        "crash.message",
+        file=channel.file or None,
+        row=channel.row(k),
+        quantity=f"time ({channel.name})",
+        message=(
             f"time stays at {stamps[k]:.15g}"
             if stays
             else f"time goes from {stamps[k - 1]:.15g} to {stamps[k]:.15g}"
         )
         + (f" ({back.size} times such)" if back.size > 1 else ""),
-        file=channel.file or None,
-        row=channel.row(k),
-        quantity=f"time ({channel.name})",
-        remedy="sort or correct the rows; if two records were joined, split them",
+        remedy_text="sort or correct the rows; if two records were joined, split them",
     )
 
 

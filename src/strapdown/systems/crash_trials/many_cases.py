@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from typing import TypeVar
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 
 T = TypeVar("T")
 
@@ -40,9 +40,7 @@ def each_case(one: Callable[[int], T], cases: int, workers: int | None = None) -
     """
     count = (os.cpu_count() or 1) if workers is None else workers
     if cases < 1 or count < 1:
-        raise ConfigError(
-            f"{cases} cases by {count} workers", quantity="cases", remedy="use at least one of each"
-        )
+        raise ConfigError("crash.cases-workers", quantity="cases", cases=cases, count=count)
     if count == 1 or cases == 1:
         return [one(k) for k in range(cases)]
     # A fresh process has no threads or locks of this one.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.entry import Entry
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.sensors.error_draws import child
 from strapdown.simulation import CRASHES, CrashScenario, Ringing
 from strapdown.simulation.recorder_design import RecorderDesign

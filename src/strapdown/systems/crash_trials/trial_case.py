@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from strapdown.crash.entry import Entry
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.error_draws import child
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
@@ -39,9 +39,7 @@ def paper_design(name: str = "IMU1") -> RecorderDesign:
     """
     designs = {d.name: d for d in paper_units()}
     if name not in designs:
-        raise ConfigError(
-            f"there is no recorder '{name}'", quantity="name", remedy=nearest(name, designs)
-        )
+        raise ConfigError("crash.no-recorder", quantity="name", name=name, word=name, known=designs)
     return designs[name]
 
 
@@ -93,9 +91,11 @@ class TrialPriors:
         for kind in self.kinds:
             if kind not in DRAWN:
                 raise ConfigError(
-                    f"'{kind}' is no kind of crash that can be drawn",
+                    "crash.no-kind-crash-can-drawn",
                     quantity="kinds",
-                    remedy=nearest(kind, DRAWN),
+                    kind=kind,
+                    word=kind,
+                    known=DRAWN,
                 )
 
 

@@ -14,7 +14,7 @@ from strapdown.crash.prepare import prepare_unit
 from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit
 from strapdown.crash.velocity_change import EventChanges, VelocityChange
 from strapdown.earth import gravity
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.synchronise import synchronise
 from strapdown.systems.crash_trials.exact_answers import ExactAnswers

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
 from strapdown.alignment.site import Site
-from strapdown.exceptions import ConfigError, nearest
+from strapdown.errors import ConfigError
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -134,24 +134,18 @@ class Chain:
     def __post_init__(self) -> None:
         check_timeline(self.modes, self.start is not None)
         if len(self.modes) > 1 and self.sensors is None:
-            raise ConfigError(
-                "an alignment needs to know what its sensors may err by",
-                quantity="sensors",
-                remedy="give a sensor of the catalogue, or its errors",
-            )
+            raise ConfigError("navigation.alignment-needs-know-sensors-may", quantity="sensors")
         if self.intake.gaps.beyond == "align" and len(self.modes) == 1:
-            raise ConfigError(
-                "there is no alignment to begin anew with after a gap",
-                quantity="gaps",
-                remedy="use 'refuse' or 'coast'",
-            )
+            raise ConfigError("navigation.no-alignment-begin-anew-after", quantity="gaps")
         for command in self.commands:
             self._check_word(command.word)
         if self.fixes is not None and self.fixes not in self._tables():
             raise ConfigError(
-                f"there is no aid '{self.fixes}' with a table",
+                "navigation.no-aid-table-2",
                 quantity="fixes",
-                remedy=nearest(self.fixes, self._tables()),
+                fixes=self.fixes,
+                word=self.fixes,
+                known=self._tables(),
             )
 
     @property
@@ -214,9 +208,11 @@ class Chain:
         aid = self.navigator.by_name.get(name)
         if not isinstance(aid, TableAid):
             raise ConfigError(
-                f"there is no aid '{name}' with a table",
+                "navigation.no-aid-table",
                 quantity="aiding",
-                remedy=nearest(name, self._tables()),
+                name=name,
+                word=name,
+                known=self._tables(),
             )
         # What is wrong with it is said when it comes, and not after an alignment.
         aid.epochs(table)
@@ -294,7 +290,5 @@ class Chain:
         words = ("next", *(mode.name for mode in self.modes[1:]))
         if word not in words:
             raise ConfigError(
-                f"'{word}' is no mode that can be commanded",
-                quantity="commands",
-                remedy=nearest(word, words),
+                "navigation.no-mode-can-commanded", quantity="commands", word=word, known=words
             )

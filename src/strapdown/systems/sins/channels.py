@@ -11,7 +11,7 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.config.navigation import StartTable
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
@@ -81,11 +81,12 @@ def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, .
         if kind in SILENT and count > most * len(imu):
             said = worst[channel, kind].finding
             raise DataError(
-                f"{said.what}: nothing can be navigated without it",
+                "navigation.message",
                 file=said.file,
                 row=said.row,
                 quantity=said.quantity,
-                remedy=said.remedy,
+                message=f"{said.what}: nothing can be navigated without it",
+                remedy_text=said.remedy,
             )
     return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
 
@@ -139,12 +140,11 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
     wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
     if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
         raise DataError(
-            f"all gyros are {times.min():.2g} to {times.max():.2g} times as noisy as their data "
-            "sheet, and turn the body by more than it can: they seem to be in deg/s, and rad/s "
-            "are taken",
+            "navigation.all-gyros-times-noisy-their",
             file=source_of(imu),
             quantity="gyro",
-            remedy='write gyro_unit = "deg/s" in [log], or --gyro-unit deg/s',
+            times=times.min(),
+            times_2=times.max(),
         )
 
 
@@ -162,11 +162,12 @@ def _refuse_unit(imu: pd.DataFrame) -> None:
         wanted = STANDARD_GRAVITY * factor
         if abs(size / wanted - 1.0) < NEAR:
             raise DataError(
-                f"half of the time the three together read {size:.4g} m/s² or more, and gravity "
-                f"is {STANDARD_GRAVITY:.4g} m/s²: they seem to be in {unit}",
+                "navigation.half-time-three-together-read",
                 file=source_of(imu),
                 quantity="accel",
-                remedy=f'write accel_unit = "{unit}" in [log], or --accel-unit {unit}',
+                size=size,
+                standard_gravity=STANDARD_GRAVITY,
+                unit=unit,
             )
 
 
@@ -186,13 +187,12 @@ def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:
     shown = ", ".join(f"{x:.3g}" for x in force)
     upside = apart > 180.0 - FAR
     raise DataError(
-        f"the specific force of the first second, ({shown}) m/s² forward, right, down, is "
-        f"{apart:.0f}° away from where the attitude in [start] has it"
-        + (": gravity is upside down" if upside else ""),
+        "navigation.message",
         file=source_of(imu),
         quantity="accel",
-        remedy="at rest the accelerometer along down reads -9.8: give the sign as "
-        'accel_unit = "-m/s2" in [log], or the axes in [axes]'
+        message=f"the specific force of the first second, ({shown}) m/s² forward, right, down, is {apart:.0f}° away from where the attitude in [start] has it"
+        + (": gravity is upside down" if upside else ""),
+        remedy_text='at rest the accelerometer along down reads -9.8: give the sign as accel_unit = "-m/s2" in [log], or the axes in [axes]'
         if upside
         else "look at roll_deg and pitch_deg, or say in [axes] how the sensor lies in the body",
     )

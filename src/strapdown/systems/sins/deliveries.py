@@ -9,7 +9,7 @@ from statistics import median
 
 import numpy as np
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.piece import NavigationPiece, Seen
 from strapdown.navigation.record import Event, Span
 from strapdown.tables.checks import is_number
@@ -103,9 +103,7 @@ class Deliveries:
     def __post_init__(self) -> None:
         if not is_number(self.outage) or not self.outage > 1.0:
             raise ConfigError(
-                f"{self.outage!r} intervals are no outage",
-                quantity="outage",
-                remedy="give a number above 1; 3 is usual",
+                "navigation.intervals-no-outage", quantity="outage", outage=self.outage
             )
 
     def begin(self, tables: Sequence[str]) -> DeliveriesState:

@@ -13,8 +13,8 @@ from strapdown.config.navigation_file import NAVIGATION_STAGES
 from strapdown.config.slots import SLOTS, Slot, options_of
 from strapdown.config.toml_text import ASK, Asked, Page, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import Finding
 from strapdown.estimation.stated_states import STATED_STATES
-from strapdown.exceptions import Finding
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.systems.alignment_draft import listed_kinds, log_table_keys, toml_value

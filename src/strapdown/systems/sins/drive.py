@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
@@ -176,7 +176,7 @@ def pieces_of(
 ) -> Iterator[ChainPiece]:
     """Run a chain over a record in chunks, and give the pieces as they come; see `run_batch`."""
     if not chunk > 0.0:
-        raise ConfigError(f"{chunk!r} s is no chunk", quantity="chunk", remedy="give seconds")
+        raise ConfigError("navigation.no-chunk", quantity="chunk", chunk=chunk)
     check_columns(imu, CHANNELS, source_of(imu))
     state = _begun(chain, imu)
     for name, table in (tables or {}).items():

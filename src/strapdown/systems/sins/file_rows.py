@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from strapdown.exceptions import DataError, DivergenceError, Finding
+from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.tables.checks import source_of
 
 __all__ = ["in_file", "said_of_file"]
@@ -53,7 +53,11 @@ def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
         if said.file is not None or not tables:
             raise
         raise DivergenceError(
-            said.what, file=source_of(tables[0]), quantity=said.quantity, remedy=said.remedy
+            "navigation.message",
+            file=source_of(tables[0]),
+            quantity=said.quantity,
+            message=said.what,
+            remedy_text=said.remedy,
         ) from None
     except DataError as error:
         said = error.finding
@@ -61,5 +65,10 @@ def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
         if moved == said:
             raise
         raise DataError(
-            moved.what, file=moved.file, row=moved.row, quantity=moved.quantity, remedy=moved.remedy
+            "navigation.message",
+            file=moved.file,
+            row=moved.row,
+            quantity=moved.quantity,
+            message=moved.what,
+            remedy_text=moved.remedy,
         ) from None

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import even_step
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.prefilter.prefilter import Grid, Prefilter
 
 __all__ = ["Filtered", "Filtering", "FilteringState"]
@@ -91,11 +91,12 @@ class Filtering:
         except DataError as error:
             f = error.finding
             raise DataError(
-                f.what,
+                "navigation.message",
                 file=source,
                 row=f.row,
                 quantity=f.quantity,
-                remedy=f"a pre-filter needs even stamps: leave it out, or {f.remedy}",
+                message=f.what,
+                remedy_text=f"a pre-filter needs even stamps: leave it out, or {f.remedy}",
             ) from None
         try:
             return FilteringState(grid, self.prefilter.begin(grid, 6))
@@ -104,7 +105,11 @@ class Filtering:
             if f.quantity != "rate":
                 raise
             raise ConfigError(
-                f.what, file=source, quantity="prefilter, rate_hz", remedy=f.remedy
+                "navigation.message",
+                file=source,
+                quantity="prefilter, rate_hz",
+                message=f.what,
+                remedy_text=f.remedy,
             ) from None
 
     def advance(
@@ -146,11 +151,12 @@ class Filtering:
         if steps.size and not steps.min() >= 1.0:
             row = int(np.argmin(steps))
             raise DataError(
-                f"the samples are not evenly spaced: {stamps[row]:.9g} s is followed by "
-                f"{stamps[row + 1]:.9g} s, where the step is {state.grid.step:.6g} s",
+                "navigation.samples-not-evenly-spaced-followed",
                 file=source,
                 quantity="time",
-                remedy="leave the pre-filter out, or interpolate onto even stamps first",
+                stamps=stamps[row],
+                stamps_2=stamps[row + 1],
+                step=state.grid.step,
             )
         if state.numbers.size:
             return np.asarray(state.numbers[-1] + np.cumsum(steps))

@@ -14,7 +14,7 @@ from strapdown.alignment.site import Site
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.running_integral import running_integral
 from strapdown.ellipsoids import Ellipsoid
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.nav_state import NavState
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, check_gnss
@@ -195,8 +195,8 @@ def _good(
         if good.any():
             return values_of(fixes, GEODETIC)[good], sd[good], index_of(fixes)[good]
     raise DataError(
-        f"there is no fix with a place until {time:.9g} s, and no site is stated",
+        "navigation.no-fix-place-until-no",
         file=None if fixes is None else source_of(fixes),
         quantity="site",
-        remedy="state the site, or align where the receiver has fixes",
+        time=time,
     )

@@ -11,9 +11,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import DataError, Finding
 from strapdown.estimation.resting_sensors import resting_sd
 from strapdown.estimation.stated_states import states_that_are_stated
-from strapdown.exceptions import DataError, Finding
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.proposal import Proposal
@@ -145,18 +145,17 @@ def on_foot(made: Proposal) -> Proposal:
     """
     if ACCEL[0] not in made.imu.columns:
         raise DataError(
-            "it has no accelerometers, and a path is the integral of what they read",
+            "navigation.no-accelerometers-path-integral-they",
             file=source_of(made.imu),
             quantity="accel",
-            remedy="record gyros and accelerometers",
         )
     stand = first_stand(made.imu)
     if stand is None:
         raise DataError(
-            f"it stands nowhere for {STEPPED:g} s, and roll and pitch are found at a stand",
+            "navigation.stands-nowhere-roll-pitch-found",
             file=source_of(made.imu),
             quantity="accel",
-            remedy="stand for five seconds before the first step; is the unit on a shoe?",
+            stepped=STEPPED,
         )
     begin, rest = stand
     late = begin - float(index_of(made.imu)[0])
@@ -210,11 +209,11 @@ def on_foot(made: Proposal) -> Proposal:
         findings = (
             *findings,
             Finding(
-                f"it moves where it begins: the first {late:.3g} s are left out, and it is "
-                f"levelled by {rest:.2g} s of the first stance",
+                "navigation.moves-begins-first-left-out",
                 file=source_of(made.imu),
                 quantity="accel",
-                remedy="stand for five seconds before the first step, if you can record again",
+                late=late,
+                rest=rest,
             ),
         )
     return replace(made, table=table, rest=rest, drives=False, how=how, findings=findings)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown._kernels.level import Q_LB
+from strapdown.errors import ConfigError
 from strapdown.estimation.error_filter import symmetric
-from strapdown.exceptions import ConfigError
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.tables.checks import is_number
 
@@ -46,21 +46,13 @@ class GapPolicy:
     def __post_init__(self) -> None:
         if not is_number(self.usual) or not self.usual > 1.0:
             raise ConfigError(
-                f"{self.usual!r} times the usual step is no gap",
-                quantity="usual",
-                remedy="give a number above 1; 3 is usual",
+                "navigation.times-usual-step-no-gap", quantity="usual", usual=self.usual
             )
         if not is_number(self.coast) or not self.coast >= 0.0:
-            raise ConfigError(
-                f"{self.coast!r} s is no length of a gap",
-                quantity="coast",
-                remedy="give seconds, zero or more",
-            )
+            raise ConfigError("navigation.no-length-gap", quantity="coast", coast=self.coast)
         if self.beyond not in ("refuse", "align", "coast"):
             raise ConfigError(
-                f"'{self.beyond}' is nothing to do about a gap",
-                quantity="beyond",
-                remedy="use refuse, align or coast",
+                "navigation.nothing-do-about-gap", quantity="beyond", beyond=self.beyond
             )
 
 

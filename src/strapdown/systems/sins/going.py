@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import DataError, DivergenceError
 from strapdown.estimation.filter_state import FilterState
-from strapdown.exceptions import DataError, DivergenceError
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import Event, Span
@@ -97,11 +97,11 @@ class Going:
         state = self._state
         if state.navigator is None:
             raise DataError(
-                f"the samples end at {state.time:.9g} s in mode {mode}, before navigation began",
+                "navigation.samples-end-mode-before-navigation",
                 file=state.intake.source,
                 quantity="time",
-                remedy="give more samples, or end the alignment earlier: a greater "
-                "until_heading_sd_deg or until_tilt_sd_deg, or a shorter duration_s, in its table",
+                time=state.time,
+                mode=mode,
             )
         self._navigation.append(self._chain.navigator.finish(state.navigator))
         self._modes.append(Span(mode, state.begun, state.time))
@@ -114,11 +114,10 @@ class Going:
         where = f"{hole.length:.4g} s without samples, from {hole.begin:.9g} to {hole.end:.9g} s"
         if hole.length > policy.coast and policy.beyond == "refuse":
             raise DataError(
-                f"{where}: what the body did then is not known",
+                "navigation.body-did-then-not-known",
                 file=self._state.intake.source,
                 quantity="time",
-                remedy="cut the log there; or bridge longer gaps (coast_s in [gaps]), or align "
-                'anew after them (beyond = "align" in [gaps])',
+                where=where,
             )
         anew = hole.length > policy.coast and policy.beyond == "align"
         done = "alignment begins anew" if anew else "bridged along a line, and not well known since"
@@ -304,11 +303,11 @@ class Going:
         slack = 0.5 * state.intake.usual
         if not start.at_first_sample and abs(state.time - start.state.time) > slack:
             raise DataError(
-                f"the state is known at {start.state.time:.9g} s, and the samples begin at "
-                f"{state.time:.9g} s",
+                "navigation.state-known-samples-begin",
                 file=state.intake.source,
                 quantity="start",
-                remedy="state it at the time of a sample, or say that it is that of the first",
+                time=start.state.time,
+                time_2=state.time,
             )
         known = replace(start.state, time=state.time)
         self._state = replace(state, begun=state.time)

@@ -18,9 +18,9 @@ from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.alignment.site import Site
 from strapdown.ellipsoids import Ellipsoid
+from strapdown.errors import StrapdownError
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.evaluation.heading_light import SURE
-from strapdown.exceptions import StrapdownError
 from strapdown.navigation.record import NavigationRecord
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.systems.sins.chain import Chain

@@ -19,11 +19,11 @@ from strapdown import rotation
 from strapdown.aiding.gnss import Gnss
 from strapdown.constants import MAD_TO_SD
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
+from strapdown.errors import DataError, DivergenceError
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.filter_state import FilterState
 from strapdown.evaluation.heading_light import doubted
 from strapdown.evaluation.trajectory_at import trajectory_at
-from strapdown.exceptions import DataError, DivergenceError
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.piece import Mark, NavigationPiece

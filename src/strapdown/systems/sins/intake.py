@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.increments.stream import IncrementStream, IncrementStreamState
 from strapdown.navigation.growing_rows import GrowingRows
 from strapdown.prefilter.prefilter import CHANNELS, Prefilter
@@ -220,10 +220,10 @@ class Intake:
         """Learn the usual step from the first samples, and begin what needs it."""
         if len(time) < 2:
             raise DataError(
-                f"{len(time)} sample: navigation goes from sample to sample",
+                "navigation.sample-navigation-goes-sample-sample",
                 file=state.source,
                 quantity="time",
-                remedy="record for longer, or check that the right file was given",
+                count=len(time),
             )
         state = replace(
             state,
@@ -308,11 +308,11 @@ def _check(state: IntakeState, time: Array, values: Array) -> None:
     if not np.isfinite(time).all():
         row = int(np.argmin(np.isfinite(time)))
         raise DataError(
-            f"not a finite number ({time[row]})",
+            "navigation.not-finite-number",
             file=state.source,
             row=state.count + row + 1,
             quantity="time",
-            remedy="leave the sample out",
+            time=time[row],
         )
     before = [state.newest] if state.count else []
     stamps = np.concatenate([before, time])
@@ -320,20 +320,22 @@ def _check(state: IntakeState, time: Array, values: Array) -> None:
     if steps.size and not steps.min() > 0.0:
         k = int(np.argmax(~(steps > 0.0)))
         raise DataError(
-            f"time does not advance: {stamps[k]:.9g} s is followed by {stamps[k + 1]:.9g} s",
+            "navigation.time-does-not-advance-followed",
             file=state.source,
             row=state.count + k + 2 - (len(stamps) - len(time)),
             quantity="time",
-            remedy="sort the samples, drop repeated stamps, and look at the clock there",
+            stamps=stamps[k],
+            stamps_2=stamps[k + 1],
         )
     with np.errstate(invalid="ignore", over="ignore"):
         total = values.sum()
     if not np.isfinite(total) and not np.isfinite(values).all():
         row, column = (int(k) for k in np.argwhere(~np.isfinite(values))[0])
         raise DataError(
-            f"{values[row, column]} at {time[row]:.9g} s",
+            "navigation.values-time",
             file=state.source,
             row=state.count + row + 1,
             quantity=CHANNELS[column],
-            remedy="leave such samples out: a gap is bridged, or ends the run, as it is told to",
+            values=values[row, column],
+            time=time[row],
         )

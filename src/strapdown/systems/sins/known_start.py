@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.nav_state import NavState
 from strapdown.rotation import euler_from_quaternion
 from strapdown.tables.checks import is_number
@@ -52,9 +52,7 @@ class KnownStart:
             value = getattr(self, name)
             if len(value) != 3 or not all(is_number(x) and 0.0 <= x < math.inf for x in value):
                 raise ConfigError(
-                    f"{value!r} are no three standard deviations",
-                    quantity=name,
-                    remedy="give three numbers, zero or more",
+                    "navigation.no-three-standard-deviations", quantity=name, value=value
                 )
 
     @property

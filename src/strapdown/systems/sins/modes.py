@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from strapdown.alignment.coarse import CoarseAlignment
 from strapdown.alignment.fine import FineAlignment
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.tables.checks import is_number
 
 __all__ = ["CoarseMode", "Command", "FineMode", "Mode", "Navigation", "Until", "check_timeline"]
@@ -64,15 +64,9 @@ class Until:
         for name in ("duration", "heading_sd_deg", "tilt_sd_deg", "least"):
             value = getattr(self, name)
             if value is not None and not (is_number(value) and value > 0.0):
-                raise ConfigError(
-                    f"{value!r} ends no mode",
-                    quantity=name,
-                    remedy="give a number above zero",
-                )
+                raise ConfigError("navigation.ends-no-mode", quantity=name, value=value)
         if not is_number(self.pause) or not 0.0 <= self.pause <= 1.0:
-            raise ConfigError(
-                f"{self.pause!r} is no part of a time", quantity="pause", remedy="use 0 to 1"
-            )
+            raise ConfigError("navigation.no-part-time", quantity="pause", pause=self.pause)
 
     @property
     def converges(self) -> bool:
@@ -172,34 +166,22 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
     names = [mode.name for mode in modes]
     for name in names:
         if names.count(name) > 1 or name == "next":
-            raise ConfigError(
-                f"'{name}' cannot name two modes, nor be 'next'",
-                quantity="modes",
-                remedy="give each mode a name of its own",
-            )
+            raise ConfigError("navigation.cannot-name-two-modes-nor", quantity="modes", name=name)
     kinds = [mode.kind for mode in modes]
     if not kinds or kinds[-1] != "navigation" or kinds.count("navigation") > 1:
         raise ConfigError(
-            f"modes {', '.join(names) or '(none)'} do not end with one of navigation",
+            "navigation.modes-do-not-end-navigation",
             quantity="modes",
-            remedy="let navigation be the last",
+            names=", ".join(names) or "(none)",
         )
     if known_start and len(kinds) > 1:
         raise ConfigError(
-            f"the state at the start is known, and {names[0]} would look for it",
-            quantity="modes",
-            remedy="leave the alignment out, or the known state",
+            "navigation.state-start-known-would-look", quantity="modes", names=names[0]
         )
     if not known_start and len(kinds) == 1:
-        raise ConfigError(
-            "navigation has nothing to begin with",
-            quantity="modes",
-            remedy="give an alignment, or the state at the start",
-        )
+        raise ConfigError("navigation.navigation-nothing-begin", quantity="modes")
     for before, mode in zip([None, *kinds], modes, strict=False):
         if mode.kind == "fine" and before != "coarse":
             raise ConfigError(
-                f"{mode.name} begins with an attitude, and no coarse alignment is before it",
-                quantity="modes",
-                remedy="let a coarse alignment (also one with a known heading) come first",
+                "navigation.begins-attitude-no-coarse-alignment", quantity="modes", name=mode.name
             )

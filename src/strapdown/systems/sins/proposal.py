@@ -15,7 +15,7 @@ from strapdown.aiding.gnss_clock import time_offset
 from strapdown.aiding.gnss_delay import velocity_delay
 from strapdown.config.alignment import AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions

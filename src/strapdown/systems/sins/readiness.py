@@ -13,8 +13,8 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.gnss_readiness import gnss_readiness
 from strapdown.config.navigation import NavigationSpec, aids_of
 from strapdown.config.navigation_modules import make_aids
+from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_models import ERROR_MODELS
-from strapdown.exceptions import DataError, Finding
 from strapdown.frames import ecef_from_geodetic
 from strapdown.tables import GEODETIC, POSITION_SD
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -72,11 +72,13 @@ def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
     if ((time >= stamps[0]) & (time <= stamps[-1])).any():
         return
     raise DataError(
-        f"it goes from {time[0]:.9g} to {time[-1]:.9g} s and the inertial record from "
-        f"{stamps[0]:.9g} to {stamps[-1]:.9g} s: nothing of it is within that",
+        "navigation.goes-inertial-record-nothing-within",
         file=source_of(table),
         quantity="time",
-        remedy="give both on one clock, or another part of the record",
+        time=time[0],
+        time_2=time[-1],
+        stamps=stamps[0],
+        stamps_2=stamps[-1],
     )
 
 
@@ -101,13 +103,13 @@ def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, ai
     swapped = abs(fix[0]) <= 180.0 and abs(fix[1]) <= 90.0
     swapped = swapped and _apart(fix[[1, 0, 2]], here) <= allowed
     raise DataError(
-        f"the first fix, {fix[0]:.6f}°, {fix[1]:.6f}°, is {off / 1000.0:.4g} km from the place in "
-        f"[{name}], {here[0]:.6f}°, {here[1]:.6f}°"
-        + (": latitude and longitude of the fixes seem to be swapped" if swapped else ""),
+        "navigation.message",
         file=source_of(table),
         row=k + 1,
         quantity="lat, lon",
-        remedy="name its columns: columns = {lat = …, lon = …} of this aid"
+        message=f"the first fix, {fix[0]:.6f}°, {fix[1]:.6f}°, is {off / 1000.0:.4g} km from the place in [{name}], {here[0]:.6f}°, {here[1]:.6f}°"
+        + (": latitude and longitude of the fixes seem to be swapped" if swapped else ""),
+        remedy_text="name its columns: columns = {lat = …, lon = …} of this aid"
         if swapped
         else f"look at lat_deg and lon_deg in [{name}], or state a position_sd_m that is so large",
     )
@@ -130,20 +132,21 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
     if (named := ERROR_MODELS.get(model)) is not None and not named.has_height:
         return (
             Finding(
-                f"the error model '{model}' has no state of the height: no aid corrects it, and "
-                f"{grows}",
+                "navigation.error-model-no-state-height",
                 file=source_of(imu),
                 quantity="height",
-                remedy='write height = "held" in [mechanization], or take another error_model',
+                model=model,
+                grows=grows,
             ),
         )
     if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values()):
         return ()
     return (
         Finding(
-            f"nothing aids the height for {length / 60.0:.3g} minutes: {grows}",
+            "navigation.nothing-aids-height-minutes",
             file=source_of(imu),
             quantity="height",
-            remedy='write height = "held" in [mechanization], or add a barometer',
+            length=length / 60.0,
+            grows=grows,
         ),
     )

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from strapdown.aiding.aid import Aid, TableAid, lasting
 from strapdown.aiding.gnss import Gnss
 from strapdown.ellipsoids import Ellipsoid
+from strapdown.errors import StrapdownError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.exceptions import StrapdownError
 from strapdown.navigation.consistency import consistency_of_all
 from strapdown.navigation.first_inconsistency import Inconsistency, inconsistencies
 from strapdown.navigation.record import NavigationRecord

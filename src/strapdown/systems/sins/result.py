@@ -10,9 +10,9 @@ from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine_result import FineResult
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import Ellipsoid
+from strapdown.errors import Finding
 from strapdown.evaluation.control_points import ControlPointScore
 from strapdown.evaluation.trajectory_summary import DifferenceSummary
-from strapdown.exceptions import Finding
 from strapdown.navigation.record import NavigationRecord
 from strapdown.results.inputs import InputFiles
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

@@ -12,7 +12,7 @@ import pandas as pd
 
 from strapdown.config.navigation import NavigationSpec, aids_of, receivers_of
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.exceptions import ConfigError, Finding
+from strapdown.errors import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.control_points import read_control_points
 from strapdown.formats.gnss_files import files_of_fixes
@@ -109,11 +109,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         inputs.append(input_files("control-points", given.path, (Path(given.path),)))
     inputs += sensor_file(spec.sensors.sensor)
     if spec.log is None and spec.simulation is None:
-        raise ConfigError(
-            "its samples come while it runs, and there is no record of them",
-            quantity="live",
-            remedy="run it with --live, or give a record: [log] and path = …",
-        )
+        raise ConfigError("navigation.samples-come-while-runs-no", quantity="live")
     if spec.log is None:
         return _simulated(spec, tables, truth, points, inputs, findings)
     recording, imu, of_log = body_record(spec.log, spec.axes)

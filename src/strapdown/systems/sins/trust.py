@@ -15,6 +15,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import make_filter
 from strapdown.ellipsoids import find_ellipsoid
+from strapdown.errors import StrapdownError
 from strapdown.evaluation.heading_light import (
     SURE,
     HeadingLight,
@@ -23,7 +24,6 @@ from strapdown.evaluation.heading_light import (
     heading_light,
     recent_scatter,
 )
-from strapdown.exceptions import StrapdownError
 from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import ObservationConsistency, consistency_of_all
 from strapdown.navigation.first_inconsistency import Inconsistency, inconsistencies

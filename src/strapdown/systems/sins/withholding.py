@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.config.navigation import NavigationSpec, WithholdTable, aids_of
+from strapdown.errors import ConfigError
 from strapdown.evaluation.withheld import (
     WithheldScore,
     blinded,
@@ -16,7 +17,6 @@ from strapdown.evaluation.withheld import (
     spans_to_withhold,
 )
 from strapdown.evaluation.withheld_smoothed import end_of_what_tells, score_of_smoothed
-from strapdown.exceptions import ConfigError
 from strapdown.navigation.piece import NavigationPiece
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.systems.progress import Progress
@@ -110,11 +110,13 @@ def score_withholding(
     for span in spans:
         if span.begin < begun or span.end > time[-1]:
             raise ConfigError(
-                f"from {span.begin:.9g} to {span.end:.9g} s is not within the navigation, which "
-                f"goes from {begun:.9g} to {time[-1]:.9g} s",
+                "navigation.not-within-navigation-goes",
                 file=source.name,
                 quantity="withhold, spans_s",
-                remedy="give times on the clock of the samples, within it",
+                begin=span.begin,
+                end=span.end,
+                begun=begun,
+                time=time[-1],
             )
     found: dict[int, Withheld] = {}
     blind = replace(chain, navigator=blinded(chain.navigator, name))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.estimation.covariance import Innovations
-from strapdown.exceptions import ConfigError
+from strapdown.errors import ConfigError
 from strapdown.navigation.piece import NavigationPiece, Seen
 from strapdown.systems.sins.deliveries import Deliveries
 

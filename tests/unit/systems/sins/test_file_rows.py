@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "cli"))
 from bad_navigate import write_drive
 
 from strapdown.config.alignment import AxesTable, LogTable
-from strapdown.exceptions import DataError, DivergenceError, Finding
+from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.sins.file_rows import in_file, said_of_file

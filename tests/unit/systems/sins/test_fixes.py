@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from strapdown.ellipsoids import WGS84
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.rotation import quaternion_from_euler
 from strapdown.systems.sins.fixes import fixes_until, here_by_fix, site_of_fixes

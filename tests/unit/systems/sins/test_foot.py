@@ -17,7 +17,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.estimation.stated_states import states_that_are_stated
 from strapdown.evaluation.truth_comparison import compare_with_truth
-from strapdown.exceptions import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

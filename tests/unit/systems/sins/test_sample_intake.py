@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from strapdown.exceptions import DataError
+from strapdown.errors import DataError
 from strapdown.increments import motion_increments
 from strapdown.prefilter import PREFILTERS, RobustFir, Summed
 from strapdown.rotation import dcm_from_euler

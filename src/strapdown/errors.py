@@ -1,0 +1,337 @@
+"""Errors and findings: a code, its data and where it is; sentences are made where they are shown.
+
+A `Finding` says in a form that programs can read what a stage noticed; an error is a finding that
+ended the work. Neither holds a sentence. The sentences stand in one catalogue, `messages/*.toml`,
+a file for each room: ``code = {what, remedy}`` as templates over the data, with the words of an
+interface where they differ (``remedy_cli`` for options, ``remedy_file`` for the keys of a
+configuration). `Finding.sentence` and `Finding.advice` fill them in. No logic reads them: it
+reads `code`, `severity` and `data`.
+
+Templates are those of `str.format`, and besides:
+
+* a sequence is joined by ", "; ``{names:or}``, ``{names:and}``, ``{names:;}`` join by that word or
+  sign, ``{names:list}`` shows it as Python does;
+* a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
+* ``{nearest}`` suggests the known word (data `known`, `also`) that is nearest to the data `word`.
+"""
+
+from __future__ import annotations
+
+import difflib
+import string
+from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
+from functools import cache
+from importlib import resources
+from os import PathLike, fspath
+from typing import Any, Literal
+
+__all__ = [
+    "ConfigError",
+    "DataError",
+    "DivergenceError",
+    "Finding",
+    "Severity",
+    "StrapdownError",
+    "Words",
+    "nearest",
+]
+
+#: A note informs, a warning speaks against a result, an error ended the work.
+Severity = Literal["note", "warning", "error"]
+#: Whose words a sentence speaks: arguments, options, or the keys of a configuration.
+Words = Literal["python", "cli", "file"]
+
+_LOCATION = ("file", "row", "quantity", "line")
+
+
+class Finding:
+    """Something that a reader or a stage noticed and a person should know. Immutable.
+
+    Parameters
+    ----------
+    code : str
+        Names it in the catalogue: ``room.what-is-wrong``.
+    severity : {'warning', 'note', 'error'}
+    file : str, optional
+        Name of the file or source that it concerns.
+    row : int, optional
+        Row of the file, counted from 1 and including any header, as an editor
+        or a spreadsheet counts; for binary files the sample, counted from 1.
+    quantity : str, optional
+        The column or quantity.
+    line : int, optional
+        Line of a file that a person wrote, counted from 1; such a file has no rows.
+    data : mapping, optional
+        More of `values`, with names that are no identifiers or are taken by the parameters.
+    **values
+        Numbers, texts, sequences of them, or findings that explain this one; what the sentence
+        shows, and `shown`, a value as the user wrote it, which stands before the sentence.
+    """
+
+    __slots__ = ("code", "data", "file", "line", "quantity", "row", "severity")
+
+    code: str
+    severity: Severity
+    file: str | None
+    row: int | None
+    quantity: str | None
+    line: int | None
+    data: Mapping[str, Any]
+
+    def __init__(
+        self,
+        code: str,
+        *,
+        severity: Severity = "warning",
+        file: str | None = None,
+        row: int | None = None,
+        quantity: str | None = None,
+        line: int | None = None,
+        data: Mapping[str, Any] | None = None,
+        **values: Any,
+    ) -> None:
+        put = object.__setattr__
+        put(self, "code", code)
+        put(self, "severity", severity)
+        put(self, "file", file)
+        put(self, "row", row)
+        put(self, "quantity", quantity)
+        put(self, "line", line)
+        given = {**(data or {}), **values}
+        # Of a table of choices the names are data, and not what they name.
+        choices = {k: tuple(given[k]) for k in ("known", "also") if k in given}
+        put(self, "data", {k: _plain(v) for k, v in {**given, **choices}.items()})
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a Finding is immutable: make another by replace({name}=...)")
+
+    __delattr__ = __setattr__  # type: ignore[assignment]
+
+    def replace(self, **changes: Any) -> Finding:
+        """Return it with another location, severity or code, and with data added or changed."""
+        kept = {name: changes.pop(name, getattr(self, name)) for name in _LOCATION}
+        code = changes.pop("code", self.code)
+        severity = changes.pop("severity", self.severity)
+        return Finding(code, severity=severity, data={**self.data, **changes}, **kept)
+
+    def sentence(self, words: Words = "python") -> str:
+        """Return what was found, with the numbers that show it."""
+        text = _text(self, "what", words)
+        shown = self.data.get("shown")
+        return text if shown is None else f"{shown}: {text}"
+
+    def advice(self, words: Words = "python") -> str | None:
+        """Return what the user can do about it."""
+        return _text(self, "remedy", words) or None
+
+    @property
+    def what(self) -> str:
+        """The sentence in the words of Python. For people; logic reads `code`."""
+        return self.sentence()
+
+    @property
+    def remedy(self) -> str | None:
+        """The remedy in the words of Python. For people; logic reads `code`."""
+        return self.advice()
+
+    def text(self, words: Words = "python") -> str:
+        """Return where it is, the sentence, and the remedy on a line of its own."""
+        where = [self.file] if self.file else []
+        if self.row is not None:
+            where.append(f"row {self.row}")
+        if self.line is not None:
+            where.append(f"line {self.line}")
+        if self.quantity:
+            where.append(self.quantity)
+        what, remedy = self.sentence(words), self.advice(words)
+        text = f"{', '.join(where)}: {what}" if where else what
+        return f"{text}\n  Remedy: {remedy}" if remedy else text
+
+    def plain(self) -> dict[str, Any]:
+        """Return it as data for JSON: code, severity, location, data, without a sentence."""
+        where = {n: getattr(self, n) for n in _LOCATION if getattr(self, n) is not None}
+        return {"code": self.code, "severity": self.severity, **where, "data": _json(self.data)}
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def __repr__(self) -> str:
+        parts = [repr(self.code), f"severity={self.severity!r}"]
+        parts += [f"{n}={getattr(self, n)!r}" for n in _LOCATION if getattr(self, n) is not None]
+        return f"Finding({', '.join([*parts, *(f'{k}={v!r}' for k, v in self.data.items())])})"
+
+    def _key(self) -> tuple[object, ...]:
+        where = (self.file, self.row, self.quantity, self.line)
+        return (self.code, self.severity, *where, repr(sorted(self.data.items(), key=str)))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Finding) and self._key() == other._key()
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        where = {name: getattr(self, name) for name in _LOCATION}
+        return (_remade, (self.code, {"severity": self.severity, **where, "data": self.data}))
+
+
+def _remade(code: str, fields: dict[str, Any]) -> Finding:
+    return Finding(code, **fields)
+
+
+class StrapdownError(Exception):
+    """Root of every error that strapdown raises on purpose.
+
+    Parameters
+    ----------
+    code : str or Finding
+        As of a `Finding`, or one that is taken as it is.
+    file, row, quantity, line, data, **values
+        As in `Finding`.
+    """
+
+    exit_code = 1
+    finding: Finding
+
+    def __init__(self, code: str | Finding, **values: Any) -> None:
+        if isinstance(code, Finding):
+            self.finding = code.replace(severity="error", **values)
+        else:
+            self.finding = Finding(code, severity="error", **values)
+        super().__init__(self.finding)
+
+    def __str__(self) -> str:
+        return str(self.finding)
+
+    def replaced(self, **changes: Any) -> StrapdownError:
+        """Return the error with another location or more data, as `Finding.replace`."""
+        other = copy(self)
+        other.finding = self.finding.replace(**changes)
+        other.args = (other.finding,)
+        return other
+
+
+class DataError(StrapdownError):
+    """The data cannot be used as they are."""
+
+    exit_code = 3
+
+
+class ConfigError(StrapdownError):
+    """What was asked for cannot be done, or was not understood."""
+
+    exit_code = 4
+
+
+class DivergenceError(StrapdownError):
+    """A computation left the range in which its result means anything."""
+
+    exit_code = 5
+
+
+def nearest(word: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
+    """Return a sentence that helps with an unknown name.
+
+    Parameters
+    ----------
+    word : str
+        What was not understood.
+    known : iterable of str
+        The words that would have been.
+    also : iterable of str
+        Further such words, too many to be listed.
+
+    Returns
+    -------
+    str
+        ``"did you mean 'x'? Known: a, b, c"``, or the list alone when nothing
+        is near.
+    """
+    words = list(known)
+    close = difflib.get_close_matches(str(word), [*words, *also], n=1, cutoff=0.5)
+    hint = f"did you mean '{close[0]}'? " if close else ""
+    return f"{hint}Known: {', '.join(words)}."
+
+
+@cache
+def _catalogue(room: str) -> Mapping[str, Mapping[str, str]]:
+    import tomllib
+
+    file = resources.files("strapdown").joinpath("messages", f"{room}.toml")
+    return tomllib.loads(file.read_text(encoding="utf-8"))
+
+
+def _template(code: str, part: str, words: Words) -> str:
+    room, _, name = code.partition(".")
+    entry = _catalogue(room)[name]
+    return entry.get(f"{part}_{words}", entry.get(part, ""))
+
+
+def _text(finding: Finding, part: str, words: Words) -> str:
+    template = _template(finding.code, part, words)
+    return _Sentence(words).vformat(template, (), finding.data) if template else ""
+
+
+class _Sentence(string.Formatter):
+    """Templates over the data of a finding."""
+
+    _JOINTS = {"": ", ", "or": " or ", "and": " and ", ";": "; "}  # noqa: RUF012
+
+    def __init__(self, words: Words) -> None:
+        self._words = words
+
+    def get_field(self, name: str, args: Sequence[Any], kwargs: Mapping[str, Any]) -> Any:
+        first, _, part = name.partition(".")
+        if first == "nearest" and "nearest" not in kwargs:
+            known = nearest(kwargs["word"], kwargs["known"], kwargs.get("also", ()))
+            return known, first
+        value = kwargs[first]
+        if isinstance(value, Finding) and part == "remedy":
+            value = value.advice(self._words) or ""
+        return value, first
+
+    def format_field(self, value: Any, spec: str) -> str:
+        if isinstance(value, Finding):
+            return value.sentence(self._words)
+        if isinstance(value, tuple):
+            if spec == "list":
+                return str(list(value))
+            if spec in self._JOINTS:
+                return self._JOINTS[spec].join(self.format_field(one, "") for one in value)
+            return ", ".join(self.format_field(one, spec) for one in value)
+        return str(format(value, spec))
+
+
+def _plain(value: Any) -> Any:
+    """The value as data: no arrays, no views, nothing that changes later."""
+    if value is None or isinstance(value, bool | int | float | str | Finding):
+        # A subclass, as a float of numpy, is shown by another repr.
+        return (
+            value
+            if type(value).__module__ == "builtins" or isinstance(value, Finding)
+            else (value.item() if hasattr(value, "item") else str(value))
+        )
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, PathLike):
+        return fspath(value)
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, set | frozenset):
+        return tuple(sorted(_plain(v) for v in value))
+    if isinstance(value, Iterable):
+        return tuple(_plain(v) for v in value)
+    if isinstance(value, StrapdownError):
+        return value.finding
+    return str(value)
+
+
+def _json(value: Any) -> Any:
+    if isinstance(value, Finding):
+        return value.plain()
+    if isinstance(value, Mapping):
+        return {k: _json(v) for k, v in value.items()}
+    if isinstance(value, tuple):
+        return [_json(v) for v in value]
+    return value
