@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from importlib import resources
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -23,7 +26,7 @@ extensions = [
 ]
 exclude_patterns = ["_build"]
 
-myst_enable_extensions = ["dollarmath"]
+myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 # The docstrings give type, shape, unit and frame of every argument; annotations would only
@@ -64,8 +67,40 @@ class CodeCell(Directive):
         return [nodes.literal_block(text, text, language="python")]
 
 
+_MESSAGES = """# Messages
+
+Every error and every finding has a code, which programs may rely on, and a sentence, which may be
+reworded. `{name}` stands for a number or a name of the case at hand. The page is made of the
+catalogue in `strapdown/messages` when the manual is built.
+"""
+
+
+def _write_messages(app: Any) -> None:
+    """Make the page of messages of the catalogue of sentences."""
+    parts = [_MESSAGES]
+    rooms = resources.files("strapdown").joinpath("messages")
+    for room in sorted(rooms.iterdir(), key=lambda one: one.name):
+        if not room.name.endswith(".toml"):
+            continue
+        name = room.name.removesuffix(".toml")
+        parts.append(f"## {name}\n")
+        for code, entry in sorted(tomllib.loads(room.read_text(encoding="utf-8")).items()):
+            lines = [f"`{name}.{code}`", f": {_prose(entry['what'])}"]
+            if entry.get("remedy"):
+                lines.append(f"  \n  *{_prose(entry['remedy'])}*")
+            parts.append("\n".join(lines) + "\n")
+    (Path(app.srcdir) / "messages.md").write_text("\n".join(parts), encoding="utf-8")
+
+
+def _prose(template: str) -> str:
+    """Text of a template as Markdown that is taken as it is."""
+    text = " ".join(template.replace("{{", "{").replace("}}", "}").split())
+    return "".join(f"\\{c}" if c in "\\`*_{}[]()#+-.!|<>$:~" else c for c in text)
+
+
 def setup(app: Any) -> dict[str, bool]:
     """Register the writer of formulas, and cells of notebooks."""
+    app.connect("builder-inited", _write_messages)
     app.add_directive("code-cell", CodeCell)
     app.add_html_math_renderer("mathml", (_math, None), (_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
