@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -94,7 +95,8 @@ def _write_messages(app: Any) -> None:
 
 def _prose(template: str) -> str:
     """Text of a template as Markdown that is taken as it is."""
-    text = " ".join(template.replace("{{", "{").replace("}}", "}").split())
+    text = re.sub(r"\{(\w+(?:\.\w+)?)(?:![rsa])?:[^{}]*(?:\{\w+\})?[^{}]*\}", r"{\1}", template)
+    text = " ".join(text.replace("{{", "{").replace("}}", "}").split())
     return "".join(f"\\{c}" if c in "\\`*_{}[]()#+-.!|<>$:~" else c for c in text)
 
 
