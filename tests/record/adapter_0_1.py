@@ -28,7 +28,8 @@ def _refused(error):
     name = type(error).__name__
     if not type(error).__module__.startswith("strapdown"):
         raise error
-    return {"refused": name}
+    words = {"DataError": "data", "ConfigError": "configuration", "DivergenceError": "divergence"}
+    return {"refused": words.get(name, name)}
 
 
 def read_log(path):
@@ -119,7 +120,8 @@ def health(log):
     import strapdown
 
     found = strapdown.check_imu_channels(strapdown.read_log(log).imu)
-    return {"findings": float(len(found.findings))}
+    out = {"faults": float(len(found.faults)), "rest_time": found.rest_time}
+    return out | {f"noise/{name}": value for name, value in found.noise.items()}
 
 
 def crash_paths(folder):

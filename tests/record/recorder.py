@@ -47,7 +47,8 @@ class Found:
 
     def word(self, path, values):
         name = self.adapter.quantity(path)
-        if name is not None:
+        cells = values if isinstance(values, list) else [values]
+        if name is not None and not any(" " in cell for cell in cells):  # a sentence is no word
             self.words[name] = (
                 [self.adapter.word(v) for v in values]
                 if isinstance(values, list)

@@ -160,12 +160,14 @@ def test_json_gives_numbers_and_status_words_and_no_sentences(record):
         "answer": "It ended.",
         "heading": {"at_end": "green", "limit": 3, "borne_out": True, "why": None},
         "spans": [{"from_s": 0.5, "light": "amber", "why": "wide"}, {"from_s": 1, "light": "red"}],
+        "found": [{"kind": "gross", "meaning": "no part of the model"}],
         "matrix": [[1, 2], [3, 4]],
     }
     record["recorder"].walk_json(
         found, "nav/verdict.json", document, record["adapter_0_1"].ADAPTER.STATUS_KEYS
     )
     assert found.words == {
+        "nav/integrity/found/kind": ["gross"],
         "nav/integrity/heading/heading_status_at_end": "trusted",
         "nav/integrity/spans/heading_status": ["unverified", "rejected"],
     }
