@@ -101,6 +101,7 @@ def _bits(values):
 def _arrays(run, quantity, old, new, tolerances):
     if old.shape != new.shape:
         return Difference(run, quantity, f"shape {old.shape}", f"shape {new.shape}", "")
+    old, new = np.atleast_1d(old), np.atleast_1d(new)  # a number of a document has no axis
     changed = _bits(old) != _bits(new)
     if not changed.any():
         return None

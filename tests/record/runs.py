@@ -619,8 +619,10 @@ def live_lines():
     lines = []
     for k in range(501):
         t = k / 50
-        wave = ((k * 7919) % 101 - 50) / 5000.0  # of no meaning, and not constant
-        lines.append(f"imu,{t!r},{wave * 0.01!r},{-wave * 0.02!r},0.0,{wave!r},{-wave!r},-9.8154")
+        # Six channels of no meaning that are not constant; the fixes go straight on.
+        noise = [((k * step) % 101 - 50) / 5000.0 for step in (7919, 31, 57, 83, 23, 67)]
+        rates = ",".join(repr(0.01 * value) for value in noise[:3])
+        lines.append(f"imu,{t!r},{rates},{noise[3]!r},{noise[4]!r},{noise[5] - 9.8154!r}")
         if k % 25 == 0:
             north, east = 8.660254037844387 * t / 111_340.0, 5.0 * t / 62_790.0
             lines.append(

@@ -147,6 +147,15 @@ def test_a_new_quantity_is_counted_and_no_failure(record, sides):
     assert (told.good, told.added) == (True, 1)
 
 
+def test_one_bit_of_a_number_without_an_axis_is_found(record, sides):
+    folder, _ = sides
+    for side, value in (("old", 3.0), ("new", np.nextafter(3.0, 4.0))):
+        write(folder / side, {"nav/limit": np.float64(value)})
+    assert outcome(record, folder).unlisted[0].new == "3.0000000000000004"
+    write(folder / "old", {"nav/limit": np.float64(np.nextafter(3.0, 4.0))})
+    assert outcome(record, folder).good
+
+
 def test_another_shape_is_found(record, sides):
     folder, values = sides
     arrays = {"nav/lat": values[:1], "nav/rms": np.array([1.0])}
