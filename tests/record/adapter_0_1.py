@@ -56,8 +56,8 @@ def read_crash(path):
         return _refused(error)
     out = {}
     for channel in record.channels:
-        out[f"{channel.name}/time"] = channel.time
-        out[f"{channel.name}/values"] = channel.values
+        if channel.quantity != "time":
+            out[f"{channel.name}/time"], out[f"{channel.name}/values"] = channel.load()
     return out
 
 
@@ -138,13 +138,15 @@ def crash_paths(folder):
         import numpy as np
         import pandas as pd
 
-        columns = [np.asarray(channel.values) for channel in record.channels]
-        stamps = pd.Index(np.asarray(record.channels[0].time), name="time")
+        read = [c.load() for c in record.channels if c.quantity != "time"]
+        columns = [np.asarray(values) for _, values in read]
+        stamps = pd.Index(np.asarray(read[0][0]), name="time")
         kind = "accel" if "g.csv" in name else "gyro"
         table = pd.DataFrame(
             {f"{kind}_{axis}": values for axis, values in zip("xyz", columns, strict=True)},
             index=stamps,
         )
+        table.attrs["sampling"] = "instantaneous"
         return strapdown.RecordedTriad(table, uncertainty, name)
 
     low = strapdown.TriadUncertainty(
