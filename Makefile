@@ -7,7 +7,7 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds examples check format bench docs messages statements pictures clean
+.PHONY: demo test test-slow test-bounds examples record check format bench docs messages statements pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -15,6 +15,7 @@ help:
 	@echo "make test       install into $(VENV) and run the tests"
 	@echo "make test-slow  the tests that take more than 20 s each"
 	@echo "make examples   the longer examples of the manual: each prints what its page shows"
+	@echo "make record     version 0.1 and this tree on the same runs, compared to the last bit"
 	@echo "make check      ruff, format, mypy, import-linter"
 	@echo "make bench      speed and memory as ratios against named alternatives"
 	@echo "make docs       the manual, into docs/_build"
@@ -48,6 +49,9 @@ examples: $(VENV)/.test
 
 test-bounds: $(VENV)/.test
 	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
+
+record: $(VENV)/.run
+	$(BIN)/python tests/record
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .
