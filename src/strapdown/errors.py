@@ -101,7 +101,7 @@ class Finding:
         put(self, "row", row)
         put(self, "quantity", quantity)
         put(self, "line", line)
-        given = {**(data or {}), **values}
+        given: dict[str, Any] = {**(data or {}), **values}
         # Of a table of choices the names are data, and not what they name.
         choices = {k: tuple(given[k]) for k in ("known", "also") if k in given}
         put(self, "data", {k: _plain(v) for k, v in {**given, **choices}.items()})
