@@ -316,13 +316,13 @@ class _Sentence(string.Formatter):
 
 def _plain(value: Any) -> Any:
     """The value as data: no arrays, no views, nothing that changes later."""
-    if value is None or isinstance(value, bool | int | float | str | Finding):
+    if value is None or isinstance(value, Finding):
+        return value
+    if isinstance(value, bool | int | float | str):
         # A subclass, as a float of numpy, is shown by another repr.
-        return (
-            value
-            if type(value).__module__ == "builtins" or isinstance(value, Finding)
-            else (value.item() if hasattr(value, "item") else str(value))
-        )
+        if type(value).__module__ == "builtins":
+            return value
+        return value.item() if hasattr(value, "item") else str(value)
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     if isinstance(value, PathLike):
