@@ -4,7 +4,8 @@ A `Finding` says in a form that programs can read what a stage noticed; an error
 ended the work. Neither holds a sentence. The sentences stand in one catalogue, `messages/*.toml`,
 a file for each room: ``code = {what, remedy}`` as templates over the data, with the words of an
 interface where they differ (``remedy_cli`` for options, ``remedy_file`` for the keys of a
-configuration). `Finding.sentence` and `Finding.advice` fill them in. No logic reads them: it
+configuration, which is given to a command: without words of its own it takes those of options).
+`Finding.sentence` and `Finding.advice` fill them in. No logic reads them: it
 reads `code`, `severity` and `data`.
 
 Templates are those of `str.format`, and besides:
@@ -12,6 +13,8 @@ Templates are those of `str.format`, and besides:
 * a sequence is joined by ", "; ``{names:or}``, ``{names:and}``, ``{names:;}`` join by that word or
   sign, ``{names:list}`` shows it as Python does;
 * a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
+* ``{faults:lines}`` lists findings of one file, each on a line of its own with its location, its
+  sentence and, below it, its remedy;
 * ``{nearest}`` suggests the known word (data `known`, `also`) that is nearest to the data `word`.
 """
 
@@ -24,7 +27,7 @@ from copy import copy
 from functools import cache
 from importlib import resources
 from os import PathLike, fspath
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 __all__ = [
     "ConfigError",
@@ -98,7 +101,7 @@ class Finding:
         put(self, "row", row)
         put(self, "quantity", quantity)
         put(self, "line", line)
-        given = {**(data or {}), **values}
+        given: dict[str, Any] = {**(data or {}), **values}
         # Of a table of choices the names are data, and not what they name.
         choices = {k: tuple(given[k]) for k in ("known", "also") if k in given}
         put(self, "data", {k: _plain(v) for k, v in {**given, **choices}.items()})
@@ -137,16 +140,21 @@ class Finding:
 
     def text(self, words: Words = "python") -> str:
         """Return where it is, the sentence, and the remedy on a line of its own."""
-        where = [self.file] if self.file else []
-        if self.row is not None:
-            where.append(f"row {self.row}")
-        if self.line is not None:
-            where.append(f"line {self.line}")
-        if self.quantity:
-            where.append(self.quantity)
-        what, remedy = self.sentence(words), self.advice(words)
-        text = f"{', '.join(where)}: {what}" if where else what
+        where = ", ".join([*([self.file] if self.file else []), *self._in_file()])
+        remedy = self.advice(words)
+        text = ": ".join(part for part in (where, self.sentence(words)) if part)
         return f"{text}\n  Remedy: {remedy}" if remedy else text
+
+    def listed(self, words: Words = "python") -> str:
+        """Return it as one of several of a file: indented, and without the name of the file."""
+        remedy = self.advice(words)
+        text = ": ".join(p for p in (", ".join(self._in_file()), self.sentence(words)) if p)
+        return f"  {text}\n    {remedy}" if remedy else f"  {text}"
+
+    def _in_file(self) -> list[str]:
+        where = [f"row {self.row}"] if self.row is not None else []
+        where += [f"line {self.line}"] if self.line is not None else []
+        return [*where, self.quantity] if self.quantity else where
 
     def plain(self) -> dict[str, Any]:
         """Return it as data for JSON: code, severity, location, data, without a sentence."""
@@ -204,7 +212,7 @@ class StrapdownError(Exception):
     def __str__(self) -> str:
         return str(self.finding)
 
-    def replaced(self, **changes: Any) -> StrapdownError:
+    def replaced(self, **changes: Any) -> Self:
         """Return the error with another location or more data, as `Finding.replace`."""
         other = copy(self)
         other.finding = self.finding.replace(**changes)
@@ -265,7 +273,8 @@ def _catalogue(room: str) -> Mapping[str, Mapping[str, str]]:
 def _template(code: str, part: str, words: Words) -> str:
     room, _, name = code.partition(".")
     entry = _catalogue(room)[name]
-    return entry.get(f"{part}_{words}", entry.get(part, ""))
+    forms = {"python": (), "cli": ("_cli",), "file": ("_file", "_cli")}[words]
+    return next((entry[part + form] for form in (*forms, "") if part + form in entry), "")
 
 
 def _text(finding: Finding, part: str, words: Words) -> str:
@@ -297,6 +306,8 @@ class _Sentence(string.Formatter):
         if isinstance(value, tuple):
             if spec == "list":
                 return str(list(value))
+            if spec == "lines":
+                return "\n".join(one.listed(self._words) for one in value)
             if spec in self._JOINTS:
                 return self._JOINTS[spec].join(self.format_field(one, "") for one in value)
             return ", ".join(self.format_field(one, spec) for one in value)
@@ -305,13 +316,13 @@ class _Sentence(string.Formatter):
 
 def _plain(value: Any) -> Any:
     """The value as data: no arrays, no views, nothing that changes later."""
-    if value is None or isinstance(value, bool | int | float | str | Finding):
+    if value is None or isinstance(value, Finding):
+        return value
+    if isinstance(value, bool | int | float | str):
         # A subclass, as a float of numpy, is shown by another repr.
-        return (
-            value
-            if type(value).__module__ == "builtins" or isinstance(value, Finding)
-            else (value.item() if hasattr(value, "item") else str(value))
-        )
+        if type(value).__module__ == "builtins":
+            return value
+        return value.item() if hasattr(value, "item") else str(value)
     if hasattr(value, "tolist"):
         return _plain(value.tolist())
     if isinstance(value, PathLike):

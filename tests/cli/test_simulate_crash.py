@@ -46,7 +46,7 @@ def test_json_is_what_really_happened(here, run_cli):
         (["pole", "--format", "npz"], "error: --format: there is no writer of crash records"),
         (["pole", "--sensor", "bmi270"], "error: --sensor: the recorders of a crash have parts"),
         (["pole", "--sampling", "often"], "'often' does not fit"),
-        (["pole", "--rate", "0"], "does not fit"),
+        (["pole", "--rate", "0"], "give a number above 0"),
         (["alexiev-fig4", "--units", "IMU1"], "'alexiev-fig4' is no crash and has no recorders"),
     ],
 )

@@ -80,11 +80,13 @@ def simulate(
     write: OutFlags,
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
-    from strapdown.cli.console import console, print_seal, progress
+    from strapdown.cli.console import WORDS, console, print_seal, progress
     from strapdown.cli.result_folder import default_folder
     from strapdown.report.simulation import simulate as simulate_and_write
 
-    title = Path(name).stem if name.lower().endswith(".toml") else name
+    own = name.lower().endswith(".toml")
+    WORDS.set("file" if own else "cli")
+    title = Path(name).stem if own else name
     folder = out or default_folder(name, "simulated")
     with progress(write.quiet or write.json) as report:
         report("simulating and writing", 0.5)
