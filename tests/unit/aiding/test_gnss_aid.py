@@ -11,9 +11,9 @@ from strapdown import earth, rotation
 from strapdown._kernels.steady_motion import steady_motion
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.view import View
+from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_scale
-from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.sensors.antenna import antenna_motion

@@ -16,10 +16,10 @@ from resting import SITE, UNCERTAINTY, resting, roughly
 from strapdown import rotation
 from strapdown.alignment.fine import FineAlignment
 from strapdown.alignment.fine_result import FINE_COLUMNS
+from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_models import ERROR_MODELS
 from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.prefilter import PREFILTERS
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

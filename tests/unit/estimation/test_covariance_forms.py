@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.update_rule import Step
-from strapdown.errors import ConfigError, DataError
 
 FORMS = sorted(COVARIANCES)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from strapdown._kernels.compensation import compensate
+from strapdown.errors import DivergenceError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_models import ERROR_MODELS
@@ -24,7 +25,6 @@ from strapdown.estimation.sensor_blocks import (
     gyro_scale,
 )
 from strapdown.estimation.sensor_states import stack
-from strapdown.errors import DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import MECHANIZATIONS, NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error

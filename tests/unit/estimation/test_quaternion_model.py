@@ -11,6 +11,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from strapdown import rotation
 from strapdown._kernels.compensation import compensate
 from strapdown.ellipsoids import WGS84
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.quaternion_model import QuaternionModel
 from strapdown.estimation.sensor_blocks import (
@@ -25,7 +26,6 @@ from strapdown.estimation.sensor_blocks import (
     lever_arm,
 )
 from strapdown.estimation.sensor_states import stack
-from strapdown.errors import ConfigError
 from strapdown.frames import C_ne
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.state_error import state_error

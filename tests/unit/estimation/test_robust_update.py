@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.influence_huber import Huber
 from strapdown.estimation.influence_tukey import Tukey
@@ -13,7 +14,6 @@ from strapdown.estimation.paper_update import PaperUpdate
 from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.estimation.ud import BiermanThornton
 from strapdown.estimation.update_rules import UPDATE_RULES
-from strapdown.errors import ConfigError
 
 ALL = sorted(INFLUENCES)
 ROBUST = [name for name in ALL if name != "none"]

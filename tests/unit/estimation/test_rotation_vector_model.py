@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.ellipsoids import WGS84
+from strapdown.errors import ConfigError
 from strapdown.estimation.error_model import PHYSICAL, Segment
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import (
@@ -15,7 +16,6 @@ from strapdown.estimation.sensor_blocks import (
     gyro_bias,
     gyro_scale,
 )
-from strapdown.errors import ConfigError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error

@@ -3,6 +3,7 @@ import math
 import numpy as np
 import pytest
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.sensor_blocks import (
     ERRORS_OF_SENSORS,
     accel_bias,
@@ -22,7 +23,6 @@ from strapdown.estimation.sensor_blocks import (
 )
 from strapdown.estimation.standard_states import standard_states
 from strapdown.estimation.states import StateLayout
-from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.error_chain import apply
 from strapdown.sensors.imu_uncertainty import BiasDrift, ImuUncertainty

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.signal_filter import SignalFilter
-from strapdown.errors import ConfigError
 
 STEP = 1e-3
 

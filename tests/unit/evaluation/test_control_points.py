@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.evaluation.control_points import rigid_fit, score_control_points
 from strapdown.errors import DataError
+from strapdown.evaluation.control_points import rigid_fit, score_control_points
 from strapdown.frames import geodetic_from_ned
 from strapdown.tables import trajectory_table
 

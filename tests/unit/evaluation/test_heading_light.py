@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from strapdown.errors import ConfigError
 from strapdown.evaluation.heading_light import (
     CARRIED,
     GROWS,
@@ -16,7 +17,6 @@ from strapdown.evaluation.heading_light import (
     heading_light,
     recent_scatter,
 )
-from strapdown.errors import ConfigError
 from strapdown.navigation.record import NavigationRecord
 
 SECONDS = 200

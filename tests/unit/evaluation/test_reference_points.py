@@ -7,6 +7,7 @@ import pytest
 
 from strapdown import bench_attitude, rotation
 from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.evaluation.reference_points import (
     in_words,
@@ -14,7 +15,6 @@ from strapdown.evaluation.reference_points import (
     references_from_words,
     score_references,
 )
-from strapdown.errors import ConfigError, DataError
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
 from strapdown.report.attitude_words import standing

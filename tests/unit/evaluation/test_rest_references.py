@@ -7,6 +7,7 @@ import pytest
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as G
+from strapdown.errors import DataError
 from strapdown.evaluation.reference_points import (
     in_words,
     parse_reference,
@@ -19,7 +20,6 @@ from strapdown.evaluation.rest_references import (
     tilt_references,
     tilt_sd_deg,
 )
-from strapdown.errors import DataError
 from strapdown.formats.references import read_reference_words
 from strapdown.results import AttitudeRun, RestStretch
 from strapdown.tables import attitude_table, imu_table

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
+from strapdown.errors import DataError
 from strapdown.evaluation.clock_alignment import coarse_offset
 from strapdown.evaluation.second_log import align_second_log
 from strapdown.evaluation.second_log_truth import first_clock, second_clock, truth_from_second_log
-from strapdown.errors import DataError
 from strapdown.tables import QUATERNION, attitude_table, imu_table
 
 OFFSET, DRIFT = 0.1237, 50e-6  # s; 50 ppm

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from strapdown import rotation
+from strapdown.errors import DataError
 from strapdown.evaluation.truth_comparison import (
     compare_with_places,
     compare_with_truth,
     state_errors,
 )
-from strapdown.errors import DataError
 from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState

@@ -12,13 +12,13 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
+from strapdown.errors import ConfigError
 from strapdown.evaluation.withheld import (
     score_withheld,
     scores_table,
     spans_to_withhold,
     without_spans,
 )
-from strapdown.errors import ConfigError
 from strapdown.navigation.record import Span
 
 LENGTH = 20.0

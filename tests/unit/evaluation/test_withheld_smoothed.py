@@ -15,13 +15,13 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 import town_drive as town
 from strapdown import rotation
 from strapdown.aiding.no_slip import NoSlip
+from strapdown.errors import ConfigError
 from strapdown.evaluation.withheld import blinded, score_withheld
 from strapdown.evaluation.withheld_smoothed import (
     end_of_what_tells,
     score_of_smoothed,
     score_withheld_smoothed,
 )
-from strapdown.errors import ConfigError
 from strapdown.frames import place_difference
 from strapdown.navigation.damping import DAMPINGS
 from strapdown.navigation.record import Span

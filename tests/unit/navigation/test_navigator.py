@@ -10,13 +10,13 @@ import pytest
 from tests import aided_drives
 
 from strapdown.aiding.gnss import Gnss
+from strapdown.errors import ConfigError, DivergenceError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_models import ERROR_MODELS
 from strapdown.estimation.influence_tukey import Tukey
 from strapdown.estimation.paper_update import PaperUpdate
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
-from strapdown.errors import ConfigError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.mechanization.state_error import state_error

@@ -12,8 +12,8 @@ from tests.aided_drives import begin, drive, gnss_of, increments_of, navigator_o
 
 from strapdown.aiding.gnss import Gnss
 from strapdown.aiding.no_slip import NoSlip
-from strapdown.estimation.quaternion_model import QuaternionModel
 from strapdown.errors import ConfigError
+from strapdown.estimation.quaternion_model import QuaternionModel
 from strapdown.mechanization import NorthEastDown
 from strapdown.mechanization.state_error import state_error
 from strapdown.nav_state import NavState

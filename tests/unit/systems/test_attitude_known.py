@@ -7,9 +7,9 @@ import pytest
 
 from strapdown import bench_attitude, rotation
 from strapdown.attitude import Quaternion, run_attitude
+from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.evaluation.known import Known, known_at
-from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor

@@ -11,8 +11,8 @@ import pytest
 from strapdown import rotation
 from strapdown.config.coast import coast_spec
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
-from strapdown.evaluation.plane_bound import PLANE_95
 from strapdown.errors import ConfigError
+from strapdown.evaluation.plane_bound import PLANE_95
 from strapdown.frames import ned_from_geodetic
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from strapdown.estimation.covariance import Innovations
 from strapdown.errors import ConfigError
+from strapdown.estimation.covariance import Innovations
 from strapdown.navigation.piece import NavigationPiece, Seen
 from strapdown.systems.sins.deliveries import Deliveries
 

@@ -15,9 +15,9 @@ from strapdown.config.navigation_file import navigation_spec, read_navigation_sp
 from strapdown.config.navigation_modules import sensors_of
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
+from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.stated_states import states_that_are_stated
 from strapdown.evaluation.truth_comparison import compare_with_truth
-from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.imu_uncertainty import ImuUncertainty

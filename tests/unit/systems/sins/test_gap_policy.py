@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariances import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.rotation_vector_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
-from strapdown.errors import ConfigError, DataError
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator
