@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapdown.errors import ConfigError, DataError, StrapdownError, nearest
+from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.formats import (
     asl,
     broad,
@@ -148,11 +148,11 @@ def _no_recording(path: Path) -> DataError:
             "io.folder-no-known-recording-holds", file=path.resolve().name, names=names or "nothing"
         )
     return DataError(
-        "io.message",
+        "io.folder-of-one-recording" if len(logs) == 1 else "io.folder-of-recordings",
         file=path.resolve().name,
-        message="the folder is no recording by itself; "
-        + (f"it holds one: {names}" if len(logs) == 1 else f"it holds {len(logs)}: {names}"),
-        remedy_text=f"give {('it' if len(logs) == 1 else 'one of them')}: {path / logs[0]}",
+        count=len(logs),
+        names=names,
+        path=path / logs[0],
     )
 
 

@@ -140,12 +140,11 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
             raise
         # The options that would state it are those of the log.
         raise DataError(
-            "io.message",
+            "io.truth-time-unusable",
             file=raw.name,
             row=error.finding.row,
             quantity="time",
-            message=error.finding.what,
-            remedy_text="name its column with the unit of time, as in time_ms",
+            reason=error.finding,
         ) from None
     return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
 

@@ -197,6 +197,6 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
             file=channel.file or None,
             row=channel.row(k),
             quantity=f"time of channel {channel.name}",
-            stamps=stamps[k - 1],
-            stamps_2=stamps[k],
+            stamps=stamps[k - 1] if bad.size else None,
+            stamps_2=stamps[k] if bad.size else None,
         )

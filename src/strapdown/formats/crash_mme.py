@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 from strapdown.errors import DataError, Finding
@@ -208,7 +207,16 @@ def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
                 value = header.number(key)
             except DataError as error:
                 # What the report could say of the vehicle is no reason to refuse its record.
-                findings.append(replace(error.finding, what=f"left out: {error.finding.what}"))
+                fault = error.finding
+                findings.append(
+                    Finding(
+                        "io.left-out-unusable",
+                        file=fault.file,
+                        row=fault.row,
+                        quantity=fault.quantity,
+                        reason=fault,
+                    )
+                )
                 continue
             if value is not None:
                 facts[name] = f"{value:.10g}"

@@ -123,11 +123,15 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
             column = int(said["column"])
             notes[names[column - 1]] = checked
         except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
-            told = (
-                error.finding.what if isinstance(error, DataError) else "no channel is read in it"
-            )
+            reason = error.finding if isinstance(error, DataError) else None
             raw.findings.append(
-                Finding("io.comment-left-out", file=raw.name, row=row, severity="note", told=told)
+                Finding(
+                    "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
+                    file=raw.name,
+                    row=row,
+                    severity="note",
+                    reason=reason,
+                )
             )
     return notes
 

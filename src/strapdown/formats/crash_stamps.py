@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding
 from strapdown.formats.inference.clock import infer_time_unit
-from strapdown.formats.judge import not_told
+from strapdown.formats.judge import what_numbers_say
 from strapdown.formats.stamps import EPOCH
 
 Array = NDArray[np.float64]
@@ -127,21 +127,8 @@ def last_midnight(stamp: float, factor: float) -> float:
 
 def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str:
     said = infer_time_unit(stamps)
+    where = {"file": clock.file, "quantity": f"time ({clock.name})"}
     if said.settled:
-        findings.append(
-            Finding(
-                "io.message",
-                file=clock.file,
-                quantity=f"time ({clock.name})",
-                message=str(said),
-                remedy_text='if not, state it, as in time_unit = "ms"',
-            )
-        )
+        findings.append(said.finding("io.crash-time-unit-inferred", **where))
         return str(said.value)
-    raise DataError(
-        "io.message",
-        file=clock.file,
-        quantity=f"time ({clock.name})",
-        message=not_told(said),
-        remedy_text='state it, as in time_unit = "ms"',
-    )
+    raise DataError("io.crash-time-unit-undecided", **where, **what_numbers_say(said))

@@ -296,12 +296,11 @@ def _retold(read: Callable[[], T]) -> T:
     except DataError as error:
         found = error.finding
         raise DataError(
-            "io.message",
+            "io.crash-channel-unusable",
             file=found.file,
             row=found.row,
             quantity=found.quantity,
-            message=found.what,
-            remedy_text="correct or delete that row, or name another channel",
+            reason=found,
         ) from None
 
 

@@ -132,7 +132,7 @@ def _chosen(
             "io.no-axis" if wrong else "io.no-axis-named",
             file=record.path.name,
             quantity="channels",
-            wrong=wrong[0],
+            wrong=wrong[:1],
         )
     out: dict[str, tuple[CrashChannel, float]] = {}
     for axis in _AXES:
@@ -211,12 +211,10 @@ def _as_mean(
     from_zero = starts_at_zero(stamps, channel)
     findings.append(
         Finding(
-            "io.message",
+            "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
             file=channel.file or None,
             quantity=f"channel {channel.name}",
-            message="changes of velocity are turned into mean accelerations over each interval"
-            + (", the first from time zero" if from_zero else ""),
-            remedy_text="if it holds the change of each sample alone, add them up first",
+            severity="note",
         )
     )
     return mean_accelerations_of(stamps, values, from_zero=from_zero)

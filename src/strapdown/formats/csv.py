@@ -192,9 +192,8 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
     try:
         return data.decode("utf-8-sig"), []
     except UnicodeDecodeError as error:
-        what = f"byte {error.start} is not UTF-8; read as Windows-1252"
         return data.decode("cp1252", "replace"), [
-            Finding("io.message-2", file=name, severity="note", message=what)
+            Finding("io.not-utf-8", file=name, severity="note", byte=error.start)
         ]
 
 
@@ -294,8 +293,16 @@ def _whole_lines(
         lines.append(line)
     if amid:
         row, line = amid[0]
-        what = f"comments among the rows, {len(amid)} in all, are not read: '{line.strip()[:60]}'"
-        findings.append(Finding("io.message-2", file=name, row=row, severity="note", message=what))
+        findings.append(
+            Finding(
+                "io.comments-among-rows",
+                file=name,
+                row=row,
+                severity="note",
+                count=len(amid),
+                first=line.strip()[:60],
+            )
+        )
     return rows, lines
 
 

@@ -55,7 +55,7 @@ def _arrays(path: Path, *names: str) -> dict[str, Any]:
                 file=path.name,
                 quantity=name,
                 name=name,
-                arrays=arrays,
+                arrays=list(arrays),
             )
     return {name: arrays[name].astype(np.float64) for name in names}
 

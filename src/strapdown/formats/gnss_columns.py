@@ -121,7 +121,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
             "io.missing-columns-2",
             file=raw.name,
             missing=missing,
-            columns=raw.columns,
+            columns=list(raw.columns),
             missing_2=missing[0],
         )
     if over_sea and "geoid" not in found:

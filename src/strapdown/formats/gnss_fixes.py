@@ -174,8 +174,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
             file=fixes.name,
             row=int(fixes.rows[bad[0]]),
             quantity="time",
-            size=bad.size,
-            value="s" if bad.size > 1 else "",
+            count=bad.size,
         )
     keep: NDArray[np.bool_] = np.isfinite(time)
     if fixes.clock.name in (GPS, RELATIVE):
@@ -200,17 +199,16 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
         k = int(late[0])
         same = there[k] == before[k]
         raise DataError(
-            "io.message",
+            "io.fix-stamp-repeated" if same else "io.fix-stamp-earlier",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity="time",
-            message=f"the stamp {time[k]:.12g} s "
-            + ("is that of a row before" if same else f"comes after {before[k]:.12g} s")
-            + f" ({late.size} such row{('s' if late.size > 1 else '')} in all)",
-            remedy_text="sort the rows by time, each instant once; repair leaves such rows out",
+            stamp=time[k],
+            before=before[k],
+            count=late.size,
         )
     keep = np.asarray(keep & (there > before))
-    _say_left_out(fixes, keep, "whose stamp is no number, or not later than every one before")
+    _say_left_out(fixes, keep, "io.fixes-out-of-time-left-out")
     return time, keep
 
 
@@ -226,25 +224,22 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=which,
-            size=bad.size,
-            value="s" if bad.size > 1 else "",
+            count=bad.size,
         )
-    _say_left_out(fixes, there, "without a place")
+    _say_left_out(fixes, there, "io.fixes-without-position-left-out")
     return there
 
 
-def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], why: str) -> None:
+def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
     out = np.flatnonzero(~keep)
     if out.size:
         fixes.findings.append(
             Finding(
-                "io.row-left-out",
+                code,
                 file=fixes.name,
                 row=int(fixes.rows[out[0]]),
                 severity="note",
-                size=out.size,
-                value="s" if out.size > 1 else "",
-                why=why,
+                count=out.size,
             )
         )
 
@@ -285,13 +280,12 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         rows = np.flatnonzero(zero.any(axis=1))
         fixes.findings.append(
             Finding(
-                "io.row-standard-deviation-zero-stands",
+                "io.sd-of-zero-unknown",
                 file=fixes.name,
                 row=int(fixes.rows[rows[0]]),
                 quantity=names[int(np.argmax(zero[rows[0]]))],
-                size=rows.size,
-                value="s" if rows.size > 1 else "",
-                what=what,
+                count=rows.size,
+                of=what,
             )
         )
         sd = np.where(zero, np.inf, sd)
@@ -305,6 +299,6 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
             quantity=names[j],
             stated=stated[k, j],
             count=len(np.unique(bad[:, 0])),
-            what=what,
+            of=what,
         )
     return np.asarray(sd)

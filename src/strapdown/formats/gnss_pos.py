@@ -207,13 +207,11 @@ def _refuse_words(plain: list[tuple[int, str]], names: list[str], file: str) -> 
                 float(text)
             except ValueError:
                 raise DataError(
-                    "io.message",
+                    "io.not-number-decimal-comma" if "," in text else "io.not-number-2",
                     file=file,
                     row=row,
                     quantity=name,
-                    message=f"'{text}' is not a number",
-                    remedy_text="correct or delete that row"
-                    + ("; decimals need a point" if "," in text else ""),
+                    text=text,
                 ) from None
 
 

@@ -148,7 +148,10 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
     """
     if "time" not in found:
         raise DataError(
-            "io.no-column-recognised-time-logs", file=log.name, quantity="time", columns=log.columns
+            "io.no-column-recognised-time-logs",
+            file=log.name,
+            quantity="time",
+            columns=list(log.columns),
         )
     ticks, dated = ticks_of(log, found["time"])
     return Clock(ticks, "ns" if dated else found["time"].unit)
@@ -231,7 +234,9 @@ def _onto(
     if stamps.size == time.size and np.array_equal(stamps, time):
         return values, np.ones(time.size, dtype=bool)
     if not stamps.size or not known.any():
-        _leave_out(log.name, triad, "it holds no number", findings)
+        findings.append(
+            Finding("io.left-out-without-number", file=log.name, quantity=triad, severity="note")
+        )
         return None, known
     out, inside, distance = at_stamps(time, stamps, values)
     if not inside.any():
@@ -246,8 +251,16 @@ def _onto(
         )
     covered = int(inside.sum())
     if covered < COVERED * known.sum():
-        what = f"it has values for {covered} of the {int(known.sum())} samples of the gyro"
-        _leave_out(log.name, triad, what, findings)
+        findings.append(
+            Finding(
+                "io.left-out-few-samples",
+                file=log.name,
+                quantity=triad,
+                severity="note",
+                covered=covered,
+                count=int(known.sum()),
+            )
+        )
         return None, known
     if distance > 0:
         findings.append(
@@ -270,16 +283,11 @@ def _onto(
                 file=log.name,
                 quantity=triad,
                 count=len(gaps),
-                value="s" if len(gaps) > 1 else "",
                 length=longest.length,
             )
         )
     # A stamp of the gyro that is no number is refused, or repaired, with the gyro's own.
     return np.where(known[:, None], out, 0.0), inside | ~known
-
-
-def _leave_out(name: str, triad: str, what: str, findings: list[Finding]) -> None:
-    findings.append(Finding("io.left-out-3", file=name, quantity=triad, severity="note", what=what))
 
 
 def _in_order(
@@ -307,11 +315,10 @@ def _one_of(what: str, logs: Sequence[RawLog], name: str) -> str | None:
     said = {log.axes: log.name for log in logs if log.axes}
     if len(said) > 1:
         raise DataError(
-            "io.message",
+            "io.axes-of-logs-differ",
             file=name,
             quantity=what,
-            message="; ".join((f"{file} says {axes}" for axes, file in said.items())),
-            remedy_text="turn one of them into the axes of the other",
+            stated=[f"{file} says {axes}" for axes, file in said.items()],
         )
     return next(iter(said), None)
 

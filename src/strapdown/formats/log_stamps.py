@@ -88,13 +88,7 @@ def stamps_of_log(
         unit, why = str(said["time_unit"].value), str(said["time_unit"])
         if unit != "s":
             findings.append(
-                Finding(
-                    "io.message",
-                    file=raw.name,
-                    quantity="time",
-                    message=why,
-                    remedy_text="if not, say --time-unit",
-                )
+                said["time_unit"].finding("io.time-unit-inferred", file=raw.name, quantity="time")
             )
     stamps = read_stamps(
         ticks[rows],

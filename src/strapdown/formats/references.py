@@ -74,15 +74,11 @@ def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[
             read = parse_place if is_place(text) else parse_reference
             read(text, -math.inf, math.inf)
         except ConfigError as error:
+            where = {"file": path.name, "quantity": "reference"}
+            if what == "line":
+                raise DataError(error.finding, row=number, **where) from None
             raise DataError(
-                "io.message",
-                file=path.name,
-                row=number if what == "line" else None,
-                quantity="reference",
-                message=error.finding.what
-                if what == "line"
-                else f"{what} {number}: {error.finding.what}",
-                remedy_text=error.finding.remedy,
+                "io.sentence-not-understood", number=number, reason=error.finding, **where
             ) from None
     return [text for _, text in numbered]
 

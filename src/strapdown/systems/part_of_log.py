@@ -80,11 +80,16 @@ def part_of_log(
     if kept.sum() < 2:
         ends = to_s is not None or duration_s is not None
         raise ConfigError(
-            "io.samples-lie-log-runs",
+            "io.part-between"
+            if from_s is not None and ends
+            else "io.part-up-to"
+            if ends
+            else "io.part-from",
             file=name,
             quantity="time",
             kept=int(kept.sum()),
-            words=_words(from_s, last if ends else None),
+            from_s=first,
+            to_s=last,
             time=time[0],
             time_2=time[-1],
         )
@@ -95,9 +100,3 @@ def part_of_log(
     if out.attrs.get("first_row") is not None:
         out.attrs["first_row"] += int(np.argmax(kept))
     return out
-
-
-def _words(from_s: float | None, last: float | None) -> str:
-    if from_s is None:
-        return f"up to {last:.9g} s"
-    return f"from {from_s:.9g} s on" if last is None else f"between {from_s:.9g} and {last:.9g} s"
