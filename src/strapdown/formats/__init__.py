@@ -112,13 +112,13 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
         It is of no known format, or it is damaged.
     """
     if not path.exists():
-        raise ConfigError("io.no-such-file-or-folder", file=str(path))
+        raise ConfigError("io.no-such-log", file=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise DataError("io.file-empty", file=path.name)
     if form is not None:
         if form not in READERS:
             raise ConfigError(
-                "io.no-format-log", quantity="format", form=form, word=form, known=READERS
+                "io.unknown-format-of-log", quantity="format", form=form, word=form, known=READERS
             )
         return READERS[form].read(path)
     for reader in READERS.values():

@@ -117,7 +117,7 @@ def read_aid_table(
         if name in values and UNITS[unit] and not found[name].stated:
             findings.append(
                 Finding(
-                    "io.no-unit-stated-taken",
+                    "io.unit-assumed",
                     file=raw.name,
                     quantity=name,
                     severity="note",
@@ -141,7 +141,7 @@ def _raw(path: Path) -> RawLog:
         raise ConfigError("io.no-such-file", file=str(path))
     if path.is_dir() or not (csv.detect(path) or parquet.detect(path)):
         raise DataError(
-            "io.folder" if path.is_dir() else "io.ending-no-table",
+            "io.folder" if path.is_dir() else "io.aid-file-ending",
             file=path.resolve().name,
             suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
             suffix=path.suffix,
@@ -191,7 +191,7 @@ def _usable(
     _refuse_or_say(raw, "time", late, "io.aid-not-later", repair, findings)
     keep &= ~late
     if not keep.any():
-        raise DataError("io.no-row-can-used", file=raw.name)
+        raise DataError("io.no-usable-row", file=raw.name)
     return keep
 
 

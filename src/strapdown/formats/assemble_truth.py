@@ -189,12 +189,17 @@ def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> 
     """An attitude of unknown frames, as a phone computes one, is no truth unless it is said."""
     if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
         findings.append(
-            Finding("io.also-holds-attitude-not-used", file=raw.name, quantity="attitude")
+            Finding(
+                "io.attitude-not-used",
+                severity="note",
+                file=raw.name,
+                quantity="attitude",
+            )
         )
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
     """Quaternion ``q_sb`` from body axes to the axes in which the file has its truth."""
     if mirrored(*axes):
-        raise ConfigError("io.axes-stated-mirror-image-sensor", file=raw.name, quantity="--axes")
+        raise ConfigError("io.truth-axes-mirrored", file=raw.name, quantity="--axes")
     return rotation.quaternion_from_dcm(axes_matrix(*axes).T)

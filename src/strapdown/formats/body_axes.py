@@ -65,7 +65,7 @@ def body_axes(
     if options.axes and mirrored(axis, sign):
         findings.append(
             Finding(
-                "io.axes-mirror-image-turns-no",
+                "io.axes-mirrored",
                 file=raw.name,
                 quantity="axes",
                 severity="note",

@@ -52,7 +52,7 @@ def triad_stamps(
         Nothing tells the stamps, or time does not advance.
     """
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
-        raise ConfigError("io.hz-no-rate", quantity="rate_hz", rate_hz=rate_hz)
+        raise ConfigError("io.crash-rate-not-positive", quantity="rate_hz", rate_hz=rate_hz)
     if time is None and time_unit is None and rate_hz is None:
         stamps, values = channel.load()
         _check_advances(channel, stamps)

@@ -56,6 +56,7 @@ def read(path: Path) -> CrashRecord:
         findings.append(
             Finding(
                 "io.listed-channels-not-folder",
+                severity="note",
                 file=index.name if index else head.name,
                 quantity="channels",
                 count=len(absent),
@@ -231,7 +232,7 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
     if file.known is None:
         told.append(
             Finding(
-                "io.no-channel-code-sixteen-letters" if file.code else "io.no-channel-code",
+                "io.channel-code-malformed" if file.code else "io.channel-code-missing",
                 file=name,
                 row=file.header.line("channel code"),
                 quantity="channel code",

@@ -60,7 +60,7 @@ def read_text_table(
         )
     text, findings = csv.decoded(path.read_bytes(), path.name)
     if "\0" in text:
-        raise DataError("io.no-text-holds-zero-bytes", file=path.name)
+        raise DataError("io.crash-table-with-zero-bytes", file=path.name)
     lines = text.splitlines()
     header, units_at, units = _header(lines)
     remarks = _remarks(lines, header)

@@ -23,19 +23,19 @@ MOST_NAMES = 10_000
 ROW_FAULTS = frozenset(
     {
         "io.fields-expected",
-        "io.fields-first-line-2",
+        "io.csv-field-count",
         "io.first-or-last-stamp-missing",
         "io.no-stamp-such",
         "io.no-whole-number-nanoseconds",
         "io.not-date-time-like-those",
-        "io.not-number-2",
+        "io.text-not-a-number",
         "io.not-stamp-blocks-id-values",
         "io.numbers-every-sample",
         "io.time-no-date-since-no",
     }
 )
 # Faults whose remedies are options of the command that reads logs for their attitude.
-OPTION_FAULTS = frozenset({"io.not-number-column"})
+OPTION_FAULTS = frozenset({"io.value-not-a-number"})
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def read_crash_record(
     file = Path(path)
     if format is not None and format not in CRASH_READERS:
         raise ConfigError(
-            "io.no-reader", quantity="format", format=format, word=format, known=CRASH_READERS
+            "io.unknown-reader", quantity="format", format=format, word=format, known=CRASH_READERS
         )
     try:
         # Messages name a record by the last part of its path, which "." does not have.
@@ -126,7 +126,7 @@ def read_crash_record(
     except (OSError, ValueError) as error:
         # A name that no file can have, a file that may not be read, a link that leads in a ring.
         raise DataError(
-            "io.cannot-read",
+            "io.crash-record-unreadable",
             file=clean(file.name),
             name=type(error).__name__,
             clean=clean(str(error), 200),
@@ -144,7 +144,7 @@ def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
         near = difflib.get_close_matches(file.name, _names_beside(file), n=1)
         raise ConfigError(
-            "io.no-such-file-or-folder-2" if near else "io.no-such-file-or-folder-3",
+            "io.no-such-record-but-near" if near else "io.no-such-record",
             file=clean(str(file)),
             clean=clean(near[0]) if near else "",
         )

@@ -86,7 +86,7 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
         k = int(back[0])
         same = ticks[k] == ticks[k + 1]
         raise DataError(
-            "io.stamp-repeats-row-before" if same else "io.time-goes-back",
+            "io.crash-stamp-repeated" if same else "io.time-goes-back-in-record",
             file=clock.file,
             row=clock.row(k + 1),
             quantity=f"time ({clock.name})",
@@ -100,7 +100,7 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     midnight = last_midnight(stamps[0].item(), factor)
     findings.append(
         Finding(
-            "io.stamps-count-distant-origin-time",
+            "io.crash-time-from-midnight",
             file=clock.file,
             quantity=f"time ({clock.name})",
             severity="note",

@@ -83,7 +83,7 @@ def triad_factor(
             other = axes[next(iter(own))][0].name
             findings.append(
                 Finding(
-                    "io.no-unit-taken",
+                    "io.unit-taken-from-other-axis",
                     file=record.path.name,
                     quantity="unit",
                     without=without,
@@ -160,6 +160,7 @@ def _choices(block: list[Array], quantity: str) -> list[Finding]:
     return [
         Finding(
             "io.crash-choice-of-unit",
+            severity="note",
             unit=unit,
             largest=largest,
             value=largest * FACTORS[quantity][unit],

@@ -57,7 +57,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     for quantity, source in options.columns.items():
         if quantity not in QUANTITIES and quantity not in TRIADS:
             raise ConfigError(
-                "io.no-quantity",
+                "io.unknown-quantity",
                 quantity="--columns",
                 of_what=quantity,
                 word=quantity,
@@ -66,7 +66,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         for q, name in _asked(raw, quantity, source):
             if name in asked.values():
                 raise ConfigError(
-                    "io.column-named-two-quantities",
+                    "io.column-named-twice",
                     file=raw.name,
                     quantity=f"--columns {q}",
                     name=name,
@@ -138,7 +138,7 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
             names = [n for n in names if not says_increment(n)] or names
         if len(names) > 1:
             raise ConfigError(
-                "io.columns-could",
+                "io.columns-ambiguous",
                 file=raw.name,
                 quantity=quantity,
                 count=len(names),
@@ -171,7 +171,7 @@ def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
     elif source.isdecimal() and 1 <= int(source) <= len(names):
         return [(quantity, names[int(source) - 1])]
     raise ConfigError(
-        "io.no-column",
+        "io.no-such-column",
         file=raw.name,
         quantity=f"--columns {quantity}",
         source=source,
@@ -190,7 +190,7 @@ def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
     width = _width(raw, base)
     if width > 3 and not index:
         raise ConfigError(
-            "io.columns",
+            "io.columns-of-array",
             file=raw.name,
             quantity=f"--columns {quantity}",
             source=source,

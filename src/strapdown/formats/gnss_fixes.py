@@ -137,7 +137,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     time, keep = _time(fixes, options)
     keep &= _placed(fixes, quality, options)
     if not keep.any():
-        raise DataError("io.no-fix-can-used", file=fixes.name, quantity="lat, lon")
+        raise DataError("io.no-usable-fix", file=fixes.name, quantity="lat, lon")
     at = np.flatnonzero(keep)
     with told_by_file_rows(fixes.name, lambda row: int(fixes.rows[at[row]])):
         table = gnss_table(
@@ -170,7 +170,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size and not options.repair:
         raise DataError(
-            "io.stamp-no-number-such-row",
+            "io.fix-stamp-no-number",
             file=fixes.name,
             row=int(fixes.rows[bad[0]]),
             quantity="time",
@@ -185,7 +185,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
             row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
             fixes.findings.append(
                 Finding(
-                    "io.seconds-week-begin-again-they",
+                    "io.seconds-of-week-unrolled",
                     file=fixes.name,
                     row=row,
                     quantity="time",
@@ -220,7 +220,7 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
         k = int(bad[0])
         which = GEODETIC[int(np.argmin(np.isfinite(fixes.place[k])))]
         raise DataError(
-            "io.no-number-such-row-all",
+            "io.fix-value-no-number",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=which,
@@ -265,15 +265,13 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         if what == "velocity":
             fixes.findings.append(
                 Finding(
-                    "io.velocities-without-standard-deviations-they",
+                    "io.velocity-sd-not-stated",
                     file=fixes.name,
                     quantity=", ".join(VELOCITY),
                 )
             )
             return np.full((count, 3), np.inf)
-        raise DataError(
-            "io.no-standard-deviations-places", file=fixes.name, quantity=", ".join(names)
-        )
+        raise DataError("io.position-sd-not-stated", file=fixes.name, quantity=", ".join(names))
     sd = np.where(np.isnan(stated), np.inf, stated)
     zero = sd == 0.0
     if fixes.zero_is_unknown and zero.any():
@@ -293,7 +291,7 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
     if bad.size:
         k, j = (int(v) for v in bad[0])
         raise DataError(
-            "io.no-standard-deviation-such-rows",
+            "io.sd-not-positive",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=names[j],

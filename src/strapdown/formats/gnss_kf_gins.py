@@ -61,7 +61,7 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):
         raise DataError(
-            "io.columns-layout-seven-or-thirteen",
+            "io.kf-gins-fix-column-count",
             file=raw.name,
             row=raw.row(0),
             count=len(raw.columns),

@@ -323,7 +323,7 @@ def _of_one_provider(
     chosen = next((p for p in PROVIDERS if (said == p).any()), None)
     if chosen is None:
         raise DataError(
-            "io.no-fix-satellite-receiver-fixes",
+            "io.no-gnss-fix",
             file=path.name,
             quantity="Provider",
             said=sorted(set(said)),

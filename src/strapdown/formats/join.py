@@ -148,7 +148,7 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
     """
     if "time" not in found:
         raise DataError(
-            "io.no-column-recognised-time-logs",
+            "io.join-time-column-missing",
             file=log.name,
             quantity="time",
             columns=list(log.columns),
@@ -202,7 +202,9 @@ def _with_gyro(logs: Sequence[RawLog], found: Sequence[dict[str, Column]], name:
     if len(have) == 1:
         return have[0]
     if have:
-        raise ConfigError("io.each", file=name, quantity="gyro", have=[logs[k].name for k in have])
+        raise ConfigError(
+            "io.gyro-in-several-logs", file=name, quantity="gyro", have=[logs[k].name for k in have]
+        )
     held = "; ".join(f"{_short(log)} ({', '.join(log.columns)})" for log in logs)
     raise DataError(
         "io.no-gyroscope-holds",
@@ -277,9 +279,8 @@ def _onto(
         longest = max(gaps, key=lambda g: g.length)
         findings.append(
             Finding(
-                "io.gap-longest-values-them-straight"
-                if triad == "accel"
-                else "io.gap-longest-values-them-straight-2",
+                "io.gaps-in-force" if triad == "accel" else "io.gaps-in-sensor",
+                severity="warning" if triad == "accel" else "note",
                 file=log.name,
                 quantity=triad,
                 count=len(gaps),
@@ -359,7 +360,7 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
                 its[quantity] = plain
         if not any(quantity in its for its in asked):
             raise ConfigError(
-                "io.no-log-column",
+                "io.no-log-with-column",
                 file=", ".join(log.name for log in logs),
                 quantity=f"--columns {quantity}",
                 source=source,

@@ -104,9 +104,13 @@ def _choice(triad: str, unit: str, largest: float) -> Finding:
     value = largest * UNITS[triad][unit]
     if triad == "gyro":
         turns = np.degrees(value) / 360.0
-        return Finding("io.choice-of-gyro-unit", unit=unit, largest=largest, turns=turns)
+        return Finding(
+            "io.choice-of-gyro-unit", severity="note", unit=unit, largest=largest, turns=turns
+        )
     si = "µT" if triad == "mag" else "m/s²"
-    return Finding("io.choice-of-unit", unit=unit, largest=largest, value=value, si=si)
+    return Finding(
+        "io.choice-of-unit", severity="note", unit=unit, largest=largest, value=value, si=si
+    )
 
 
 def report_contradictions(
@@ -234,7 +238,7 @@ def report_upside_down(
         return
     findings.append(
         Finding(
-            "io.axes-points-down-sensor-upside",
+            "io.axes-upside-down",
             file=file,
             quantity="axes",
             axis=axis,

@@ -87,7 +87,7 @@ def read(path: Path) -> RawLog:
     names = list(raw.columns)
     if len(names) != len(COLUMNS) or any(n.startswith("column ") is False for n in names):
         raise DataError(
-            "io.columns-layout-seven-without-header",
+            "io.kf-gins-column-count",
             file=raw.name,
             row=raw.row(0),
             count=len(names),

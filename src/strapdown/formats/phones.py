@@ -102,7 +102,9 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
             raise DataError("io.holds-no-number", file=gravity.name, quantity="accel")
         at, inside, distance = at_stamps(time, own[order], values[1][order])
     if not inside.any():
-        raise DataError("io.no-time-common", file=gravity.name, quantity="time", name=linear.name)
+        raise DataError(
+            "io.logs-without-common-time", file=gravity.name, quantity="time", name=linear.name
+        )
     total = (values[0] + at)[inside]
     rows = np.arange(1, time.size + 1) if linear.rows is None else linear.rows
     time_column = next(s for s, (q, _) in linear.stated.items() if q == "time")

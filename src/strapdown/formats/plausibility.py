@@ -66,7 +66,7 @@ def report_absurd(
     if largest[k] > IMPOSSIBLE_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
         raise DataError(
-            "io.rad-beyond-anything-turns",
+            "io.rate-impossible",
             file=name,
             row=row(at),
             quantity=f"gyro_{AXES[k]}",
@@ -76,7 +76,7 @@ def report_absurd(
     if LASTING_RATE < lasting <= largest[k] <= ABSURD_RATE:
         findings.append(
             Finding(
-                "io.twentieth-samples-beyond-rad-turns",
+                "io.rate-absurd-for-long",
                 file=name,
                 quantity="gyro",
                 lasting=lasting,
@@ -87,7 +87,7 @@ def report_absurd(
         at = int(np.abs(gyro[:, k]).argmax())
         findings.append(
             Finding(
-                "io.rad-turns-second",
+                "io.rate-absurd",
                 file=name,
                 row=row(at),
                 quantity=f"gyro_{AXES[k]}",
@@ -106,7 +106,7 @@ def report_absurd(
         if run.any():
             findings.append(
                 Finding(
-                    "io.samples-stand-full-scale-rate",
+                    "io.rate-at-full-scale",
                     file=name,
                     row=row(int(run.argmax())),
                     quantity=f"gyro_{AXES[k]}",

@@ -223,7 +223,9 @@ def _block(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Numbers of all rows; a last row that may have lost digits is left out."""
     if lines and (not ended or len(lines[-1][1].split()) < width):
-        findings.append(Finding("io.last-line-does-not-end", file=file, row=lines[-1][0]))
+        findings.append(
+            Finding("io.last-line-does-not-end", severity="note", file=file, row=lines[-1][0])
+        )
         lines = lines[:-1]
     if not lines:
         raise DataError("io.header-no-samples-under-2", file=file)
@@ -236,7 +238,7 @@ def _block(
         row, text = next(
             (row, f) for row, line in lines for f in line.split() if math.isnan(_number(f))
         )
-        raise DataError("io.not-number-2", file=file, row=row, text=text) from None
+        raise DataError("io.text-not-a-number", file=file, row=row, text=text) from None
     return flat.reshape(-1, width), np.array([row for row, _ in lines], dtype=np.int64)
 
 

@@ -87,7 +87,7 @@ def _from_toml(path: Path) -> list[str]:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError("io.no-toml", file=path.name, error=error) from None
+        raise DataError("io.toml-malformed", file=path.name, error=error) from None
     words = content.get("references")
     if not isinstance(words, list) or not all(isinstance(w, str) for w in words):
         raise DataError("io.no-list-sentences-named-references", file=path.name)
@@ -162,5 +162,5 @@ def read_truth(
     """
     truth = truth_of_file(read_raw(path), options or ReadOptions(), origin or Origin(0, "s"))
     if truth is None or not np.isfinite(truth.to_numpy()).all():
-        raise DataError("io.no-attitude", file=path.name)
+        raise DataError("io.file-without-attitude", file=path.name)
     return truth

@@ -101,7 +101,7 @@ def read_stamps(
             stamps, unit = whole, "s"
             findings.append(
                 Finding(
-                    "io.seconds-week-begin-again-they",
+                    "io.seconds-of-week-unrolled",
                     file=file,
                     row=row(weeks[0]),
                     quantity="time",
@@ -119,7 +119,11 @@ def read_stamps(
     ):
         findings.append(
             Finding(
-                "io.stated-samples-second", file=file, quantity="time", unit=unit, usual=1.0 / usual
+                "io.stated-time-unit-implausible",
+                file=file,
+                quantity="time",
+                unit=unit,
+                usual=1.0 / usual,
             )
         )
     factor = TIME_UNITS[unit]
@@ -130,7 +134,7 @@ def read_stamps(
         if far:
             findings.append(
                 Finding(
-                    "io.stamps-count-distant-origin-time-2",
+                    "io.time-from-first-stamp",
                     file=file,
                     quantity="time",
                     severity="note",
@@ -164,7 +168,7 @@ def _refuse_backward(
     here, then = stamps[k], stamps[k + 1]
     if steps[k] == 0:
         raise DataError(
-            "io.stamp-repeats-row-before-all",
+            "io.stamp-repeated",
             file=file,
             row=row(k + 1),
             quantity="time",
@@ -173,7 +177,7 @@ def _refuse_backward(
         )
     if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
         raise DataError(
-            "io.time-falls-counter-bits-does",
+            "io.time-counter-wraps",
             file=file,
             row=row(k + 1),
             quantity="time",
@@ -182,7 +186,7 @@ def _refuse_backward(
             bits=bits,
         )
     raise DataError(
-        "io.time-goes-back-all",
+        "io.time-goes-back",
         file=file,
         row=row(k + 1),
         quantity="time",
@@ -244,7 +248,13 @@ def _evident_unit(
     usual = _mean_step((stamps - stamps[0]).astype(np.float64))
     shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     choices = [
-        Finding("io.choice-of-time-unit", unit=u, rate_hz=1.0 / (usual * TIME_UNITS[u]), share=p)
+        Finding(
+            "io.choice-of-time-unit",
+            severity="note",
+            unit=u,
+            rate_hz=1.0 / (usual * TIME_UNITS[u]),
+            share=p,
+        )
         for u, p in shares.items()
         if p >= 1e-3 and usual > 0
     ]

@@ -71,7 +71,7 @@ def sampling_of_sums(
     names = [t for t in ("gyro", "accel") if t in summed]
     if asked and asked.lower() != "mean":
         raise ConfigError(
-            "io.does-not-go-increments-they", quantity="--sampling", asked=asked, names=names
+            "io.sampling-against-increments", quantity="--sampling", asked=asked, names=names
         )
     rest = [t for t in ("gyro", "accel") if t in triads - summed]
     findings.append(

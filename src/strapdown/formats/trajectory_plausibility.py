@@ -91,7 +91,7 @@ def judge_trajectory(
             raise DataError(code, file=file, quantity="lat, lon", misfit=plain, other=other)
     return [
         Finding(
-            "io.places-integral-velocity-disagree-motion",
+            "io.positions-and-velocities-disagree",
             file=file,
             quantity="lat, lon",
             plain=plain,
@@ -113,7 +113,7 @@ def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None)
     # Nothing drives 20 deg beside its heading and, by accident, along 57 times its heading.
     if plain > 20.0 and radians < 5.0:
         raise DataError(
-            "io.heading-course-if-radians",
+            "io.heading-in-radians",
             file=file,
             quantity="heading",
             plain=plain,

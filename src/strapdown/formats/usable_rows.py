@@ -81,5 +81,5 @@ def finite_rows(
         )
         keep &= ~bad.any(axis=1)
     if not keep.any():
-        raise DataError("io.no-row-can-used", file=raw.name)
+        raise DataError("io.no-usable-row", file=raw.name)
     return keep

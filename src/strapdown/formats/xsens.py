@@ -181,6 +181,7 @@ def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
         step=step,
         rate_hz=rate,
         choices=[
-            Finding("io.choice-of-tick", rate_hz=r, tick_us=tick) for tick, r in found.items()
+            Finding("io.choice-of-tick", severity="note", rate_hz=r, tick_us=tick)
+            for tick, r in found.items()
         ],
     )

@@ -24,18 +24,18 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
     """
     for flag, value in (("--from", from_s), ("--to", to_s), ("--duration", duration_s)):
         if value is not None and not np.isfinite(value):
-            raise ConfigError("io.no-number-5", quantity=flag, value=value)
+            raise ConfigError("io.part-not-finite", quantity=flag, value=value)
     if to_s is not None and duration_s is not None:
         raise ConfigError(
-            "io.ends-or-after-both-said",
+            "io.part-ends-twice",
             quantity="--to, --duration",
             to_s=to_s,
             duration_s=duration_s,
         )
     if duration_s is not None and not duration_s > 0.0:
-        raise ConfigError("io.no-duration", quantity="--duration", duration_s=duration_s)
+        raise ConfigError("io.part-duration-not-positive", quantity="--duration", duration_s=duration_s)
     if from_s is not None and to_s is not None and not from_s < to_s:
-        raise ConfigError("io.not-after", quantity="--to", to_s=to_s, from_s=from_s)
+        raise ConfigError("io.part-ends-before-it-begins", quantity="--to", to_s=to_s, from_s=from_s)
 
 
 def part_of_log(
