@@ -266,13 +266,12 @@ def _sampling(
         )
     kinds = {"mean" if p.mean else p.channel.sampling for p in parts} - {None}
     if len(kinds) > 1 or (stated and kinds and stated not in kinds):
-        said = " and ".join(sorted(str(k) for k in kinds))
         raise ConfigError(
             "io.sampling-contradicts-record" if stated else "io.sampling-of-axes-differs",
             file=record.path.name,
             quantity="sampling",
-            said=said,
-            stated=stated or "one kind",
+            kinds=sorted(str(k) for k in kinds),
+            stated=stated,
         )
     if not kinds and stated is None:
         findings.append(
