@@ -33,9 +33,13 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
             duration_s=duration_s,
         )
     if duration_s is not None and not duration_s > 0.0:
-        raise ConfigError("io.part-duration-not-positive", quantity="--duration", duration_s=duration_s)
+        raise ConfigError(
+            "io.part-duration-not-positive", quantity="--duration", duration_s=duration_s
+        )
     if from_s is not None and to_s is not None and not from_s < to_s:
-        raise ConfigError("io.part-ends-before-it-begins", quantity="--to", to_s=to_s, from_s=from_s)
+        raise ConfigError(
+            "io.part-ends-before-it-begins", quantity="--to", to_s=to_s, from_s=from_s
+        )
 
 
 def part_of_log(
