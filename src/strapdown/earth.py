@@ -228,8 +228,7 @@ def transport_rate(
         np.abs(lat) >= 90.0,
         lat,
         "lat_deg",
-        "north-east-down has no direction at a pole",
-        "leave that row out, or use axes of ECEF there",
+        "geodesy.no-direction-at-pole",
     )
     velocities = np.column_stack([north, east])
     return _vectors(
@@ -274,45 +273,43 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
     columns = []
     for name, array in arrays.items():
         column = np.ascontiguousarray(np.broadcast_to(array, leading).reshape(-1))
-        refuse(~np.isfinite(column), column, name, "not a finite number", "leave that row out")
+        refuse(~np.isfinite(column), column, name, "geodesy.not-finite")
         if name.startswith("lat"):
             refuse(
                 np.abs(column) > 90.0,
                 column,
                 name,
-                "a latitude beyond the pole",
-                "give geodetic latitude within -90 to 90 deg, north positive; in a pair it is "
-                "the first",
+                "geodesy.latitude-beyond-pole",
             )
         elif name.startswith("lon"):
             refuse(
                 np.abs(column) > 360.0,
                 column,
                 name,
-                "a longitude of more than a full turn",
-                "give longitude within -180 to 360 deg, east positive",
+                "geodesy.longitude-beyond-turn",
             )
         elif name.startswith("alt"):
             refuse(
                 (column < _DEEPEST) | (column > _HIGHEST),
                 column,
                 name,
-                "no height over the ellipsoid",
-                "give it in metres; as a distance from the centre of the Earth it would be one "
-                "in ECEF",
+                "geodesy.height-beyond-limits",
             )
         columns.append(column)
     return columns, leading
 
 
-def refuse(bad: NDArray[np.bool_], values: Array, name: str, what: str, remedy: str) -> None:
+def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: Any) -> None:
     """Raise what is wrong with the first bad row, if there is one.
 
     Parameters
     ----------
     bad : ndarray of bool, (n,)
     values : ndarray, (n, ...)
-    name, what, remedy : str
+    name, code : str
+        Of the quantity, and of the error.
+    **data
+        Of the error, beside the value.
 
     Raises
     ------
@@ -322,11 +319,7 @@ def refuse(bad: NDArray[np.bool_], values: Array, name: str, what: str, remedy: 
     where = np.flatnonzero(bad)
     if where.size:
         raise DataError(
-            "geodesy.message",
-            row=int(where[0]) + 1,
-            quantity=name,
-            message=f"{what}: {values[where[0]].tolist()}",
-            remedy_text=remedy,
+            code, row=int(where[0]) + 1, quantity=name, value=values[where[0]].tolist(), **data
         )
 
 
@@ -335,8 +328,7 @@ def _within_gravity(alt: Array) -> None:
         np.abs(alt) > _HIGHEST_GRAVITY,
         alt,
         "alt",
-        "normal gravity is not continued farther than 1000 km from the ellipsoid",
-        "give the height in metres; for orbits use a model of spherical harmonics",
+        "geodesy.height-beyond-gravity",
     )
 
 

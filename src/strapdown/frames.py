@@ -100,8 +100,9 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
         (distance < NEAREST) | (distance >= FARTHEST),
         xyz,
         "position",
-        f"not within {NEAREST:g} to {FARTHEST:g} m of the centre of the Earth",
-        "give Earth-centred coordinates in metres",
+        "geodesy.not-earth-centred",
+        nearest_m=NEAREST,
+        farthest_m=FARTHEST,
     )
     out = np.empty((x.size, 3))
     kernel.places_from_ecef(xyz, ellipsoid.parameters(), out)

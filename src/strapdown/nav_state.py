@@ -66,10 +66,11 @@ class NavState:
                 raise DataError("mechanization.not-finite-number", quantity=name, value=value)
         if abs(self.lat) > 0.5 * math.pi:
             raise DataError(
-                "mechanization.message",
+                "mechanization.latitude-longitude-exchanged"
+                if abs(self.lat) <= math.pi and abs(self.lon) <= 0.5 * math.pi
+                else "mechanization.latitude-in-degrees",
                 quantity="lat",
-                message=f"a latitude of {self.lat:.9g} rad is beyond the pole",
-                remedy_text=_beyond_in_radians(self.lat, self.lon),
+                lat=self.lat,
             )
         if abs(self.lon) > 2.0 * math.pi:
             raise DataError(
@@ -210,9 +211,3 @@ def _numbers(values: ArrayLike, name: str) -> Array:
             quantity=name,
             values=values,
         ) from None
-
-
-def _beyond_in_radians(lat: float, lon: float) -> str:
-    if abs(lat) <= math.pi and abs(lon) <= 0.5 * math.pi:
-        return "latitude and longitude seem to be swapped: latitude comes first"
-    return "this looks like degrees: use NavState.from_degrees"

@@ -125,18 +125,19 @@ class OutlierDesign:
     bandwidth: float = 0.2
 
     def __post_init__(self) -> None:
-        for name, good, remedy in (
-            ("threshold", 3.0 <= self.threshold < math.inf, "give 3 or more, as 6"),
-            ("window", self.window >= LEAST_WINDOW, f"give {LEAST_WINDOW} samples or more, as 128"),
-            ("longest_run", 1 <= self.longest_run <= LONGEST_RUN, "give 1 to 5 samples, as 3"),
-            ("bandwidth", 0.0 < self.bandwidth < 0.25, "give a part of the rate, as 0.2"),
+        for name, good, code in (
+            ("threshold", 3.0 <= self.threshold < math.inf, "dsp.outlier-threshold"),
+            ("window", self.window >= LEAST_WINDOW, "dsp.outlier-window"),
+            ("longest_run", 1 <= self.longest_run <= LONGEST_RUN, "dsp.outlier-run"),
+            ("bandwidth", 0.0 < self.bandwidth < 0.25, "dsp.outlier-bandwidth"),
         ):
             if not good:
                 raise ConfigError(
-                    "dsp.message",
+                    code,
                     quantity=name,
-                    message=f"{getattr(self, name)!r} is out of range",
-                    remedy_text=remedy,
+                    value=getattr(self, name),
+                    least_window=LEAST_WINDOW,
+                    longest_run=LONGEST_RUN,
                 )
 
     @cached_property

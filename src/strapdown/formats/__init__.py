@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from strapdown.errors import ConfigError, DataError, StrapdownError, nearest
+from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.formats import (
     asl,
     broad,
@@ -112,13 +112,13 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
         It is of no known format, or it is damaged.
     """
     if not path.exists():
-        raise ConfigError("io.no-such-file-or-folder", file=str(path))
+        raise ConfigError("io.no-such-log", file=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise DataError("io.file-empty", file=path.name)
     if form is not None:
         if form not in READERS:
             raise ConfigError(
-                "io.no-format-log", quantity="format", form=form, word=form, known=READERS
+                "io.unknown-format-of-log", quantity="format", form=form, word=form, known=READERS
             )
         return READERS[form].read(path)
     for reader in READERS.values():
@@ -148,11 +148,11 @@ def _no_recording(path: Path) -> DataError:
             "io.folder-no-known-recording-holds", file=path.resolve().name, names=names or "nothing"
         )
     return DataError(
-        "io.message",
+        "io.folder-of-one-recording" if len(logs) == 1 else "io.folder-of-recordings",
         file=path.resolve().name,
-        message="the folder is no recording by itself; "
-        + (f"it holds one: {names}" if len(logs) == 1 else f"it holds {len(logs)}: {names}"),
-        remedy_text=f"give {('it' if len(logs) == 1 else 'one of them')}: {path / logs[0]}",
+        count=len(logs),
+        names=names,
+        path=path / logs[0],
     )
 
 

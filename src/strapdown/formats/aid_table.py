@@ -105,7 +105,7 @@ def read_aid_table(
             "io.missing-columns",
             file=raw.name,
             missing=missing,
-            columns=raw.columns,
+            columns=list(raw.columns),
             needed=needed,
             missing_2=missing[0],
         )
@@ -117,7 +117,7 @@ def read_aid_table(
         if name in values and UNITS[unit] and not found[name].stated:
             findings.append(
                 Finding(
-                    "io.no-unit-stated-taken",
+                    "io.unit-assumed",
                     file=raw.name,
                     quantity=name,
                     severity="note",
@@ -141,7 +141,7 @@ def _raw(path: Path) -> RawLog:
         raise ConfigError("io.no-such-file", file=str(path))
     if path.is_dir() or not (csv.detect(path) or parquet.detect(path)):
         raise DataError(
-            "io.folder" if path.is_dir() else "io.ending-no-table",
+            "io.folder" if path.is_dir() else "io.aid-file-ending",
             file=path.resolve().name,
             suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
             suffix=path.suffix,
@@ -181,17 +181,17 @@ def _usable(
     keep = np.ones(time.size, dtype=bool)
     for name, block in {"time": time, **values}.items():
         bad = ~np.isfinite(block)
-        what = "it is no number"
+        code = "io.aid-no-number"
         if name.endswith(_SD) and not bad.any():
-            bad, what = ~(block > 0.0), "it is no standard deviation: it is not positive"
-        _refuse_or_say(raw, name, bad, what, repair, findings)
+            bad, code = ~(block > 0.0), "io.aid-sd-not-positive"
+        _refuse_or_say(raw, name, bad, code, repair, findings)
         keep &= ~bad
     latest = np.maximum.accumulate(np.where(keep, time, -np.inf))
     late = keep & np.concatenate([[False], time[1:] <= latest[:-1]])
-    _refuse_or_say(raw, "time", late, "it is not later than every row before", repair, findings)
+    _refuse_or_say(raw, "time", late, "io.aid-not-later", repair, findings)
     keep &= ~late
     if not keep.any():
-        raise DataError("io.no-row-can-used", file=raw.name)
+        raise DataError("io.no-usable-row", file=raw.name)
     return keep
 
 
@@ -199,24 +199,23 @@ def _refuse_or_say(
     raw: RawLog,
     name: str,
     bad: NDArray[np.bool_],
-    what: str,
+    code: str,
     repair: bool,
     findings: list[Finding],
 ) -> None:
     rows = np.flatnonzero(bad)
     if not rows.size:
         return
-    more = f"{what} ({rows.size} such row{'s' if rows.size > 1 else ''} in all)"
-    row = raw.row(int(rows[0]))
+    fault = Finding(code, file=raw.name, row=raw.row(int(rows[0])), quantity=name, count=rows.size)
     if not repair:
-        raise DataError(
-            "io.message",
-            file=raw.name,
-            row=row,
-            quantity=name,
-            message=more,
-            remedy_text="correct or delete such rows, or leave them out with repair",
-        )
+        raise DataError(fault)
     findings.append(
-        Finding("io.left-out", file=raw.name, row=row, quantity=name, severity="note", more=more)
+        Finding(
+            "io.left-out",
+            file=fault.file,
+            row=fault.row,
+            quantity=name,
+            severity="note",
+            reason=fault,
+        )
     )

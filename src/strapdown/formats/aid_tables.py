@@ -101,13 +101,7 @@ def _made(raw: RawLog, units: Mapping[str, str], made: Made) -> pd.DataFrame:
         return made(found["time"], *(found[name] for name in names), source=raw.name)
     except DataError as error:
         # A table counts its rows; a person, those of the file.
-        told = error.finding
-        row = None if told.row is None else raw.row(told.row - 1)
+        row = error.finding.row
         raise DataError(
-            "io.message",
-            file=raw.name,
-            row=row,
-            quantity=told.quantity,
-            message=told.what,
-            remedy_text=told.remedy,
+            error.finding, file=raw.name, row=None if row is None else raw.row(row - 1)
         ) from None

@@ -74,7 +74,7 @@ def raw_log(
         columns |= _columns(name, np.squeeze(array))
     if not columns:
         raise DataError(
-            "io.no-array-numbers-holds",
+            "io.no-array-of-numbers",
             file=path.name,
             arrays=", ".join([*arrays, *meta]) or "nothing",
         )

@@ -195,13 +195,14 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
         mean = rotation.rotate(q_ns[at], force[at]).mean(axis=0)
         tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[1]), -mean[2])))
     if not tilt <= MOST_TILT:
-        why = (
-            f"specific force, turned into its world, leans by {tilt:.3g}° from its z on average"
-            if at.any()
-            else "none of its poses is near a sample"
-        )
         findings.append(
-            Finding("io.left-out-2", file=known.name, quantity="attitude", severity="note", why=why)
+            Finding(
+                "io.left-out-attitude-leans" if at.any() else "io.left-out-attitude-far",
+                file=known.name,
+                quantity="attitude",
+                severity="note",
+                tilt_deg=tilt,
+            )
         )
         return dataclasses.replace(raw, findings=findings)
     findings.append(

@@ -64,7 +64,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     time = stamps.seconds[stamps.keep]
     if time.size < 2:
         raise DataError(
-            "io.usable-sample-attitude-integral-rate",
+            "io.too-few-samples",
             file=raw.name,
             quantity="time",
             size=time.size,

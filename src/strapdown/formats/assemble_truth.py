@@ -140,12 +140,11 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
             raise
         # The options that would state it are those of the log.
         raise DataError(
-            "io.message",
+            "io.truth-time-unusable",
             file=raw.name,
             row=error.finding.row,
             quantity="time",
-            message=error.finding.what,
-            remedy_text="name its column with the unit of time, as in time_ms",
+            reason=error.finding,
         ) from None
     return attitude_table(stamps.seconds[stamps.keep], q[rows][stamps.keep], raw.name)
 
@@ -190,12 +189,17 @@ def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> 
     """An attitude of unknown frames, as a phone computes one, is no truth unless it is said."""
     if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
         findings.append(
-            Finding("io.also-holds-attitude-not-used", file=raw.name, quantity="attitude")
+            Finding(
+                "io.attitude-not-used",
+                severity="note",
+                file=raw.name,
+                quantity="attitude",
+            )
         )
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:
     """Quaternion ``q_sb`` from body axes to the axes in which the file has its truth."""
     if mirrored(*axes):
-        raise ConfigError("io.axes-stated-mirror-image-sensor", file=raw.name, quantity="--axes")
+        raise ConfigError("io.truth-axes-mirrored", file=raw.name, quantity="--axes")
     return rotation.quaternion_from_dcm(axes_matrix(*axes).T)

@@ -11,7 +11,7 @@ from strapdown.errors import Finding
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.find_columns import AXES
 from strapdown.formats.inference import Inference
-from strapdown.formats.judge import report_upside_down, told_of_up
+from strapdown.formats.judge import axes_against_gravity, report_upside_down
 from strapdown.formats.recording import RawLog, ReadOptions
 
 __all__ = ["Axes", "axes_matrix", "body_axes", "mirrored"]
@@ -54,20 +54,9 @@ def body_axes(
     """
     text = options.axes or raw.axes
     if text is None:
-        up = None if options.accel_unit else told_of_up(said)
-        what, remedy = up or (
-            "",
-            "state them with --axes, as in --axes x,-y,-z for forward, left, up",
-        )
-        findings.append(
-            Finding(
-                "io.message",
-                file=raw.name,
-                quantity="axes",
-                message=f"the sensor's x, y, z are taken as the body's forward, right, down: nothing says otherwise{what}",
-                remedy_text=remedy,
-            )
-        )
+        doubt = None if options.accel_unit else axes_against_gravity(said)
+        taken = doubt or Finding("io.axes-not-stated", severity="note")
+        findings.append(taken.replace(file=raw.name, quantity="axes"))
         return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are")
     axis, sign = parse_axes(text)
     if options.axes and not options.accel_unit:
@@ -76,7 +65,7 @@ def body_axes(
     if options.axes and mirrored(axis, sign):
         findings.append(
             Finding(
-                "io.axes-mirror-image-turns-no",
+                "io.axes-mirrored",
                 file=raw.name,
                 quantity="axes",
                 severity="note",

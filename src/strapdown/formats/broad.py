@@ -54,7 +54,7 @@ def read(path: Path) -> RawLog:
     wanted = {"imu_gyr": (samples, 3), "imu_acc": (samples, 3), "opt_quat": (samples, 4)}
     if samples < 2 or shapes != wanted or movement.shape != (samples,):
         raise DataError(
-            "io.imu-gyr-imu-acc-opt", file=path.name, values=shapes.values(), shape=movement.shape
+            "io.broad-shapes", file=path.name, values=shapes.values(), shape=movement.shape
         )
     sensors = {"imu_gyr": ("gyro", "rad/s"), "imu_acc": ("accel", "m/s2")}
     # The magnetometer runs slower than the gyro in some exports; only one on its stamps is read.

@@ -232,21 +232,21 @@ def on_clock_of(
     time = table.index.to_numpy(dtype=np.float64)
     absolute = time + own.origin
     if own.name == other.name == UNIX:
-        shift, why = own.origin - other.origin, "both clocks count from 1970"
+        shift, code = own.origin - other.origin, "io.time-from-1970-shifted"
     elif own.name == other.name:
         weeks = 0.0 if None in (own.week, other.week) else WEEK * (own.week - other.week)  # type: ignore[operator]
-        shift, why = own.origin - other.origin + weeks, "both clocks are seconds of GPS weeks"
+        shift, code = own.origin - other.origin + weeks, "io.time-of-gps-week-shifted"
     else:
         if own.name == UNIX:
             gps = gps_from_unix(absolute[:1])[0]
             week = other.week if other.week is not None else int(gps // WEEK)
             shift = float(gps - WEEK * week) - time[0] - other.origin
         elif own.week is None:
-            raise DataError("io.time-seconds-gps-week-not", file=file, quantity="time")
+            raise DataError("io.gps-week-not-stated", file=file, quantity="time")
         else:
             unix = unix_from_gps(absolute[:1] + WEEK * own.week)[0]
             shift = float(unix) - time[0] - other.origin
-        why = "GPS time is ahead of UTC by the leap seconds"
+        code = "io.time-shifted-by-leap-seconds"
     if shift == 0.0:
         return table, None
     out = table.copy()
@@ -254,10 +254,9 @@ def on_clock_of(
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
     out.attrs["gps_week"] = other.week
     return out, Finding(
-        "io.added-time-counts-inertial-sensors",
+        code,
         file=file,
         quantity="time",
         severity="note",
         shift=shift,
-        why=why,
     )

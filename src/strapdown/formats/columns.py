@@ -268,7 +268,11 @@ def parse_column_option(items: list[str]) -> dict[str, str]:
             raise ConfigError("io.no-form-understood", quantity="--columns", item=item)
         if quantity not in known:
             raise ConfigError(
-                "io.no-quantity", quantity="--columns", of_what=quantity, word=quantity, known=known
+                "io.unknown-quantity",
+                quantity="--columns",
+                of_what=quantity,
+                word=quantity,
+                known=known,
             )
         out[quantity] = column
     return out
@@ -301,7 +305,7 @@ def parse_axes(text: str) -> tuple[list[int], list[float]]:
     if sorted(names) != ["x", "y", "z"] or any(
         len(p) - len(n) > 1 for p, n in zip(parts, names, strict=True)
     ):
-        raise ConfigError("io.does-not-name-three-axes", quantity="--axes", text=text)
+        raise ConfigError("io.axes-not-three", quantity="--axes", text=text)
     return [_AXES.index(n) for n in names], [-1.0 if p.startswith("-") else 1.0 for p in parts]
 
 
@@ -312,6 +316,6 @@ def _directions(text: str) -> tuple[list[int], list[float]] | None:
         return None
     said = [_DIRECTIONS[w] for w in words]
     if sorted(body for body, _ in said) != [0, 1, 2]:
-        raise ConfigError("io.names-direction-twice", quantity="--axes", text=text)
+        raise ConfigError("io.axes-name-direction-twice", quantity="--axes", text=text)
     axis = [next(k for k, (body, _) in enumerate(said) if body == b) for b in range(3)]
     return axis, [said[k][1] for k in axis]

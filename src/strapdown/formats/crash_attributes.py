@@ -67,38 +67,39 @@ def check_attributes(said: object, file: str, row: int | None = None) -> dict[st
         It is of another form.
     """
     if not isinstance(said, Mapping):
-        raise _bad("a channel", "is no table of keys", file, row)
+        raise _bad("a channel", "io.channel-no-table", file, row)
     texts = {}
     for key in _TEXTS:
         value = said.get(key, "")
         if not isinstance(value, str):
-            raise _bad(key, f"is no text ({str(value)[:40]})", file, row)
+            raise _bad(key, "io.channel-no-text", file, row, value=str(value)[:40])
         texts[key] = clean(value, LONGEST_NAME) if key in ("name", "unit") else clean(value)
     numbers = {}
     for key in _NUMBERS:
         value = said.get(key)
         number = isinstance(value, int | float) and not isinstance(value, bool)
         if value is not None and not (number and math.isfinite(value)):
-            raise _bad(key, f"is no number ({str(value)[:40]})", file, row)
+            raise _bad(key, "io.channel-no-number", file, row, value=str(value)[:40])
         numbers[key] = None if value is None else float(value)
     for key, known in (("quantity", tuple(QUANTITIES)), ("axis", _AXES)):
         if texts[key] not in known:
             raise DataError(
-                "io.no",
+                "io.channel-unknown-word",
                 file=file,
                 row=row,
                 quantity=key,
-                texts=texts[key],
                 key=key,
                 word=texts[key],
                 known=known,
             )
     remarks = said.get("remarks", [])
     if not isinstance(remarks, list) or not all(isinstance(r, str) for r in remarks):
-        raise _bad("remarks", "are no list of texts", file, row)
+        raise _bad("remarks", "io.channel-remarks-no-texts", file, row)
     sampling = said.get("sampling")
     if sampling not in (None, *SAMPLINGS):
-        raise _bad("sampling", f"is '{str(sampling)[:40]}'", file, row)
+        raise _bad(
+            "sampling", "io.channel-sampling", file, row, value=str(sampling)[:40], known=SAMPLINGS
+        )
     return {
         **texts,
         **numbers,
@@ -107,5 +108,5 @@ def check_attributes(said: object, file: str, row: int | None = None) -> dict[st
     }
 
 
-def _bad(key: str, what: str, file: str, row: int | None) -> DataError:
-    return DataError("io.key-what", file=file, row=row, quantity=key, key=key, what=what)
+def _bad(key: str, code: str, file: str, row: int | None, **data: Any) -> DataError:
+    return DataError(code, file=file, row=row, quantity=key, key=key, **data)

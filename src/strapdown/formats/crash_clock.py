@@ -52,7 +52,7 @@ def triad_stamps(
         Nothing tells the stamps, or time does not advance.
     """
     if rate_hz is not None and not (math.isfinite(rate_hz) and rate_hz > 0.0):
-        raise ConfigError("io.hz-no-rate", quantity="rate_hz", rate_hz=rate_hz)
+        raise ConfigError("io.crash-rate-not-positive", quantity="rate_hz", rate_hz=rate_hz)
     if time is None and time_unit is None and rate_hz is None:
         stamps, values = channel.load()
         _check_advances(channel, stamps)
@@ -197,6 +197,6 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
             file=channel.file or None,
             row=channel.row(k),
             quantity=f"time of channel {channel.name}",
-            stamps=stamps[k - 1],
-            stamps_2=stamps[k],
+            stamps=stamps[k - 1] if bad.size else None,
+            stamps_2=stamps[k] if bad.size else None,
         )

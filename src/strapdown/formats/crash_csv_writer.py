@@ -55,7 +55,7 @@ def write_crash_csv(path: str | Path, record: CrashRecord) -> tuple[Path, ...]:
         stamps[key] = time
         groups.setdefault(key, []).append((attributes_of(channel), values))
     if not groups:
-        raise DataError("io.no-channel", file=record.path.name)
+        raise DataError("io.record-without-channels", file=record.path.name)
     first = Path(path)
     paths = []
     for k, (key, members) in enumerate(groups.items(), start=1):

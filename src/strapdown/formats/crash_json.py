@@ -105,7 +105,7 @@ def read(path: Path) -> CrashRecord:
     ]
     for k, clock in enumerate(stamps):
         if clock.size and not (np.isfinite(clock).all() and (np.diff(clock) > 0.0).all()):
-            raise _form(path, f"stamps_s {k}", "io.do-not-advance")
+            raise _form(path, f"stamps_s {k}", "io.crash-json-stamps-do-not-advance")
     said = _list(whole, "channels", path)
     attributes = [check_attributes(s, path.name) for s in said]
     names = unique([a["name"] or f"channel {k + 1}" for k, a in enumerate(attributes)])
@@ -113,13 +113,13 @@ def read(path: Path) -> CrashRecord:
     for k, (one, raw) in enumerate(zip(attributes, said, strict=True)):
         at = raw.get("stamps")
         if not isinstance(at, int) or isinstance(at, bool) or not 0 <= at < len(stamps):
-            raise _form(path, f"channel {names[k]}", "io.names-stamps-not", at=at)
+            raise _form(path, f"channel {names[k]}", "io.crash-json-no-such-stamps", at=at)
         values = _numbers(raw.get("values"), path, f"channel {names[k]}")
         if values.size != stamps[at].size or not values.size:
             raise _form(
                 path,
                 f"channel {names[k]}",
-                "io.values-stamps",
+                "io.crash-json-count-of-stamps",
                 size=values.size,
                 size_2=stamps[at].size,
             )
@@ -129,7 +129,7 @@ def read(path: Path) -> CrashRecord:
         )
     facts = whole.get("facts", {})
     if not isinstance(facts, dict):
-        raise _form(path, "facts", "io.no-table-keys")
+        raise _form(path, "facts", "io.crash-json-no-table")
     title = whole.get("title", "")
     return CrashRecord(
         path=path,
@@ -148,7 +148,7 @@ def _loader(time: Array, values: Array) -> Callable[[], tuple[Array, Array]]:
 def _parsed(path: Path) -> dict[str, Any]:
     size = path.stat().st_size
     if size > LARGEST:
-        raise _form(path, "the file", "io.bytes-more-than-record", size=size)
+        raise _form(path, "the file", "io.crash-json-too-large", size=size)
     try:
         whole = json.loads(path.read_bytes().decode("utf-8-sig"))
     except json.JSONDecodeError as error:
@@ -160,39 +160,39 @@ def _parsed(path: Path) -> dict[str, Any]:
             msg=error.msg,
         ) from None
     except (UnicodeDecodeError, RecursionError, ValueError):
-        raise _form(path, "the file", "io.no-json-record") from None
+        raise _form(path, "the file", "io.crash-json-no-record") from None
     if not isinstance(whole, dict) or whole.get("format") != FORMAT:
-        raise _form(path, "format", "io.not-strapdown-crash-record")
+        raise _form(path, "format", "io.crash-json-other-format")
     if whole.get("version") != VERSION:
-        raise _form(path, "version", "io.read", get=str(whole.get("version"))[:40], version=VERSION)
+        raise _form(
+            path,
+            "version",
+            "io.crash-json-other-version",
+            get=str(whole.get("version"))[:40],
+            version=VERSION,
+        )
     return whole
 
 
 def _list(whole: dict[str, Any], key: str, path: Path) -> list[Any]:
     found = whole.get(key)
     if not isinstance(found, list) or not found:
-        raise _form(path, key, "io.no-list-or-empty")
+        raise _form(path, key, "io.crash-json-no-list")
     return found
 
 
 def _numbers(values: object, path: Path, quantity: str) -> Array:
     if not isinstance(values, list):
-        raise _form(path, quantity, "io.no-list-numbers")
+        raise _form(path, quantity, "io.crash-json-no-numbers")
     plain = [float("nan") if v is None else v for v in values]
     for k, v in enumerate(plain):
         if isinstance(v, bool) or not isinstance(v, int | float) or abs(v) == float("inf"):
-            raise _form(path, quantity, "io.no-number-sample", k=k + 1, v=str(v)[:40])
+            raise _form(path, quantity, "io.crash-json-no-number", k=k + 1, v=str(v)[:40])
     try:
         return np.array(plain, dtype=np.float64)
     except OverflowError:
-        raise _form(path, quantity, "io.number-too-large") from None
+        raise _form(path, quantity, "io.crash-json-too-large-number") from None
 
 
-def _form(path: Path, quantity: str, what: str) -> DataError:
-    return DataError(
-        "io.message",
-        file=path.name,
-        quantity=quantity,
-        message=f"it {what}" if not what.startswith("it ") else what,
-        remedy_text="write the record again, or give it as CSV or ISO MME",
-    )
+def _form(path: Path, quantity: str, code: str, **data: Any) -> DataError:
+    return DataError(code, file=path.name, quantity=quantity, **data)

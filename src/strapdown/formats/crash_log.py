@@ -52,7 +52,7 @@ def read(path: Path) -> CrashRecord:
         if READERS[key].detect(path):
             return record_of(READERS[key].read(path), path, "log")
     raise DataError(
-        "io.none-these-formats",
+        "io.crash-log-format-unknown",
         file=path.name,
         quantity="format",
         logs=[READERS[key].title for key in LOGS],

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
 
 from strapdown.errors import DataError, Finding
@@ -57,6 +56,7 @@ def read(path: Path) -> CrashRecord:
         findings.append(
             Finding(
                 "io.listed-channels-not-folder",
+                severity="note",
                 file=index.name if index else head.name,
                 quantity="channels",
                 count=len(absent),
@@ -208,7 +208,16 @@ def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
                 value = header.number(key)
             except DataError as error:
                 # What the report could say of the vehicle is no reason to refuse its record.
-                findings.append(replace(error.finding, what=f"left out: {error.finding.what}"))
+                fault = error.finding
+                findings.append(
+                    Finding(
+                        "io.left-out-unusable",
+                        file=fault.file,
+                        row=fault.row,
+                        quantity=fault.quantity,
+                        reason=fault,
+                    )
+                )
                 continue
             if value is not None:
                 facts[name] = f"{value:.10g}"
@@ -223,7 +232,7 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
     if file.known is None:
         told.append(
             Finding(
-                "io.no-channel-code-sixteen-letters" if file.code else "io.no-channel-code",
+                "io.channel-code-malformed" if file.code else "io.channel-code-missing",
                 file=name,
                 row=file.header.line("channel code"),
                 quantity="channel code",

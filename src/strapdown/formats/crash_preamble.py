@@ -60,7 +60,7 @@ def read_text_table(
         )
     text, findings = csv.decoded(path.read_bytes(), path.name)
     if "\0" in text:
-        raise DataError("io.no-text-holds-zero-bytes", file=path.name)
+        raise DataError("io.crash-table-with-zero-bytes", file=path.name)
     lines = text.splitlines()
     header, units_at, units = _header(lines)
     remarks = _remarks(lines, header)
@@ -123,11 +123,15 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
             column = int(said["column"])
             notes[names[column - 1]] = checked
         except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
-            told = (
-                error.finding.what if isinstance(error, DataError) else "no channel is read in it"
-            )
+            reason = error.finding if isinstance(error, DataError) else None
             raw.findings.append(
-                Finding("io.comment-left-out", file=raw.name, row=row, severity="note", told=told)
+                Finding(
+                    "io.comment-of-no-channel" if reason is None else "io.comment-left-out",
+                    file=raw.name,
+                    row=row,
+                    severity="note",
+                    reason=reason,
+                )
             )
     return notes
 

@@ -138,7 +138,7 @@ class CrashRecord:
             if channel.name == name:
                 return channel
         raise DataError(
-            "io.no-channel-2",
+            "io.no-such-channel",
             file=self.path.name,
             quantity="channel",
             name=name,

@@ -19,8 +19,23 @@ __all__ = ["CRASH_READERS", "CrashReader", "read_crash_record"]
 SPREADSHEETS = (".xlsx", ".xls", ".xlsm", ".ods", ".numbers")
 # Names of a folder that are looked through for one that is near.
 MOST_NAMES = 10_000
-# What readers of logs say of a row.
-CORRECT = "correct or delete that row"
+# Faults of a row that is corrected in a copy: the record itself is evidence.
+ROW_FAULTS = frozenset(
+    {
+        "io.fields-expected",
+        "io.csv-field-count",
+        "io.first-or-last-stamp-missing",
+        "io.no-stamp-such",
+        "io.no-whole-number-nanoseconds",
+        "io.not-date-time-like-those",
+        "io.text-not-a-number",
+        "io.not-stamp-blocks-id-values",
+        "io.numbers-every-sample",
+        "io.time-no-date-since-no",
+    }
+)
+# Faults whose remedies are options of the command that reads logs for their attitude.
+OPTION_FAULTS = frozenset({"io.value-not-a-number"})
 
 
 @dataclass(frozen=True)
@@ -87,37 +102,31 @@ def read_crash_record(
     file = Path(path)
     if format is not None and format not in CRASH_READERS:
         raise ConfigError(
-            "io.no-reader", quantity="format", format=format, word=format, known=CRASH_READERS
+            "io.unknown-reader", quantity="format", format=format, word=format, known=CRASH_READERS
         )
     try:
         # Messages name a record by the last part of its path, which "." does not have.
         return _read(file if file.name not in ("", "..") else file.resolve(), format)
     except DataError as error:
         found = error.finding
-        if found.remedy == CORRECT:
-            raise DataError(
-                "io.message",
-                file=found.file,
-                row=found.row,
-                quantity=found.quantity,
-                message=found.what,
-                remedy_text=f"{CORRECT} in a copy, and name the copy; the record itself stays as it is",
-            ) from error
-        # Options of the command that reads logs for their attitude.
-        if "--" not in f"{found.remedy}{found.quantity}":
+        at_option = str(found.quantity).startswith("--")
+        if found.code in ROW_FAULTS:
+            code = "io.crash-row"
+        elif found.code in OPTION_FAULTS or at_option:
+            code = "io.crash-record-unusable"
+        else:
             raise
         raise DataError(
-            "io.message",
+            code,
             file=found.file,
             row=found.row,
-            quantity=None if "--" in str(found.quantity) else found.quantity,
-            message=found.what,
-            remedy_text="correct a copy of it, or give the record as CSV with a column a channel",
+            quantity=None if at_option else found.quantity,
+            reason=found,
         ) from error
     except (OSError, ValueError) as error:
         # A name that no file can have, a file that may not be read, a link that leads in a ring.
         raise DataError(
-            "io.cannot-read",
+            "io.crash-record-unreadable",
             file=clean(file.name),
             name=type(error).__name__,
             clean=clean(str(error), 200),
@@ -135,9 +144,9 @@ def _read(file: Path, form: str | None) -> CrashRecord:
     if not file.exists():
         near = difflib.get_close_matches(file.name, _names_beside(file), n=1)
         raise ConfigError(
-            "io.no-such-file-or-folder-2" if near else "io.no-such-file-or-folder-3",
+            "io.no-such-record-but-near" if near else "io.no-such-record",
             file=clean(str(file)),
-            clean=clean(near[0]),
+            clean=clean(near[0]) if near else "",
         )
     if file.suffix.lower() in SPREADSHEETS and file.is_file():
         raise DataError("io.spreadsheet", file=file.name)

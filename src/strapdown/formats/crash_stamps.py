@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding
 from strapdown.formats.inference.clock import infer_time_unit
-from strapdown.formats.judge import not_told
+from strapdown.formats.judge import what_numbers_say
 from strapdown.formats.stamps import EPOCH
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
         k = int(back[0])
         same = ticks[k] == ticks[k + 1]
         raise DataError(
-            "io.stamp-repeats-row-before" if same else "io.time-goes-back",
+            "io.crash-stamp-repeated" if same else "io.time-goes-back-in-record",
             file=clock.file,
             row=clock.row(k + 1),
             quantity=f"time ({clock.name})",
@@ -100,7 +100,7 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     midnight = last_midnight(stamps[0].item(), factor)
     findings.append(
         Finding(
-            "io.stamps-count-distant-origin-time",
+            "io.crash-time-from-midnight",
             file=clock.file,
             quantity=f"time ({clock.name})",
             severity="note",
@@ -127,21 +127,8 @@ def last_midnight(stamp: float, factor: float) -> float:
 
 def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str:
     said = infer_time_unit(stamps)
+    where = {"file": clock.file, "quantity": f"time ({clock.name})"}
     if said.settled:
-        findings.append(
-            Finding(
-                "io.message",
-                file=clock.file,
-                quantity=f"time ({clock.name})",
-                message=str(said),
-                remedy_text='if not, state it, as in time_unit = "ms"',
-            )
-        )
+        findings.append(said.finding("io.crash-time-unit-inferred", **where))
         return str(said.value)
-    raise DataError(
-        "io.message",
-        file=clock.file,
-        quantity=f"time ({clock.name})",
-        message=not_told(said),
-        remedy_text='state it, as in time_unit = "ms"',
-    )
+    raise DataError("io.crash-time-unit-undecided", **where, **what_numbers_say(said))

@@ -105,7 +105,7 @@ def record_of(
             Finding("io.columns-text-left-out", file=raw.name, severity="note", value_shown=shown)
         )
     if not kept:
-        raise DataError("io.no-column-holds-numbers", file=raw.name)
+        raise DataError("io.no-numeric-column", file=raw.name)
     notes = notes or {}
     names = unique(
         [
@@ -201,7 +201,11 @@ def _clock(
     if _advances(raw.columns[first]) and said[first].quantity == "other" and len(said) > 1:
         findings.append(
             Finding(
-                "io.advances-evenly-taken-time", file=raw.name, quantity="time", names=names[first]
+                "io.advances-evenly-taken-time",
+                severity="note",
+                file=raw.name,
+                quantity="time",
+                names=names[first],
             )
         )
         return first
@@ -296,12 +300,11 @@ def _retold(read: Callable[[], T]) -> T:
     except DataError as error:
         found = error.finding
         raise DataError(
-            "io.message",
+            "io.crash-channel-unusable",
             file=found.file,
             row=found.row,
             quantity=found.quantity,
-            message=found.what,
-            remedy_text="correct or delete that row, or name another channel",
+            reason=found,
         ) from None
 
 
@@ -311,7 +314,7 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
             if raw.rate:
                 count = len(next(iter(raw.columns.values())))
                 return np.arange(count, dtype=np.float64) / raw.rate
-            raise DataError("io.no-column-known-hold-time", file=raw.name, quantity="time")
+            raise DataError("io.crash-time-column-missing", file=raw.name, quantity="time")
         stamps, dated = _ticks(raw, clock)
         unit = "ns" if dated else stated
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]

@@ -91,7 +91,7 @@ def triad_of_channels(
     """
     if quantity not in _COLUMNS:
         raise ConfigError(
-            "io.no-triad", quantity="quantity", of_what=quantity, word=quantity, known=_COLUMNS
+            "io.unknown-triad", quantity="quantity", of_what=quantity, word=quantity, known=_COLUMNS
         )
     findings: list[Finding] = []
     chosen = _chosen(record, channels, findings)
@@ -129,10 +129,10 @@ def _chosen(
     wrong = [a for a in channels if a not in _AXES]
     if wrong or not channels:
         raise ConfigError(
-            "io.no-axis" if wrong else "io.no-axis-named",
+            "io.triad-axis-unknown" if wrong else "io.triad-without-axes",
             file=record.path.name,
             quantity="channels",
-            wrong=wrong[0],
+            wrong=wrong[:1],
         )
     out: dict[str, tuple[CrashChannel, float]] = {}
     for axis in _AXES:
@@ -184,7 +184,7 @@ def _check_quantity(
     unit = f" in {channel.unit}" if channel.unit else ""
     others = [c.name for c in record.channels if c.quantity in fits]
     raise DataError(
-        "io.holds-needed" if others else "io.holds-needed-2",
+        "io.channel-of-other-quantity" if others else "io.channel-of-unstated-quantity",
         file=channel.file or record.path.name,
         quantity=f"channel {channel.name}",
         of_what=channel.quantity if channel.quantity != "other" else "something",
@@ -211,12 +211,10 @@ def _as_mean(
     from_zero = starts_at_zero(stamps, channel)
     findings.append(
         Finding(
-            "io.message",
+            "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
             file=channel.file or None,
             quantity=f"channel {channel.name}",
-            message="changes of velocity are turned into mean accelerations over each interval"
-            + (", the first from time zero" if from_zero else ""),
-            remedy_text="if it holds the change of each sample alone, add them up first",
+            severity="note",
         )
     )
     return mean_accelerations_of(stamps, values, from_zero=from_zero)
@@ -225,7 +223,9 @@ def _as_mean(
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:
     if not values.size:
         raise DataError(
-            "io.no-samples", file=channel.file or None, quantity=f"channel {channel.name}"
+            "io.channel-without-samples",
+            file=channel.file or None,
+            quantity=f"channel {channel.name}",
         )
     there = np.flatnonzero(np.isfinite(values))
     endless = np.flatnonzero(np.isinf(values))
@@ -258,21 +258,29 @@ def _sampling(
 ) -> str:
     if stated is not None and stated not in SAMPLINGS:
         raise ConfigError(
-            "io.no-kind-sampling", quantity="sampling", stated=stated, word=stated, known=SAMPLINGS
+            "io.triad-sampling-unknown",
+            quantity="sampling",
+            stated=stated,
+            word=stated,
+            known=SAMPLINGS,
         )
     kinds = {"mean" if p.mean else p.channel.sampling for p in parts} - {None}
     if len(kinds) > 1 or (stated and kinds and stated not in kinds):
-        said = " and ".join(sorted(str(k) for k in kinds))
         raise ConfigError(
-            "io.record-samples-asked" if stated else "io.record-samples-asked-2",
+            "io.sampling-contradicts-record" if stated else "io.sampling-of-axes-differs",
             file=record.path.name,
             quantity="sampling",
-            said=said,
-            stated=stated or "one kind",
+            kinds=sorted(str(k) for k in kinds),
+            stated=stated,
         )
     if not kinds and stated is None:
         findings.append(
-            Finding("io.nothing-says-sample-mean-over", file=record.path.name, quantity="sampling")
+            Finding(
+                "io.crash-sampling-taken-as-instantaneous",
+                severity="note",
+                file=record.path.name,
+                quantity="sampling",
+            )
         )
     return stated or (str(kinds.pop()) if kinds else "instantaneous")
 

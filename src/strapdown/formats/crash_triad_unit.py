@@ -11,7 +11,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_units import FACTORS, factor_of, state_unit
 from strapdown.formats.inference import Signals, infer_signals
-from strapdown.formats.judge import not_told
+from strapdown.formats.judge import what_numbers_say
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def triad_factor(
             other = axes[next(iter(own))][0].name
             findings.append(
                 Finding(
-                    "io.no-unit-taken",
+                    "io.unit-taken-from-other-axis",
                     file=record.path.name,
                     quantity="unit",
                     without=without,
@@ -137,31 +137,34 @@ def _evident(
         unit, form = said.get(f"{triad}_unit"), said.get(f"{triad}_form")
         if unit is not None and unit.settled and (form is None or form.value == "rate"):
             findings.append(
-                Finding(
-                    "io.message",
+                unit.finding(
+                    "io.crash-unit-inferred",
                     file=record.path.name,
                     quantity=f"unit of {names}",
-                    message=str(unit),
-                    remedy_text=f'if not, state it, as in unit = "{unit.value}"',
                 )
             )
             return str(unit.value)
     raise DataError(
-        "io.message",
+        "io.crash-unit-not-stated" if unit is None else "io.crash-unit-undecided",
         file=record.path.name,
         quantity=names,
-        message=not_told(unit),
-        remedy_text=_choices(block, quantity),
+        choices=_choices(block, quantity),
+        **what_numbers_say(unit),
     )
 
 
-def _choices(block: list[Array], quantity: str) -> str:
+def _choices(block: list[Array], quantity: str) -> list[Finding]:
+    """The units that it may have, with the largest value in each."""
     largest = max(float(np.nanmax(np.abs(b), initial=0.0)) for b in block)
-    si = QUANTITIES[quantity]
     units = _CHOICES.get(quantity, tuple(FACTORS[quantity])[:3])
-    told = " or ".join(
-        f'unit = "{u}" (the largest value, {largest:.4g}, is then '
-        f"{largest * FACTORS[quantity][u]:.4g} {si})"
-        for u in units
-    )
-    return f"write {told}"
+    return [
+        Finding(
+            "io.crash-choice-of-unit",
+            severity="note",
+            unit=unit,
+            largest=largest,
+            value=largest * FACTORS[quantity][unit],
+            si=QUANTITIES[quantity],
+        )
+        for unit in units
+    ]

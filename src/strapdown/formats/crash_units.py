@@ -96,13 +96,11 @@ def state_unit(text: str, quantity: str, key: str = "unit") -> str:
         return text
     found = unit_of(text)
     if found is None or found[0] != quantity:
-        what = f"is a unit of {found[0]}" if found else "is no unit that is known"
         raise ConfigError(
-            "io.needed",
+            "io.crash-unit-of-other-quantity" if found else "io.crash-unit-unknown",
             quantity=key,
-            text=text,
-            what=what,
-            of_what=quantity,
+            is_of=found[0] if found else None,
+            needed=quantity,
             word=text,
             known=known,
         )

@@ -53,7 +53,7 @@ def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
             file=channel.file or None,
             row=channel.row(k) if k is not None else None,
             quantity=channel.name,
-            velocity=velocity[k],
+            velocity=velocity[k] if k is not None else None,
         )
     return mean_accelerations_of(time, velocity, from_zero=starts_at_zero(time, channel))
 

@@ -118,7 +118,7 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
     top = _top(numbered, comments)
     if not top.data:
-        raise DataError("io.header-no-data-under", file=name, row=numbered[0][0])
+        raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
     rows, lines = _whole_lines(top.data, len(top.names), top.separator, text, name, findings)
     columns = _parse(lines, len(top.names), top.separator, name)
     return _log(name, files, top, columns, np.array(rows), comments, findings)
@@ -188,13 +188,12 @@ def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace"), []
     if b"\0" in data[:4096]:
-        raise DataError("io.no-text-holds-zero-bytes-2", file=name)
+        raise DataError("io.text-with-zero-bytes", file=name)
     try:
         return data.decode("utf-8-sig"), []
     except UnicodeDecodeError as error:
-        what = f"byte {error.start} is not UTF-8; read as Windows-1252"
         return data.decode("cp1252", "replace"), [
-            Finding("io.message-2", file=name, severity="note", message=what)
+            Finding("io.not-utf-8", file=name, severity="note", byte=error.start)
         ]
 
 
@@ -273,7 +272,9 @@ def _whole_lines(
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
         if last and k and _was_cut(line, numbered[max(0, k - 20) : k], width, separator, ended):
-            findings.append(Finding("io.last-line-cut-left-out", file=name, row=row))
+            findings.append(
+                Finding("io.last-line-cut-left-out", severity="note", file=name, row=row)
+            )
             break
         count = _count(line, separator)
         if count == width + 1 and separator and line.rstrip().endswith(separator):
@@ -284,7 +285,7 @@ def _whole_lines(
                 continue
             doubled = separator == "," and count >= 2 * width - 1 > 1
             raise DataError(
-                "io.fields-first-line" if doubled else "io.fields-first-line-2",
+                "io.csv-decimal-commas" if doubled else "io.csv-field-count",
                 file=name,
                 row=row,
                 count=count,
@@ -294,8 +295,16 @@ def _whole_lines(
         lines.append(line)
     if amid:
         row, line = amid[0]
-        what = f"comments among the rows, {len(amid)} in all, are not read: '{line.strip()[:60]}'"
-        findings.append(Finding("io.message-2", file=name, row=row, severity="note", message=what))
+        findings.append(
+            Finding(
+                "io.comments-among-rows",
+                file=name,
+                row=row,
+                severity="note",
+                count=len(amid),
+                first=line.strip()[:60],
+            )
+        )
     return rows, lines
 
 

@@ -57,7 +57,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
     for quantity, source in options.columns.items():
         if quantity not in QUANTITIES and quantity not in TRIADS:
             raise ConfigError(
-                "io.no-quantity",
+                "io.unknown-quantity",
                 quantity="--columns",
                 of_what=quantity,
                 word=quantity,
@@ -66,7 +66,7 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
         for q, name in _asked(raw, quantity, source):
             if name in asked.values():
                 raise ConfigError(
-                    "io.column-named-two-quantities",
+                    "io.column-named-twice",
                     file=raw.name,
                     quantity=f"--columns {q}",
                     name=name,
@@ -87,31 +87,31 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]
     if not missing:
         return
-    left_out = "".join(f"; {f.what}" for f in raw.findings if f.what.startswith("left out"))
     if raw.columns and all(name == f"column {k}" for k, name in enumerate(raw.columns, 1)):
-        _refuse_nameless(raw, left_out)
+        _refuse_nameless(raw)
+    left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
     raise DataError(
-        "io.no-column-recognised",
+        "io.no-gyro-columns-left-out" if left_out else "io.no-gyro-columns",
         file=raw.name,
         missing=missing,
-        columns=", ".join(raw.columns) or "none",
+        columns=list(raw.columns) or ["none"],
         left_out=left_out,
     )
 
 
-def _refuse_nameless(raw: RawLog, left_out: str) -> NoReturn:
+def _refuse_nameless(raw: RawLog) -> NoReturn:
     """Show what stands in columns without names, by which a person can tell them apart."""
-    first = ", ".join(f"{k}: {column[0]}" for k, column in enumerate(raw.columns.values(), 1))
+    example = "time=1,gyro_x=2,gyro_y=3,gyro_z=4"
+    if len(raw.columns) >= 7:
+        example += ",accel_x=5,accel_y=6,accel_z=7"
     # Increments of KF-GINS are the usual layout of seven.
-    seven = len(raw.columns) == 7
-    force = ",accel_x=5,accel_y=6,accel_z=7" if len(raw.columns) >= 7 else ""
     raise DataError(
-        "io.message",
+        "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
         file=raw.name,
         row=raw.row(0),
-        message=f"no column was recognised as gyro_x, gyro_y, gyro_z, for its {len(raw.columns)} columns have no names; the first row holds {first}{left_out}",
-        remedy_text=f"say which is which by these numbers, as in --columns time=1,gyro_x=2,gyro_y=3,gyro_z=4{force}, with their units (--gyro-unit, --accel-unit, --time-unit) where the numbers do not tell them"
-        + ("; or state the format, as in kf-gins for increments" if seven else ""),
+        count=len(raw.columns),
+        first=[f"{k}: {column[0]}" for k, column in enumerate(raw.columns.values(), 1)],
+        example=example,
     )
 
 
@@ -138,7 +138,7 @@ def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
             names = [n for n in names if not says_increment(n)] or names
         if len(names) > 1:
             raise ConfigError(
-                "io.columns-could",
+                "io.columns-ambiguous",
                 file=raw.name,
                 quantity=quantity,
                 count=len(names),
@@ -171,7 +171,7 @@ def _asked(raw: RawLog, quantity: str, source: str) -> list[tuple[str, str]]:
     elif source.isdecimal() and 1 <= int(source) <= len(names):
         return [(quantity, names[int(source) - 1])]
     raise ConfigError(
-        "io.no-column",
+        "io.no-such-column",
         file=raw.name,
         quantity=f"--columns {quantity}",
         source=source,
@@ -190,7 +190,7 @@ def _three_of(raw: RawLog, quantity: str, source: str) -> list[str]:
     width = _width(raw, base)
     if width > 3 and not index:
         raise ConfigError(
-            "io.columns",
+            "io.columns-of-array",
             file=raw.name,
             quantity=f"--columns {quantity}",
             source=source,

@@ -51,11 +51,11 @@ def _arrays(path: Path, *names: str) -> dict[str, Any]:
     for name in names:
         if name not in arrays:
             raise DataError(
-                "io.no-array-numbers-holds-2",
+                "io.no-such-array",
                 file=path.name,
                 quantity=name,
                 name=name,
-                arrays=arrays,
+                arrays=list(arrays),
             )
     return {name: arrays[name].astype(np.float64) for name in names}
 
@@ -137,7 +137,7 @@ def read_points(path: Path) -> tuple[Array, Array]:
     if not within.all():
         k = int(np.argmin(within))
         raise DataError(
-            "io.no-sample-counted-zero",
+            "io.control-point-outside",
             file=path.name,
             row=k + 1,
             quantity="strideIndex",

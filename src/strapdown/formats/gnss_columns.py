@@ -121,7 +121,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
             "io.missing-columns-2",
             file=raw.name,
             missing=missing,
-            columns=raw.columns,
+            columns=list(raw.columns),
             missing_2=missing[0],
         )
     if over_sea and "geoid" not in found:
@@ -193,7 +193,12 @@ def _velocity(raw: RawLog, velocity: Array | None) -> Array | None:
     words = [w for name in raw.columns for w in re.split(r"[^a-z]+", name.lower())]
     if velocity is None and {"speed", "sog"} & set(words) and {"course", "cog"} & set(words):
         raw.findings.append(
-            Finding("io.speed-course-not-used-nothing", file=raw.name, quantity=", ".join(VELOCITY))
+            Finding(
+                "io.speed-course-not-used-nothing",
+                severity="note",
+                file=raw.name,
+                quantity=", ".join(VELOCITY),
+            )
         )
     return velocity
 
@@ -230,6 +235,7 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     raw.findings.append(
         Finding(
             "io.column-taken-codes-rtklib-fix",
+            severity="note",
             file=raw.name,
             quantity="quality",
             source=found["Q"].source,

@@ -142,7 +142,7 @@ def _dated(t: Array, utc: Array, name: str, findings: list[Finding]) -> Array:
     late -= late.min()
     findings.append(
         Finding(
-            "io.each-fix-dated-utc-lies",
+            "io.comma2k19-fixes-dated-by-utc",
             file=name,
             quantity="time",
             late=late.max(),

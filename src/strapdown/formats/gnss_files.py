@@ -103,7 +103,7 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
         raise DataError("io.file-empty", file=path.name)
     if asked.format is not None and asked.format not in GNSS_READERS:
         raise ConfigError(
-            "io.no-format-fixes",
+            "io.unknown-format-of-fixes",
             quantity="format",
             format=asked.format,
             word=asked.format,

@@ -137,7 +137,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     time, keep = _time(fixes, options)
     keep &= _placed(fixes, quality, options)
     if not keep.any():
-        raise DataError("io.no-fix-can-used", file=fixes.name, quantity="lat, lon")
+        raise DataError("io.no-usable-fix", file=fixes.name, quantity="lat, lon")
     at = np.flatnonzero(keep)
     with told_by_file_rows(fixes.name, lambda row: int(fixes.rows[at[row]])):
         table = gnss_table(
@@ -170,12 +170,11 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
     bad = np.flatnonzero(~np.isfinite(time))
     if bad.size and not options.repair:
         raise DataError(
-            "io.stamp-no-number-such-row",
+            "io.fix-stamp-no-number",
             file=fixes.name,
             row=int(fixes.rows[bad[0]]),
             quantity="time",
-            size=bad.size,
-            value="s" if bad.size > 1 else "",
+            count=bad.size,
         )
     keep: NDArray[np.bool_] = np.isfinite(time)
     if fixes.clock.name in (GPS, RELATIVE):
@@ -186,7 +185,7 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
             row = int(fixes.rows[np.flatnonzero(keep)[weeks[0]]])
             fixes.findings.append(
                 Finding(
-                    "io.seconds-week-begin-again-they",
+                    "io.seconds-of-week-unrolled",
                     file=fixes.name,
                     row=row,
                     quantity="time",
@@ -200,17 +199,16 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
         k = int(late[0])
         same = there[k] == before[k]
         raise DataError(
-            "io.message",
+            "io.fix-stamp-repeated" if same else "io.fix-stamp-earlier",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity="time",
-            message=f"the stamp {time[k]:.12g} s "
-            + ("is that of a row before" if same else f"comes after {before[k]:.12g} s")
-            + f" ({late.size} such row{('s' if late.size > 1 else '')} in all)",
-            remedy_text="sort the rows by time, each instant once; repair leaves such rows out",
+            stamp=time[k],
+            before=before[k],
+            count=late.size,
         )
     keep = np.asarray(keep & (there > before))
-    _say_left_out(fixes, keep, "whose stamp is no number, or not later than every one before")
+    _say_left_out(fixes, keep, "io.fixes-out-of-time-left-out")
     return time, keep
 
 
@@ -222,29 +220,26 @@ def _placed(fixes: Fixes, quality: Array, options: GnssOptions) -> NDArray[np.bo
         k = int(bad[0])
         which = GEODETIC[int(np.argmin(np.isfinite(fixes.place[k])))]
         raise DataError(
-            "io.no-number-such-row-all",
+            "io.fix-value-no-number",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=which,
-            size=bad.size,
-            value="s" if bad.size > 1 else "",
+            count=bad.size,
         )
-    _say_left_out(fixes, there, "without a place")
+    _say_left_out(fixes, there, "io.fixes-without-position-left-out")
     return there
 
 
-def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], why: str) -> None:
+def _say_left_out(fixes: Fixes, keep: NDArray[np.bool_], code: str) -> None:
     out = np.flatnonzero(~keep)
     if out.size:
         fixes.findings.append(
             Finding(
-                "io.row-left-out",
+                code,
                 file=fixes.name,
                 row=int(fixes.rows[out[0]]),
                 severity="note",
-                size=out.size,
-                value="s" if out.size > 1 else "",
-                why=why,
+                count=out.size,
             )
         )
 
@@ -270,28 +265,25 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
         if what == "velocity":
             fixes.findings.append(
                 Finding(
-                    "io.velocities-without-standard-deviations-they",
+                    "io.velocity-sd-not-stated",
                     file=fixes.name,
                     quantity=", ".join(VELOCITY),
                 )
             )
             return np.full((count, 3), np.inf)
-        raise DataError(
-            "io.no-standard-deviations-places", file=fixes.name, quantity=", ".join(names)
-        )
+        raise DataError("io.position-sd-not-stated", file=fixes.name, quantity=", ".join(names))
     sd = np.where(np.isnan(stated), np.inf, stated)
     zero = sd == 0.0
     if fixes.zero_is_unknown and zero.any():
         rows = np.flatnonzero(zero.any(axis=1))
         fixes.findings.append(
             Finding(
-                "io.row-standard-deviation-zero-stands",
+                "io.sd-of-zero-unknown",
                 file=fixes.name,
                 row=int(fixes.rows[rows[0]]),
                 quantity=names[int(np.argmax(zero[rows[0]]))],
-                size=rows.size,
-                value="s" if rows.size > 1 else "",
-                what=what,
+                count=rows.size,
+                of=what,
             )
         )
         sd = np.where(zero, np.inf, sd)
@@ -299,12 +291,12 @@ def _sd(fixes: Fixes, what: str, asked: Sd | None, count: int) -> Array:
     if bad.size:
         k, j = (int(v) for v in bad[0])
         raise DataError(
-            "io.no-standard-deviation-such-rows",
+            "io.sd-not-positive",
             file=fixes.name,
             row=int(fixes.rows[k]),
             quantity=names[j],
             stated=stated[k, j],
             count=len(np.unique(bad[:, 0])),
-            what=what,
+            of=what,
         )
     return np.asarray(sd)

@@ -23,7 +23,6 @@ __all__ = ["detect", "read"]
 
 NAMES = ("time", "lat", "lon", "alt", "north_sd", "east_sd", "down_sd")
 WITH_VELOCITY = (*NAMES, "VN", "VE", "VD", "VN_sd", "VE_sd", "VD_sd")
-LAYOUT = "seconds of week, lat and lon in deg, height in m, standard deviations north, east, down"
 
 
 def detect(path: Path) -> bool:
@@ -57,14 +56,12 @@ def read(path: Path, options: GnssOptions) -> Fixes:
         It has other columns, a value is no number, or the numbers are those of inertial sensors.
     """
     if kf_gins.detect(path):
-        raise DataError(
-            "io.these-increments-inertial-sensors-not", file=path.name, layout=kf_gins.LAYOUT
-        )
+        raise DataError("io.these-increments-inertial-sensors-not", file=path.name)
     raw = csv.read(path)
     names = WITH_VELOCITY if len(raw.columns) == len(WITH_VELOCITY) else NAMES
     if len(raw.columns) != len(names):
         raise DataError(
-            "io.columns-layout-seven-or-thirteen",
+            "io.kf-gins-fix-column-count",
             file=raw.name,
             row=raw.row(0),
             count=len(raw.columns),
@@ -84,11 +81,12 @@ def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
 
     raw.findings.append(
         Finding(
-            "io.message",
+            "io.taken-for-kf-gins-fixes-with-velocity"
+            if len(names) > len(NAMES)
+            else "io.taken-for-kf-gins-fixes",
             file=raw.name,
-            message=f"{len(names)} columns without a header: taken for the layout of KF-GINS, {LAYOUT}"
-            + (", velocity and its standard deviations" if len(names) > len(NAMES) else ""),
-            remedy_text="if not, name the columns in a header",
+            severity="note",
+            count=len(names),
         )
     )
     return Fixes(

@@ -123,11 +123,8 @@ def read(path: Path) -> RawLog:
         if kind is None:
             continue
         if kind == "UncalGyro":
-            what = "UncalGyro is read, from which the phone has taken no bias"
             findings.append(
-                Finding(
-                    "io.message-2", file=path.name, quantity=triad, severity="note", message=what
-                )
+                Finding("io.uncalibrated-gyro", file=path.name, quantity=triad, severity="note")
             )
         table, rows = _table(path, lines[kind], SENSOR)
         table["time"] = _whole(table["elapsedRealtimeNanos"], path, rows) + ahead
@@ -199,9 +196,8 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     if at["elapsed"] and any(lines.get(k) for k in ("UncalGyro", "Gyro")):
         elapsed = _whole(table[str(at["elapsed"])], path, rows)[keep]
         time = np.asarray((elapsed + _ahead(path, lines, findings)) * 1e-9, dtype=np.float64)
-        what = "stamps of the fixes are those since the phone was started, as those of the sensors"
         findings.append(
-            Finding("io.message-2", file=path.name, quantity="time", severity="note", message=what)
+            Finding("io.fixes-since-start", file=path.name, quantity="time", severity="note")
         )
     horizontal = values("radius") / RADIUS
     vertical = values("vertical")
@@ -327,18 +323,23 @@ def _of_one_provider(
     chosen = next((p for p in PROVIDERS if (said == p).any()), None)
     if chosen is None:
         raise DataError(
-            "io.no-fix-satellite-receiver-fixes",
+            "io.no-gnss-fix",
             file=path.name,
             quantity="Provider",
             said=sorted(set(said)),
         )
     keep: NDArray[np.bool_] = np.asarray(said == chosen)
     if not keep.all():
-        others = ", ".join(sorted(set(said[~keep])))
-        what = f"{int(keep.sum())} of {keep.size} fixes are used, of {chosen}; not of {others}"
         findings.append(
             Finding(
-                "io.message-2", file=path.name, quantity="Provider", severity="note", message=what
+                "io.fixes-of-one-provider",
+                file=path.name,
+                quantity="Provider",
+                severity="note",
+                used=int(keep.sum()),
+                count=keep.size,
+                provider=chosen,
+                others=sorted(set(said[~keep])),
             )
         )
     return keep

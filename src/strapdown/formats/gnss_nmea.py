@@ -89,12 +89,11 @@ def read(path: Path, options: GnssOptions) -> Fixes:
     if wrong:
         findings.append(
             Finding(
-                "io.line-left-out-no-sentence",
+                "io.nmea-lines-left-out",
                 file=path.name,
                 row=wrong[0],
                 severity="note",
                 count=len(wrong),
-                value="s" if len(wrong) > 1 else "",
             )
         )
     time, clock = _times(fixed)

@@ -180,7 +180,9 @@ def _columns(
     plain = [(row, line.translate(table)) for row, line in held]
     widths = [len(line.split()) for _, line in plain]
     if widths[-1] < len(names) and (not ended or len(plain) > 1):
-        findings.append(Finding("io.last-line-cut-left-out", file=file, row=plain[-1][0]))
+        findings.append(
+            Finding("io.last-line-cut-left-out", severity="note", file=file, row=plain[-1][0])
+        )
         plain, widths = plain[:-1], widths[:-1]
     if not plain:
         raise DataError("io.only-line-under-header-cut", file=file, row=held[0][0])
@@ -207,13 +209,11 @@ def _refuse_words(plain: list[tuple[int, str]], names: list[str], file: str) -> 
                 float(text)
             except ValueError:
                 raise DataError(
-                    "io.message",
+                    "io.text-with-decimal-comma" if "," in text else "io.text-not-a-number",
                     file=file,
                     row=row,
                     quantity=name,
-                    message=f"'{text}' is not a number",
-                    remedy_text="correct or delete that row"
-                    + ("; decimals need a point" if "," in text else ""),
+                    text=text,
                 ) from None
 
 

@@ -98,7 +98,7 @@ def read_arrays(
     except DataError:
         raise
     except Exception as error:  # a damaged file can break the library anywhere
-        raise DataError("io.cannot-read-hdf", file=path.name, error=error) from None
+        raise DataError("io.hdf5-unreadable", file=path.name, error=error) from None
     return arrays, units, meta
 
 

@@ -148,7 +148,10 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
     """
     if "time" not in found:
         raise DataError(
-            "io.no-column-recognised-time-logs", file=log.name, quantity="time", columns=log.columns
+            "io.join-time-column-missing",
+            file=log.name,
+            quantity="time",
+            columns=list(log.columns),
         )
     ticks, dated = ticks_of(log, found["time"])
     return Clock(ticks, "ns" if dated else found["time"].unit)
@@ -199,7 +202,9 @@ def _with_gyro(logs: Sequence[RawLog], found: Sequence[dict[str, Column]], name:
     if len(have) == 1:
         return have[0]
     if have:
-        raise ConfigError("io.each", file=name, quantity="gyro", have=[logs[k].name for k in have])
+        raise ConfigError(
+            "io.gyro-in-several-logs", file=name, quantity="gyro", have=[logs[k].name for k in have]
+        )
     held = "; ".join(f"{_short(log)} ({', '.join(log.columns)})" for log in logs)
     raise DataError(
         "io.no-gyroscope-holds",
@@ -231,7 +236,9 @@ def _onto(
     if stamps.size == time.size and np.array_equal(stamps, time):
         return values, np.ones(time.size, dtype=bool)
     if not stamps.size or not known.any():
-        _leave_out(log.name, triad, "it holds no number", findings)
+        findings.append(
+            Finding("io.left-out-without-number", file=log.name, quantity=triad, severity="note")
+        )
         return None, known
     out, inside, distance = at_stamps(time, stamps, values)
     if not inside.any():
@@ -246,8 +253,16 @@ def _onto(
         )
     covered = int(inside.sum())
     if covered < COVERED * known.sum():
-        what = f"it has values for {covered} of the {int(known.sum())} samples of the gyro"
-        _leave_out(log.name, triad, what, findings)
+        findings.append(
+            Finding(
+                "io.left-out-few-samples",
+                file=log.name,
+                quantity=triad,
+                severity="note",
+                covered=covered,
+                count=int(known.sum()),
+            )
+        )
         return None, known
     if distance > 0:
         findings.append(
@@ -264,22 +279,16 @@ def _onto(
         longest = max(gaps, key=lambda g: g.length)
         findings.append(
             Finding(
-                "io.gap-longest-values-them-straight"
-                if triad == "accel"
-                else "io.gap-longest-values-them-straight-2",
+                "io.gaps-in-force" if triad == "accel" else "io.gaps-in-sensor",
+                severity="warning" if triad == "accel" else "note",
                 file=log.name,
                 quantity=triad,
                 count=len(gaps),
-                value="s" if len(gaps) > 1 else "",
                 length=longest.length,
             )
         )
     # A stamp of the gyro that is no number is refused, or repaired, with the gyro's own.
     return np.where(known[:, None], out, 0.0), inside | ~known
-
-
-def _leave_out(name: str, triad: str, what: str, findings: list[Finding]) -> None:
-    findings.append(Finding("io.left-out-3", file=name, quantity=triad, severity="note", what=what))
 
 
 def _in_order(
@@ -307,11 +316,10 @@ def _one_of(what: str, logs: Sequence[RawLog], name: str) -> str | None:
     said = {log.axes: log.name for log in logs if log.axes}
     if len(said) > 1:
         raise DataError(
-            "io.message",
+            "io.axes-of-logs-differ",
             file=name,
             quantity=what,
-            message="; ".join((f"{file} says {axes}" for axes, file in said.items())),
-            remedy_text="turn one of them into the axes of the other",
+            stated=[f"{file} says {axes}" for axes, file in said.items()],
         )
     return next(iter(said), None)
 
@@ -352,7 +360,7 @@ def with_columns(logs: Sequence[RawLog], options: ReadOptions) -> list[RawLog]:
                 its[quantity] = plain
         if not any(quantity in its for its in asked):
             raise ConfigError(
-                "io.no-log-column",
+                "io.no-log-with-column",
                 file=", ".join(log.name for log in logs),
                 quantity=f"--columns {quantity}",
                 source=source,

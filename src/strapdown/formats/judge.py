@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,10 +16,9 @@ Array = NDArray[np.float64]
 UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
 # Of numbers that may be raw counts; the sensor is that of most boards (InvenSense, MPU-6000 and
 # MPU-6050 Product Specification, revision 3.4, sections 6.1 and 6.2).
-_COUNTS = {
-    "gyro": "as in deg/s/131 (an MPU-6050 at ±250 deg/s; 65.5, 32.8, 16.4 at its wider ranges)",
-    "accel": "as in g/16384 (an MPU-6050 at ±2 g; 8192, 4096, 2048 at its wider ranges)",
-}
+_COUNTS = {"gyro": "io.example-gyro-counts", "accel": "io.example-accel-counts"}
+# Axes with each axis of the sensor up.
+_EXAMPLES = {"z": "x,-y,-z", "y": "-z,x,-y", "-y": "z,x,y", "x": "y,z,-x", "-x": "y,-z,x"}
 # What is shown of the numbers of a unit that nothing tells.
 _CHOICES = {"gyro": ("rad/s", "deg/s"), "accel": ("m/s2", "g"), "mag": ("uT", "gauss")}
 
@@ -50,73 +51,66 @@ def inferred_unit(
     form = said.get(f"{triad}_form")
     if form is not None and form.value == "increment" and form.confidence > 0.5:
         raise DataError(
-            "io.unit-not-stated-these-look",
+            "io.unit-not-stated-of-increments",
             file=file,
             quantity=triad,
             evidence=form.evidence,
             confidence=form.confidence,
-            flag=_flag(triad),
+            triad=triad,
             sum_of=sum_of(_likely(unit), triad),
         )
     if unit is not None and unit.settled and (form is None or form.value == "rate"):
-        findings.append(
-            Finding(
-                "io.message",
-                file=file,
-                quantity=f"unit of {triad}",
-                message=str(unit),
-                remedy_text=f"if not, state it with {_flag(triad)}",
-            )
-        )
+        code = "io.mag-unit-inferred" if triad == "mag" else "io.unit-inferred"
+        findings.append(unit.finding(code, file=file, quantity=f"unit of {triad}", triad=triad))
         return str(unit.value), str(unit)
-    raise DataError(
-        "io.message",
-        file=file,
-        quantity=triad,
-        message=not_told(unit),
-        remedy_text=_choices(triad, values),
-    )
+    raise DataError(_undecided(triad, unit, values).replace(file=file, quantity=triad))
 
 
 def _likely(unit: Inference | None) -> str | None:
     return str(unit.value) if unit is not None and unit.settled else None
 
 
-def _flag(triad: str) -> str:
-    return "the column's name" if triad == "mag" else f"--{triad}-unit"
+def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
+    """The unit that the user has to state, with what each of the likely ones makes of the values.
 
-
-def not_told(unit: Inference | None) -> str:
-    """What is said of a unit that the numbers do not tell."""
-    if unit is None:
-        return "the unit is not stated"
-    pairs = [(v, p) for v, p in ((unit.value, unit.confidence), *unit.alternatives) if p > 0.005]
-    shares = ", ".join(f"{v or 'none of those known'} {p:.2g}" for v, p in pairs)
-    return (
-        f"the unit is not stated, and the numbers do not tell it to {THRESHOLD:g} "
-        f"({'; '.join(unit.evidence)}; probability: {shares})"
-    )
-
-
-def _choices(triad: str, values: Array) -> str:
+    Raw counts are whole numbers; a magnetometer has no option that states its unit.
+    """
     largest = float(np.nanmax(np.abs(np.where(np.isfinite(values), values, np.nan)), initial=0.0))
-    told = " or ".join(
-        f"{u} (the largest value, {largest:.4g}, is then "
-        f"{_in_plain_words(triad, largest * UNITS[triad][u])})"
-        for u in _CHOICES[triad]
-    )
-    if triad not in _COUNTS or not bool((values == np.round(values)).all()):
-        return f"state it with {_flag(triad)}: {told}"
-    return (
-        f"state it with {_flag(triad)}: {told}; all are whole numbers: if they are raw counts, say "
-        f"how many are a unit, {_COUNTS[triad]}"
+    counts = None
+    if triad == "mag":
+        code = "io.mag-unit-not-stated" if unit is None else "io.mag-unit-undecided"
+    elif bool((values == np.round(values)).all()):
+        code = "io.counts-unit-not-stated" if unit is None else "io.counts-unit-undecided"
+        counts = Finding(_COUNTS[triad], severity="note")
+    else:
+        code = "io.unit-not-stated" if unit is None else "io.unit-undecided"
+    return Finding(
+        code,
+        triad=triad,
+        choices=[_choice(triad, u, largest) for u in _CHOICES[triad]],
+        counts=counts,
+        **what_numbers_say(unit),
     )
 
 
-def _in_plain_words(triad: str, value: float) -> str:
+def what_numbers_say(unit: Inference | None) -> dict[str, Any]:
+    """Return the data of a sentence on a unit that the numbers leave open."""
+    if unit is None:
+        return {}
+    return {"threshold": THRESHOLD, "evidence": unit.evidence, "shares": unit.shares()}
+
+
+def _choice(triad: str, unit: str, largest: float) -> Finding:
+    value = largest * UNITS[triad][unit]
     if triad == "gyro":
-        return f"{np.degrees(value) / 360.0:.3g} turns a second"
-    return f"{value:.3g} {'µT' if triad == 'mag' else 'm/s²'}"
+        turns = np.degrees(value) / 360.0
+        return Finding(
+            "io.choice-of-gyro-unit", severity="note", unit=unit, largest=largest, turns=turns
+        )
+    si = "µT" if triad == "mag" else "m/s²"
+    return Finding(
+        "io.choice-of-unit", severity="note", unit=unit, largest=largest, value=value, si=si
+    )
 
 
 def report_contradictions(
@@ -148,41 +142,49 @@ def report_contradictions(
         form = said.get(f"{triad}_form")
         if triad in asked or not heard or other is None or not other.settled:
             continue
-        value = str(other.value)
-        told = form.value if form is not None and form.settled else None
+        likely = str(other.value)
+        kind = form.value if form is not None and form.settled else None
+        reason = other
         if unit in SUMS[triad]:
-            if told != "rate":
+            if kind != "rate" or form is None:
                 continue
-            what = f"the numbers look like rates, not increments of each sample; {form}"
-        elif told == "increment":
-            what = f"the numbers look like increments of each sample, not rates; {form}"
-            value = sum_of(value, triad)
+            code, reason = "io.looks-like-rates", form
+        elif kind == "increment" and form is not None:
+            code, reason = "io.looks-like-increments", form
+            likely = sum_of(likely, triad)
         elif other.value != unit.lstrip("-") and (form is None or form.value == "rate"):
-            what = f"the numbers contradict {unit}, which is stated; {other}"
+            code = "io.mag-contradicts-unit" if triad == "mag" else "io.contradicts-unit"
         else:
             continue
-        remedy = f"if the statement is wrong, say {_flag(triad)} {value}"
         findings.append(
-            Finding("io.message", file=file, quantity=triad, message=what, remedy_text=remedy)
+            Finding(
+                code,
+                file=file,
+                quantity=triad,
+                triad=triad,
+                unit=unit,
+                likely=likely,
+                reason=reason.finding(),
+            )
         )
     gravity = said.get("gravity")
     if "accel" in units and gravity is not None and gravity.settled and gravity.value == "removed":
-        findings.append(Finding("io.gravity-not", file=file, quantity="accel", gravity=gravity))
+        findings.append(
+            Finding("io.no-gravity", file=file, quantity="accel", reason=gravity.finding())
+        )
     axes = said.get("gyro_axes")
     if axes is None or not axes.settled or axes.value == "x,y,z":
         return
-    if axes.value == "-x,-y,-z":
-        if mirrored:
-            return
-        what = "turns the other way than gravity does in the accelerometer: its sense of rotation "
-        what += "is reversed, or the sensor's axes are left-handed"
-        remedy = "for left-handed axes say so with --axes, as in --axes x,y,-z"
-    else:
-        what = f"its {axes.value} stand along x,y,z of the accelerometer"
-        remedy = "correct the columns that are reversed or exchanged (--columns exchanges them)"
+    reversed_sense = axes.value == "-x,-y,-z"
+    if reversed_sense and mirrored:
+        return
     findings.append(
         Finding(
-            "io.message", file=file, quantity="gyro", message=f"{what}; {axes}", remedy_text=remedy
+            "io.gyro-turns-against-gravity" if reversed_sense else "io.gyro-axes-differ",
+            file=file,
+            quantity="gyro",
+            axes=axes.value,
+            reason=axes.finding(),
         )
     )
 
@@ -191,8 +193,8 @@ def _settled(said: dict[str, Inference], quantity: str) -> bool:
     return quantity in said and said[quantity].settled
 
 
-def told_of_up(said: dict[str, Inference]) -> tuple[str, str] | None:
-    """What gravity says of axes that are taken for forward, right, down; None if it agrees.
+def axes_against_gravity(said: dict[str, Inference]) -> Finding | None:
+    """Say that axes which are taken for forward, right, down are not, by gravity.
 
     Parameters
     ----------
@@ -200,30 +202,22 @@ def told_of_up(said: dict[str, Inference]) -> tuple[str, str] | None:
 
     Returns
     -------
-    what, remedy : str, or None
+    Finding or None
+        None where gravity agrees, or does not tell.
     """
     up = said.get("up_axis")
     if up is None or up.value is None or up.value == "-z" or up.confidence < 0.5:
         return None
     axis = str(up.value)
     down = axis[1:] if axis.startswith("-") else f"-{axis}"
-    examples = {
-        "-z": "x,-y,-z (forward, left, up) or y,x,-z (right, forward, up, as a phone on its back)",
-        "-y": "-z,x,-y (a phone upright, its screen to the rear)",
-        "y": "z,x,y",
-        "-x": "y,z,-x",
-        "x": "y,-z,x",
-    }
-    share = up.evidence[0].rsplit(" in ", 1)[-1]
-    what = (
-        f"; but the sensor's {axis} points up in {share}, by gravity (a sensor that reports it "
-        "with the other sign, as iOS does, is read as upside down)"
+    code = {"z": "io.axes-not-stated-z-up", "y": "io.axes-not-stated-y-up"}.get(axis)
+    return Finding(
+        code or "io.axes-not-stated-other-up",
+        up=axis,
+        percent=up.evidence[0].data["percent"],
+        down=down,
+        example=_EXAMPLES[axis],
     )
-    remedy = (
-        f"which axis is forward gravity cannot say; down is {down} then: state --axes, as in "
-        f"--axes {examples[down]}; or state --accel-unit -m/s2 or -g"
-    )
-    return what, remedy
 
 
 def report_upside_down(
@@ -244,7 +238,7 @@ def report_upside_down(
         return
     findings.append(
         Finding(
-            "io.axes-points-down-sensor-upside",
+            "io.axes-upside-down",
             file=file,
             quantity="axes",
             axis=axis,

@@ -27,7 +27,6 @@ _KINDS += [(f"accel_{a}", "m/s") for a in "xyz"]
 _GRAVITY = (9.6, 10.0)  # m/s²
 _STEPS = (1e-4, 0.5)  # s
 _TURNS = 2.0 * np.pi  # rad/s
-LAYOUT = "seconds of week, three increments in rad, three in m/s"
 
 
 def detect(path: Path) -> bool:
@@ -88,7 +87,7 @@ def read(path: Path) -> RawLog:
     names = list(raw.columns)
     if len(names) != len(COLUMNS) or any(n.startswith("column ") is False for n in names):
         raise DataError(
-            "io.columns-layout-seven-without-header",
+            "io.kf-gins-column-count",
             file=raw.name,
             row=raw.row(0),
             count=len(names),
@@ -120,15 +119,11 @@ def _axes(columns: dict[str, NDArray[np.float64]], raw: RawLog) -> str | None:
     told = down < -0.5 * _GRAVITY[0]
     raw.findings.append(
         Finding(
-            "io.message",
+            "io.taken-for-kf-gins" if told else "io.taken-for-kf-gins-axes-open",
             file=raw.name,
-            message=f"seven columns without a header, the first a clock of {1.0 / step:.4g} Hz: taken for the layout of KF-GINS, increments in rad and m/s"
-            + (
-                ", axes forward, right, down"
-                if told
-                else f"; the third axis feels {down:.3g} m/s², which is not level with forward, right, down"
-            ),
-            remedy_text="if not, name the columns (--columns time=1,gyro_x=2 …)",
+            severity="note" if told else "warning",
+            rate_hz=1.0 / step,
+            down=down,
         )
     )
     return "x,y,z" if told else None

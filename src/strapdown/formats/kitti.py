@@ -34,7 +34,6 @@ FORCE, RATE, ACCURACY = slice(11, 14), slice(17, 20), slice(23, 25)
 AXES = "x,-y,-z"  # forward, left, up
 # From forward, right, down to forward, left, up: half a turn about x.
 Q_SB = np.array([0.0, 1.0, 0.0, 0.0])
-OWN = "the own solution of the OXTS unit, of these very sensors and its receivers: no independent"
 _NAME = re.compile(r"\d{10}\.txt")
 
 
@@ -114,7 +113,6 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
     time, values, _ = _values(path)
     name = path.resolve().name
     accuracy = values[:, ACCURACY]
-    what = f"places and velocities are {OWN} aid, and its errors are the same from fix to fix"
     return Fixes(
         name=name,
         time=np.asarray(time * 1e-9, dtype=np.float64),
@@ -126,7 +124,7 @@ def read_fixes(path: Path, options: GnssOptions) -> Fixes:
         velocity_sd=np.repeat(accuracy[:, 1:], 3, axis=1),
         zero_is_unknown=True,
         findings=[
-            Finding("io.message-2", file=name, quantity="lat, lon", severity="note", message=what)
+            Finding("io.fixes-of-own-solution", file=name, quantity="lat, lon", severity="note")
         ],
     )
 

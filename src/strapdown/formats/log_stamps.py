@@ -58,10 +58,10 @@ def stamps_of_log(
     rows = np.flatnonzero(finite)
     rate = options.rate or raw.rate
     if options.rate is not None and not (np.isfinite(options.rate) and options.rate > 0):
-        raise ConfigError("io.hz-no-rate-2", quantity="--rate", rate=options.rate)
+        raise ConfigError("io.rate-not-positive", quantity="--rate", rate=options.rate)
     if ticks is None:
         if rate is None:
-            raise DataError("io.no-column-recognised-time", file=raw.name, quantity="time")
+            raise DataError("io.time-column-missing", file=raw.name, quantity="time")
         everything = np.ones(rows.size, dtype=bool)
         why = f"no time column: {rate:g} Hz as stated"
         return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
@@ -69,7 +69,7 @@ def stamps_of_log(
     if options.rate is not None:
         findings.append(
             Finding(
-                "io.rate-not-used-log-stamps",
+                "io.rate-not-used",
                 file=raw.name,
                 quantity="time",
                 severity="note",
@@ -88,13 +88,7 @@ def stamps_of_log(
         unit, why = str(said["time_unit"].value), str(said["time_unit"])
         if unit != "s":
             findings.append(
-                Finding(
-                    "io.message",
-                    file=raw.name,
-                    quantity="time",
-                    message=why,
-                    remedy_text="if not, say --time-unit",
-                )
+                said["time_unit"].finding("io.time-unit-inferred", file=raw.name, quantity="time")
             )
     stamps = read_stamps(
         ticks[rows],

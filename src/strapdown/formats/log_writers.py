@@ -102,7 +102,7 @@ def log_formats(names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         if name not in (*LOG_WRITERS, "all"):
             raise ConfigError(
-                "io.no-writer",
+                "io.unknown-writer",
                 quantity="--format",
                 name=name,
                 word=name,

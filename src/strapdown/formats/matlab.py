@@ -72,7 +72,7 @@ def read_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
         raise
     except Exception as error:  # a damaged file can break the parser anywhere
         raise DataError(
-            "io.cannot-read-matlab-file", file=path.name, error=error or type(error).__name__
+            "io.matlab-unreadable", file=path.name, error=error or type(error).__name__
         ) from None
     named: dict[str, NDArray[Any]] = {}
     for name, value in content.items():

@@ -82,7 +82,7 @@ class Member:
             raise
         except Exception as error:  # a damaged archive can break any of the decoders
             raise DataError(
-                "io.cannot-read-2", file=self.label, error=error or type(error).__name__
+                "io.member-unreadable", file=self.label, error=error or type(error).__name__
             ) from None
 
 
@@ -121,7 +121,7 @@ def members_of(path: Path) -> list[Member]:
             names = sorted({i.filename for i in archive.infolist() if not i.is_dir()})
     except Exception as error:  # zipfile raises more than BadZipFile on damaged archives
         raise DataError(
-            "io.archive-cannot-read", file=whole, error=error or type(error).__name__
+            "io.zip-unreadable", file=whole, error=error or type(error).__name__
         ) from None
     return [
         Member(n, f"{whole}/{n}", path, True)

@@ -101,7 +101,7 @@ def text_of(path: Path, longest: int = LARGEST) -> str:
         data = data[: data.rfind(b"\n") + 1]
     text = csv.decoded(data, path.name)[0]
     if "\0" in text:
-        raise DataError("io.no-text-holds-zero-bytes-3", file=path.name)
+        raise DataError("io.mme-with-zero-bytes", file=path.name)
     return text
 
 
@@ -135,7 +135,7 @@ def read_header(path: Path) -> MmeHeader:
         match = _KEY.fullmatch(text)
         if match is None:
             raise DataError(
-                "io.neither-key-value-nor-number", file=path.name, row=row, clean=clean(text, 60)
+                "io.mme-line-not-understood", file=path.name, row=row, clean=clean(text, 60)
             )
         key = " ".join(match[1].lower().split())
         values.setdefault(key, (match[2].strip(), row))

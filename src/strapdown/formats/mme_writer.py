@@ -167,7 +167,7 @@ def _check(channel: CrashChannel, time: Array, values: Array) -> None:
             file=channel.file or None,
             row=channel.row(int(bad[0])) if bad.size else None,
             quantity=f"channel {channel.name}",
-            values=values[bad[0]],
+            values=values[bad[0]] if bad.size else None,
         )
 
 

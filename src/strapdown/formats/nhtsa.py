@@ -288,6 +288,7 @@ def _findings(channels: tuple[Channel, ...], file: Path) -> list[Finding]:
         findings.append(
             Finding(
                 "io.listed-channels-not-folder-2",
+                severity="note",
                 file=file.name,
                 quantity="channels",
                 count=len(absent),

@@ -58,7 +58,7 @@ def accelerations(
     if not found:
         places = dict.fromkeys(c.location for c in test.channels if c.kind == "AC" and c.present)
         raise DataError(
-            "io.no-accelerometer-samples-axis-occupant",
+            "io.nhtsa-no-such-channel",
             file=test.path.name,
             quantity="location",
             location=location or "any place",

@@ -36,7 +36,7 @@ def load(path: Path, label: str) -> NDArray[Any]:
         raise
     except Exception as error:  # a damaged header can break the parser that NumPy uses for it
         raise DataError(
-            "io.array-cannot-read", file=label, error=error or type(error).__name__
+            "io.npy-unreadable", file=label, error=error or type(error).__name__
         ) from None
 
 

@@ -64,7 +64,7 @@ def arrays_of(path: Path) -> dict[str, NDArray[Any]]:
         raise
     except Exception as error:  # a damaged archive can break any of the decoders it goes through
         raise DataError(
-            "io.archive-cannot-read-2", file=path.name, error=error or type(error).__name__
+            "io.npz-unreadable", file=path.name, error=error or type(error).__name__
         ) from None
     return found
 

@@ -42,7 +42,7 @@ def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
     bad = np.flatnonzero(np.isnan(found) & texts.notna().to_numpy())
     if bad.size:
         raise DataError(
-            "io.not-number-column",
+            "io.value-not-a-number",
             file=raw.name,
             row=raw.row(int(bad[0])),
             quantity=quantity,

@@ -102,10 +102,9 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
             raise DataError("io.holds-no-number", file=gravity.name, quantity="accel")
         at, inside, distance = at_stamps(time, own[order], values[1][order])
     if not inside.any():
-        raise DataError("io.no-time-common", file=gravity.name, quantity="time", name=linear.name)
-    what = f"specific force is the sum of {linear.name} and {gravity.name}"
-    if distance > 0:
-        what += f", interpolated to the stamps of the first over at most {distance:.3g} s"
+        raise DataError(
+            "io.logs-without-common-time", file=gravity.name, quantity="time", name=linear.name
+        )
     total = (values[0] + at)[inside]
     rows = np.arange(1, time.size + 1) if linear.rows is None else linear.rows
     time_column = next(s for s, (q, _) in linear.stated.items() if q == "time")
@@ -122,7 +121,13 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
             *linear.findings,
             *gravity.findings,
             Finding(
-                "io.message-2", file=linear.name, quantity="accel", severity="note", message=what
+                "io.force-summed-interpolated" if distance > 0 else "io.force-summed",
+                file=linear.name,
+                quantity="accel",
+                severity="note",
+                linear=linear.name,
+                gravity=gravity.name,
+                distance=distance,
             ),
         ],
     )

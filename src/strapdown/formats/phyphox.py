@@ -121,7 +121,7 @@ def _pauses(member: Member) -> list[Finding]:
         if events[k - 1] == "PAUSE" and events[k] == "START":
             out.append(
                 Finding(
-                    "io.recording-stood-still-own-clock",
+                    "io.recording-paused",
                     file=member.label,
                     row=k + 2,
                     quantity="time",

@@ -35,17 +35,19 @@ def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) ->
     worst = max(gaps, key=lambda g: g.length)
     speed = np.sqrt((gyro[worst.sample - 1 : worst.sample + 1] ** 2).sum(axis=1)).max()
     missed = float(np.degrees(speed * worst.length))
-    what = (
-        f"{len(gaps)} gap{'s' if len(gaps) > 1 else ''} in time; the longest is "
-        f"{worst.length:.3g} s, from {worst.start:.6g} to {worst.end:.6g} s, where 95 % of the "
-        f"steps are at most {worst.usual:.3g} s. At the rate on its edges {missed:.3g}° were "
-        "turned in it, and how is a guess"
-    )
-    remedy = None
-    if worst.length >= LONG_GAP:
-        remedy = "split the log there, or put a reference point on each side of it"
     findings.append(
-        Finding("io.message", file=name, quantity="time", message=what, remedy_text=remedy)
+        Finding(
+            "io.long-gap" if worst.length >= LONG_GAP else "io.gaps",
+            file=name,
+            quantity="time",
+            severity="warning" if worst.length >= LONG_GAP else "note",
+            count=len(gaps),
+            length=worst.length,
+            start=worst.start,
+            end=worst.end,
+            usual=worst.usual,
+            missed_deg=missed,
+        )
     )
 
 
@@ -64,7 +66,7 @@ def report_absurd(
     if largest[k] > IMPOSSIBLE_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
         raise DataError(
-            "io.rad-beyond-anything-turns",
+            "io.rate-impossible",
             file=name,
             row=row(at),
             quantity=f"gyro_{AXES[k]}",
@@ -74,7 +76,7 @@ def report_absurd(
     if LASTING_RATE < lasting <= largest[k] <= ABSURD_RATE:
         findings.append(
             Finding(
-                "io.twentieth-samples-beyond-rad-turns",
+                "io.rate-absurd-for-long",
                 file=name,
                 quantity="gyro",
                 lasting=lasting,
@@ -85,7 +87,7 @@ def report_absurd(
         at = int(np.abs(gyro[:, k]).argmax())
         findings.append(
             Finding(
-                "io.rad-turns-second",
+                "io.rate-absurd",
                 file=name,
                 row=row(at),
                 quantity=f"gyro_{AXES[k]}",
@@ -104,7 +106,7 @@ def report_absurd(
         if run.any():
             findings.append(
                 Finding(
-                    "io.samples-stand-full-scale-rate",
+                    "io.rate-at-full-scale",
                     file=name,
                     row=row(int(run.argmax())),
                     quantity=f"gyro_{AXES[k]}",

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,16 +31,15 @@ AXES = "y,x,-z"
 GYROS = [f"dtheta_{a}" for a in "xyz"]
 ACCELS = [f"dv_{a}" for a in "xyz"]
 _ARCSEC = math.pi / 180.0 / 3600.0
-# The header's lines, each with what stands in it.
+# The header's lines: their name, and the code of the note on what they hold.
 _HEADER = (
-    ("attitude and velocity", "pitch, roll, yaw in deg, VE, VN, VU in m/s"),
-    ("place and clock", "lat, lon in deg, height in m, t0 in s, step in ms, g in m/s²"),
-    ("scale factors", "three gyro scales in arcsec, three accelerometer scales in µg·s"),
+    ("attitude and velocity", "io.psins-attitude-line"),
+    ("position and clock", "io.psins-position-line"),
+    ("scale factors", "io.psins-scales-line"),
 )
 # A unit that is carried or stands still feels gravity to so much, on the median of its samples.
 _GRAVITY = (9.6, 10.0)  # m/s²
 _STEPS = (1e-5, 1.0)  # s
-_COPY = "copy the file again, or correct that line"
 
 
 def detect(path: Path) -> bool:
@@ -88,12 +88,11 @@ def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> Raw
     t0, step, g = place[3], 1e-3 * place[4], place[5]
     row = lines[1][0]
     if not _STEPS[0] <= step <= _STEPS[1]:
-        _refuse(path.name, row, "sampling interval", f"{place[4]:g} ms is none", _HEADER[1][1])
+        _refuse(path.name, row, 1, "sampling interval", "io.psins-step", value=place[4])
     if not 9.7 <= g <= 9.9:
-        _refuse(path.name, row, "g", f"{g:g} m/s² is no gravity of the Earth", _HEADER[1][1])
+        _refuse(path.name, row, 1, "g", "io.psins-gravity", value=g)
     if min(scales) <= 0:
-        what = f"{min(scales):g} is no scale factor"
-        _refuse(path.name, lines[2][0], "scale factors", what, _HEADER[2][1])
+        _refuse(path.name, lines[2][0], 2, "scale factors", "io.psins-scale", value=min(scales))
     counts, rows = _counts(path.name, lines[3:], ended, findings)
     factors: Array = np.array(
         [s * _ARCSEC for s in scales[:3]] + [s * 1e-6 * g for s in scales[3:]]
@@ -119,18 +118,19 @@ def _simu(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> Raw
 
 def _header(file: str, lines: Lines, which: int) -> list[float]:
     """Six numbers of one line of the header."""
-    what, holds = _HEADER[which]
+    name, _ = _HEADER[which]
     if len(lines) <= which:
-        raise DataError("io.file-ends-before-line-header", file=file, which=which + 1, what=what)
+        raise DataError("io.psins-header-cut", file=file, which=which + 1, name=name)
     row, line = lines[which]
     fields = line.split()
     if len(fields) != 6:
-        said = f"{len(fields)} numbers in line {which + 1} of the header, where 6 belong"
-        _refuse(file, row, what, said, holds)
+        _refuse(
+            file, row, which, name, "io.psins-count", count=len(fields), line_of_header=which + 1
+        )
     values = [_number(f) for f in fields]
     for text, value in zip(fields, values, strict=True):
         if not math.isfinite(value):
-            _refuse(file, row, what, f"'{text}' is no finite number", holds)
+            _refuse(file, row, which, name, "io.psins-number", text=text)
     return values
 
 
@@ -141,15 +141,10 @@ def _number(text: str) -> float:
         return math.nan
 
 
-def _refuse(file: str, row: int, quantity: str, what: str, holds: str) -> None:
-    raise DataError(
-        "io.message",
-        file=file,
-        row=row,
-        quantity=quantity,
-        message=what,
-        remedy_text=f"that line holds: {holds}; {_COPY}",
-    )
+def _refuse(file: str, row: int, which: int, quantity: str, code: str, **data: Any) -> None:
+    """Refuse a value of a line of the header, and say what that line holds."""
+    holds = Finding(_HEADER[which][1], severity="note")
+    raise DataError(code, file=file, row=row, quantity=quantity, holds=holds, **data)
 
 
 def _start(
@@ -158,11 +153,11 @@ def _start(
     pitch, roll, yaw, east, north, up = attitude
     lat, lon, alt = place[:3]
     if abs(lat) > 90.0:
-        _refuse(file, rows[1], "latitude", f"{lat:g}° is beyond a pole", _HEADER[1][1])
+        _refuse(file, rows[1], 1, "latitude", "io.psins-latitude", value=lat)
     if abs(lon) > 360.0:
-        _refuse(file, rows[1], "longitude", f"{lon:g}° is more than a turn", _HEADER[1][1])
+        _refuse(file, rows[1], 1, "longitude", "io.psins-longitude", value=lon)
     if abs(pitch) > 90.0:
-        _refuse(file, rows[0], "pitch", f"{pitch:g}° is beyond 90°", _HEADER[0][1])
+        _refuse(file, rows[0], 0, "pitch", "io.psins-pitch", value=pitch)
     # Turned about up, then right, then forward: with yaw reversed the 3-2-1 angles of
     # forward-right-down.
     return StatedStart(lat, lon, alt, (roll, pitch, 0.0 - yaw), (north, east, 0.0 - up))
@@ -210,11 +205,11 @@ def _matrix(path: Path, lines: Lines, ended: bool, findings: list[Finding]) -> R
     up = float(np.median(block[:, 5])) / usual > 0.5 * force
     findings.append(
         Finding(
-            "io.message",
+            "io.taken-for-psins" if up else "io.taken-for-psins-axes-open",
             file=path.name,
-            message=f"seven columns without a header, the last a clock of {1.0 / usual:.4g} Hz, and {force:.4g} m/s² of force: taken for a matrix of PSINS, increments in rad and m/s"
-            + (", axes right, forward, up" if up else "; gravity is not on its third axis"),
-            remedy_text="if not, state units and axes (--gyro-unit, --accel-unit, --axes)",
+            severity="note" if up else "warning",
+            rate_hz=1.0 / usual,
+            force=force,
         )
     )
     return _log(path, time, block[:, :6], rows, AXES if up else None, findings, None)
@@ -228,7 +223,9 @@ def _block(
 ) -> tuple[Array, NDArray[np.int64]]:
     """Numbers of all rows; a last row that may have lost digits is left out."""
     if lines and (not ended or len(lines[-1][1].split()) < width):
-        findings.append(Finding("io.last-line-does-not-end", file=file, row=lines[-1][0]))
+        findings.append(
+            Finding("io.last-line-does-not-end", severity="note", file=file, row=lines[-1][0])
+        )
         lines = lines[:-1]
     if not lines:
         raise DataError("io.header-no-samples-under-2", file=file)
@@ -241,7 +238,7 @@ def _block(
         row, text = next(
             (row, f) for row, line in lines for f in line.split() if math.isnan(_number(f))
         )
-        raise DataError("io.not-number-2", file=file, row=row, text=text) from None
+        raise DataError("io.text-not-a-number", file=file, row=row, text=text) from None
     return flat.reshape(-1, width), np.array([row for row, _ in lines], dtype=np.int64)
 
 

@@ -131,7 +131,7 @@ def find_quantities(
     for quantity, name in asked.items():
         if quantity not in known:
             raise ConfigError(
-                "io.no-quantity-2",
+                "io.unknown-quantity-of-table",
                 quantity="columns",
                 of_what=quantity,
                 of=of,
@@ -162,7 +162,7 @@ def find_quantities(
         factor = sign * _factor(meant, known[meant], unit, word, name, file)
         if meant in found:
             raise DataError(
-                "io.columns-could-both",
+                "io.column-names-ambiguous",
                 file=file,
                 quantity=meant,
                 source=found[meant].source,
@@ -208,7 +208,7 @@ def _factor(
     spelled = SPELLINGS.get(unit) or unit_of(unit) or unit
     if spelled not in known.units:
         raise DataError(
-            "io.no-unit-column",
+            "io.unit-of-other-quantity",
             file=file,
             quantity=quantity,
             unit=unit,

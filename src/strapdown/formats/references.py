@@ -74,15 +74,11 @@ def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[
             read = parse_place if is_place(text) else parse_reference
             read(text, -math.inf, math.inf)
         except ConfigError as error:
+            where = {"file": path.name, "quantity": "reference"}
+            if what == "line":
+                raise DataError(error.finding, row=number, **where) from None
             raise DataError(
-                "io.message",
-                file=path.name,
-                row=number if what == "line" else None,
-                quantity="reference",
-                message=error.finding.what
-                if what == "line"
-                else f"{what} {number}: {error.finding.what}",
-                remedy_text=error.finding.remedy,
+                "io.sentence-not-understood", number=number, reason=error.finding, **where
             ) from None
     return [text for _, text in numbered]
 
@@ -91,7 +87,7 @@ def _from_toml(path: Path) -> list[str]:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DataError("io.no-toml", file=path.name, error=error) from None
+        raise DataError("io.toml-malformed", file=path.name, error=error) from None
     words = content.get("references")
     if not isinstance(words, list) or not all(isinstance(w, str) for w in words):
         raise DataError("io.no-list-sentences-named-references", file=path.name)
@@ -166,5 +162,5 @@ def read_truth(
     """
     truth = truth_of_file(read_raw(path), options or ReadOptions(), origin or Origin(0, "s"))
     if truth is None or not np.isfinite(truth.to_numpy()).all():
-        raise DataError("io.no-attitude", file=path.name)
+        raise DataError("io.file-without-attitude", file=path.name)
     return truth

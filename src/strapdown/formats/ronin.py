@@ -71,14 +71,13 @@ def read(path: Path) -> RawLog:
             stated |= {f"{name}[{k}]": (f"{triad}_{a}", unit) for k, a in enumerate("xyz")}
     with h5py.File(path, "r") as file:
         if CHEST in file:
-            what = f"{CHEST} is not used: it is the attitude of another phone, on the chest"
             raw.findings.append(
                 Finding(
-                    "io.message-2",
+                    "io.attitude-of-other-phone",
                     file=path.name,
                     quantity="attitude",
                     severity="note",
-                    message=what,
+                    name=CHEST,
                 )
             )
     raw.stated, raw.axes = stated, AXES

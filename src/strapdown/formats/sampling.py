@@ -30,10 +30,17 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
     """
     asked = (options.sampling or raw.sampling or "").lower()
     if not asked:
-        findings.append(Finding("io.each-row-taken-rate-stamp", file=raw.name, quantity="sampling"))
+        findings.append(
+            Finding(
+                "io.sampling-taken-as-instantaneous",
+                severity="note",
+                file=raw.name,
+                quantity="sampling",
+            )
+        )
         return "instantaneous"
     if asked not in SAMPLINGS:
         raise ConfigError(
-            "io.no-kind-sampling-2", quantity="--sampling", asked=asked, word=asked, known=SAMPLINGS
+            "io.sampling-unknown", quantity="--sampling", asked=asked, word=asked, known=SAMPLINGS
         )
     return asked

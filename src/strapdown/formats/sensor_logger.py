@@ -125,7 +125,9 @@ def _from_members(
         if kind not in SENSORS and kind.lower() != METADATA.lower():
             continue
         if kind in sensors:
-            raise DataError("io.both", file=member.label, name=sensors[kind].name, kind=kind)
+            raise DataError(
+                "io.two-of-a-kind", file=member.label, name=sensors[kind].name, kind=kind
+            )
         data = member.read()
         files.append(member.file)
         if kind not in SENSORS:
@@ -219,7 +221,7 @@ def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
     if kind == GYROS[1]:
         findings.append(
             Finding(
-                "io.no-gyroscope-gyroscopeuncalibrated-read-phone",
+                "io.uncalibrated-gyroscope-read",
                 file=sensors[kind].name,
                 quantity="gyro",
                 severity="note",
@@ -257,7 +259,7 @@ def _force(
             )
         return []
     if not known:
-        findings.append(Finding("io.platform-not-known-ios-writes", file=name, quantity="accel"))
+        findings.append(Finding("io.sensor-logger-platform-unknown", file=name, quantity="accel"))
     elif turned:
         findings.append(
             Finding(

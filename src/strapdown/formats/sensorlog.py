@@ -78,9 +78,8 @@ def read(path: Path) -> RawLog:
     elif set(_three(FORCE, GS)) <= have:
         logs.append(_log(raw, FORCE, "accel", "-g", findings))
     if len(logs) > 1:
-        what = "acceleration is as iOS writes it: its sign is turned"
         findings.append(
-            Finding("io.message-2", file=path.name, quantity="accel", severity="note", message=what)
+            Finding("io.sign-of-ios-turned", file=path.name, quantity="accel", severity="note")
         )
     out = join(logs, path.name, (path,))
     return dataclasses.replace(out, findings=[*raw.findings, *findings, *out.findings])
@@ -129,7 +128,11 @@ def _clock(raw: RawLog, kind: str) -> str:
         if name in raw.columns:
             return name
     raise DataError(
-        "io.no-column-5", file=raw.name, quantity="time", stamps=STAMPS[kind], columns=raw.columns
+        "io.no-column-5",
+        file=raw.name,
+        quantity="time",
+        stamps=STAMPS[kind],
+        columns=list(raw.columns),
     )
 
 

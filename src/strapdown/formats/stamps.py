@@ -101,7 +101,7 @@ def read_stamps(
             stamps, unit = whole, "s"
             findings.append(
                 Finding(
-                    "io.seconds-week-begin-again-they",
+                    "io.seconds-of-week-unrolled",
                     file=file,
                     row=row(weeks[0]),
                     quantity="time",
@@ -119,7 +119,11 @@ def read_stamps(
     ):
         findings.append(
             Finding(
-                "io.stated-samples-second", file=file, quantity="time", unit=unit, usual=1.0 / usual
+                "io.stated-time-unit-implausible",
+                file=file,
+                quantity="time",
+                unit=unit,
+                usual=1.0 / usual,
             )
         )
     factor = TIME_UNITS[unit]
@@ -130,7 +134,7 @@ def read_stamps(
         if far:
             findings.append(
                 Finding(
-                    "io.stamps-count-distant-origin-time-2",
+                    "io.time-from-first-stamp",
                     file=file,
                     quantity="time",
                     severity="note",
@@ -164,16 +168,16 @@ def _refuse_backward(
     here, then = stamps[k], stamps[k + 1]
     if steps[k] == 0:
         raise DataError(
-            "io.stamp-repeats-row-before-all",
+            "io.stamp-repeated",
             file=file,
             row=row(k + 1),
             quantity="time",
             then=then,
-            times=_times(bad.size),
+            count=bad.size,
         )
     if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
         raise DataError(
-            "io.time-falls-counter-bits-does",
+            "io.time-counter-wraps",
             file=file,
             row=row(k + 1),
             quantity="time",
@@ -182,18 +186,14 @@ def _refuse_backward(
             bits=bits,
         )
     raise DataError(
-        "io.time-goes-back-all",
+        "io.time-goes-back",
         file=file,
         row=row(k + 1),
         quantity="time",
         here=here,
         then=then,
-        times=_times(bad.size),
+        count=bad.size,
     )
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
 
 
 def _usual_step(steps: Array) -> float:
@@ -218,7 +218,7 @@ def _repaired(
                 file=file,
                 quantity="time",
                 severity="note",
-                times=_times(wraps),
+                count=wraps,
             )
         )
     latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
@@ -226,12 +226,11 @@ def _repaired(
     if dropped := int((~keep).sum()):
         findings.append(
             Finding(
-                "io.row-left-out-whose-stamp",
+                "io.rows-not-later-left-out",
                 file=file,
                 quantity="time",
                 severity="note",
-                dropped=dropped,
-                value="s" if dropped > 1 else "",
+                count=dropped,
             )
         )
     return keep, ticks
@@ -244,27 +243,26 @@ def _evident_unit(
     if said.settled and (said.value == "s" or not only_seconds):
         unit = str(said.value)
         if unit != "s":
-            findings.append(
-                Finding(
-                    "io.message",
-                    file=file,
-                    quantity="time",
-                    message=str(said),
-                    remedy_text="if not, say --time-unit",
-                )
-            )
+            findings.append(said.finding("io.time-unit-inferred", file=file, quantity="time"))
         return unit, str(said)
     usual = _mean_step((stamps - stamps[0]).astype(np.float64))
     shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
-    told = "; ".join(
-        f"--time-unit {u} makes it {1.0 / (usual * TIME_UNITS[u]):.4g} Hz (probability {p:.2g})"
+    choices = [
+        Finding(
+            "io.choice-of-time-unit",
+            severity="note",
+            unit=u,
+            rate_hz=1.0 / (usual * TIME_UNITS[u]),
+            share=p,
+        )
         for u, p in shares.items()
         if p >= 1e-3 and usual > 0
-    )
+    ]
     raise DataError(
-        "io.message",
+        "io.time-unit-undecided" if choices else "io.time-unit-of-no-step",
         file=file,
         quantity="time",
-        message=f"no unit stated, and a mean step of {usual:.6g} does not tell it to {THRESHOLD:g}",
-        remedy_text=told or "check that this is the time column",
+        step=usual,
+        threshold=THRESHOLD,
+        choices=choices,
     )

@@ -68,20 +68,20 @@ def sampling_of_sums(
     ConfigError
         The user says that they are values at their stamps.
     """
-    names = " and ".join(t for t in ("gyro", "accel") if t in summed)
+    names = [t for t in ("gyro", "accel") if t in summed]
     if asked and asked.lower() != "mean":
         raise ConfigError(
-            "io.does-not-go-increments-they", quantity="--sampling", asked=asked, names=names
+            "io.sampling-against-increments", quantity="--sampling", asked=asked, names=names
         )
     rest = [t for t in ("gyro", "accel") if t in triads - summed]
     findings.append(
         Finding(
-            "io.message-2",
+            "io.increments-made-means-with-rates" if rest else "io.increments-made-means",
             file=file,
             quantity="sampling",
             severity="note",
-            message=f"{names}: increments of each sample, divided by its step (the first by the usual step); each row is the mean over the interval that ends at its stamp"
-            + "".join(f"; {t} is taken for such a mean, too" for t in rest),
+            names=names,
+            rest=rest,
         )
     )
     return "mean"

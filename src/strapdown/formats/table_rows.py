@@ -29,12 +29,7 @@ def told_by_file_rows(name: str, row_of: Callable[[int], int | None]) -> Iterato
     try:
         yield
     except DataError as error:
-        said = error.finding
+        row = error.finding.row
         raise DataError(
-            "io.message",
-            file=name,
-            row=None if said.row is None else row_of(said.row - 1),
-            quantity=said.quantity,
-            message=said.what,
-            remedy_text=said.remedy,
+            error.finding, file=name, row=None if row is None else row_of(row - 1)
         ) from None

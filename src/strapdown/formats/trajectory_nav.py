@@ -75,7 +75,7 @@ def read(path: Path) -> pd.DataFrame:
     raw = csv.read(path)
     if len(raw.columns) != len(NAMES):
         raise DataError(
-            "io.columns-layout",
+            "io.nav-column-count",
             file=raw.name,
             row=raw.row(0),
             count=len(raw.columns),

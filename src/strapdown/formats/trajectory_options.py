@@ -85,7 +85,7 @@ class TrajectoryFileOptions:
             )
         if self.digits not in DIGITS:
             raise ConfigError(
-                "io.no-way-write-numbers",
+                "io.digits-unknown",
                 quantity="digits",
                 digits=self.digits,
                 word=str(self.digits),

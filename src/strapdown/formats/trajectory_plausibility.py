@@ -74,32 +74,24 @@ def judge_trajectory(
     plain = misfit(lat, lon)
     if plain < DISAGREE:
         return []
-    readings: list[tuple[str, str, Callable[[], float], bool]] = [
+    readings: list[tuple[str, Callable[[], float], bool]] = [
         (
-            "latitude and longitude are exchanged",
-            "exchange the names of the columns, or say which is which with columns={'lat': …}",
+            "io.lat-lon-exchanged",
             lambda: misfit(lon, lat),
             bool(np.abs(lon).max() <= 90.0),
         ),
         (
-            "they are radians",
-            "name the columns lat_rad and lon_rad",
+            "io.lat-lon-in-radians",
             lambda: misfit(np.degrees(lat), np.degrees(lon)),
             not angles_stated and bool(np.abs(lat).max() < 1.6 and np.abs(lon).max() < 6.3),
         ),
     ]
-    for why, remedy, of, possible in readings:
-        if possible and of() < AGREE:
-            raise DataError(
-                "io.message",
-                file=file,
-                quantity="lat, lon",
-                message=f"places and velocities disagree ({plain:.0%} of the motion is unexplained), and agree if {why} ({of():.1%})",
-                remedy_text=remedy,
-            )
+    for code, of, possible in readings:
+        if possible and (other := of()) < AGREE:
+            raise DataError(code, file=file, quantity="lat, lon", misfit=plain, other=other)
     return [
         Finding(
-            "io.places-integral-velocity-disagree-motion",
+            "io.positions-and-velocities-disagree",
             file=file,
             quantity="lat, lon",
             plain=plain,
@@ -121,7 +113,7 @@ def _refuse_radians_of_attitude(euler: Array, velocity: Array, file: str | None)
     # Nothing drives 20 deg beside its heading and, by accident, along 57 times its heading.
     if plain > 20.0 and radians < 5.0:
         raise DataError(
-            "io.heading-course-if-radians",
+            "io.heading-in-radians",
             file=file,
             quantity="heading",
             plain=plain,

@@ -89,7 +89,7 @@ def write_trajectory(
     form = path.suffix.lower().removeprefix(".")
     if form not in TRAJECTORY_WRITERS:
         raise ConfigError(
-            "io.no-writer-files-end",
+            "io.no-writer-for-ending",
             file=str(path),
             suffix=path.suffix,
             word=form,
@@ -100,6 +100,6 @@ def write_trajectory(
         TRAJECTORY_WRITERS[form](part, trajectory, name=name or path.stem, options=options)
         part.replace(path)
     except OSError as error:
-        raise ConfigError("io.cannot-written", file=str(path), strerror=error.strerror) from None
+        raise ConfigError("io.not-writable", file=str(path), strerror=error.strerror) from None
     finally:
         part.unlink(missing_ok=True)

@@ -101,7 +101,7 @@ def units_of_triads(
     asked: set[str] = set()
     for triad, block in values.items():
         stated = _stated_unit(found, triad, options)
-        if stated is None or stated[1].startswith("stated by --"):
+        if stated is None or _asked_unit(triad, options):
             asked.add(triad)
         try:
             if stated is None:
@@ -134,10 +134,15 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
         )
 
 
+def _asked_unit(triad: str, options: ReadOptions) -> str | None:
+    """The unit that the user states."""
+    return {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
+
+
 def _stated_unit(
     found: dict[str, Column], triad: str, options: ReadOptions
 ) -> tuple[str, str] | None:
-    asked = {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
+    asked = _asked_unit(triad, options)
     if asked:
         return parse_unit(asked, triad), f"stated by --{triad}-unit"
     columns = [found[f"{triad}_{a}"] for a in AXES]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,21 +44,27 @@ def values_of_triads(
     for triad in OPTIONAL:
         if not any(f"{triad}_{a}" in found for a in AXES):
             continue
+        missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in found]
+        if missing:
+            findings.append(_not_used(raw, triad, "io.left-out-without-axes", missing=missing))
+            continue
         try:
-            missing = [f"{triad}_{a}" for a in AXES if f"{triad}_{a}" not in found]
-            if missing:
-                raise DataError("io.not", missing=missing)
             block = _triad(raw, found, triad)
-            if not np.isfinite(block).any():
-                raise DataError("io.holds-no-number-2")
-            empty = int((~np.isfinite(block)).any(axis=1).sum())
-            if triad == "mag" and empty:
-                raise DataError("io.rows-hold-no-number", empty=empty)
         except DataError as error:
             findings.append(left_out(raw, triad, error))
+            continue
+        empty = int((~np.isfinite(block)).any(axis=1).sum())
+        if not np.isfinite(block).any():
+            findings.append(_not_used(raw, triad, "io.left-out-without-number"))
+        elif triad == "mag" and empty:
+            findings.append(_not_used(raw, triad, "io.left-out-rows-without-number", count=empty))
         else:
             values[triad] = block
     return values
+
+
+def _not_used(raw: RawLog, triad: str, code: str, **data: Any) -> Finding:
+    return Finding(code, file=raw.name, quantity=triad, severity="note", **data)
 
 
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
@@ -66,12 +74,10 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
 
 def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
     """Say of a triad that it is not used, and why."""
-    said = error.finding
     return Finding(
-        "io.message",
+        "io.left-out-unusable",
         file=raw.name,
-        row=said.row,
+        row=error.finding.row,
         quantity=triad,
-        message=f"left out: {said.what}",
-        remedy_text=said.remedy,
+        reason=error.finding,
     )

@@ -14,7 +14,7 @@ from strapdown.constants import (
     MAG_UNITS,
     TIME_UNITS,
 )
-from strapdown.errors import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["UNIT_OF", "factor_of", "parse_unit", "unit_of"]
 
@@ -112,15 +112,12 @@ def parse_unit(text: str, kind: str) -> str:
     counted = kind in ("gyro", "accel")
     scale, of = _taken_apart(text) if counted else (None, "")
     if scale is None or (unit := _word(of)) not in known:
-        remedy = nearest(text, known)
-        if counted:
-            example = "deg/s/131" if kind == "gyro" else "g/16384"
-            remedy = f"{remedy.rstrip('.')}; of raw counts say how many are a unit, as in {example}"
         raise ConfigError(
-            "io.message",
+            "io.unknown-unit-or-counts" if counted else "io.unknown-unit",
             quantity=f"--{kind}-unit",
-            message=f"'{text}' is no unit of it",
-            remedy_text=remedy,
+            word=text,
+            known=known,
+            example="deg/s/131" if kind == "gyro" else "g/16384",
         )
     counts = f"{1.0 / scale:g}"
     exact = math.isclose(float(counts) * scale, 1.0, rel_tol=1e-12)

@@ -61,27 +61,25 @@ def finite_rows(
         count = int(bad.any(axis=1).sum())
         if not options.repair:
             raise DataError(
-                "io.not-finite-number-column-such",
+                "io.not-finite-in-rows",
                 file=raw.name,
                 row=raw.row(row),
                 quantity=quantity,
                 block=block[row, column],
                 source=found[quantity].source,
                 count=count,
-                value="s" if count > 1 else "",
             )
         findings.append(
             Finding(
-                "io.row-left-out-held-no",
+                "io.rows-without-number-left-out",
                 file=raw.name,
                 row=raw.row(row),
                 quantity=quantity,
                 severity="note",
                 count=count,
-                value="s" if count > 1 else "",
             )
         )
         keep &= ~bad.any(axis=1)
     if not keep.any():
-        raise DataError("io.no-row-can-used", file=raw.name)
+        raise DataError("io.no-usable-row", file=raw.name)
     return keep

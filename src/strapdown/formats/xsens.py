@@ -77,9 +77,8 @@ def read(path: Path) -> RawLog:
     }
     findings = list(raw.findings)
     if "Mag_X" in raw.columns:
-        what = "Mag is not used: it counts in the magnetic field at the factory, in no unit"
         findings.append(
-            Finding("io.message-2", file=path.name, quantity="mag", severity="note", message=what)
+            Finding("io.xsens-mag-not-used", file=path.name, quantity="mag", severity="note")
         )
     columns = dict(raw.columns)
     source, stamps = _stamps(raw, rate, findings)
@@ -100,10 +99,14 @@ def _stamps(
         ticks = _unwrapped(raw, STAMP, (32,), findings)
         tick = _tick(raw, ticks, rate)
         if tick != 1:
-            what = f"{STAMP} counts 0.1 ms, by its step and the rate; shown in µs"
             findings.append(
                 Finding(
-                    "io.message-2", file=raw.name, quantity="time", severity="note", message=what
+                    "io.xsens-tick",
+                    file=raw.name,
+                    quantity="time",
+                    severity="note",
+                    column=STAMP,
+                    tick_us=tick,
                 )
             )
         return STAMP, ticks * tick
@@ -171,6 +174,14 @@ def _tick(raw: RawLog, ticks: NDArray[Any], rate: float | None) -> int:
         fits = [t for t, r in found.items() if RATES[0] <= r <= RATES[1]]
     if len(fits) == 1:
         return fits[0]
-    told = " or ".join(f"{r:.4g} Hz in ticks of {t} µs" for t, r in found.items())
-    top = f"the rate at the top, {rate:g} Hz, is neither" if rate else "no rate stands at the top"
-    raise DataError("io.step", file=raw.name, quantity=STAMP, step=step, told=told, top=top)
+    raise DataError(
+        "io.xsens-tick-undecided" if rate is None else "io.xsens-tick-against-rate",
+        file=raw.name,
+        quantity=STAMP,
+        step=step,
+        rate_hz=rate,
+        choices=[
+            Finding("io.choice-of-tick", severity="note", rate_hz=r, tick_us=tick)
+            for tick, r in found.items()
+        ],
+    )

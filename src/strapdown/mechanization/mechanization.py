@@ -310,7 +310,7 @@ class Mechanization(ABC):
                     self.largest_speed,
                     increments.attrs.get("source"),
                 )
-            before = self._words(history[made - 1]) if made else ""
+            before = self._state_before(history[made - 1]) if made else None
             refuse_step(why, at, increments, before, self.latitude_limit_deg)
         if backward:
             state[velocity] *= -1.0
@@ -357,8 +357,11 @@ class Mechanization(ABC):
     def _speed(self, row: Array) -> float:
         return float(np.linalg.norm(row[self.v_at : self.v_at + 3]))
 
-    def _words(self, row: Array) -> str:
-        return (
-            f"; before it {np.degrees(self.latitude(row)):.6f} deg of latitude, "
-            f"{row[self.alt_at]:.6g} m of height, {self._speed(row):.6g} m/s"
+    def _state_before(self, row: Array) -> Finding:
+        return Finding(
+            "mechanization.state-before-step",
+            severity="note",
+            lat_deg=np.degrees(self.latitude(row)),
+            alt=row[self.alt_at],
+            speed=self._speed(row),
         )

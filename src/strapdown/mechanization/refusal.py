@@ -7,7 +7,7 @@ from typing import NoReturn
 import pandas as pd
 
 from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
-from strapdown.errors import DivergenceError
+from strapdown.errors import DivergenceError, Finding
 from strapdown.tables import MOTION
 
 
@@ -49,7 +49,7 @@ def refuse_start(
 
 
 def refuse_step(
-    why: int, step: int, increments: pd.DataFrame, before: str, latitude_limit_deg: float
+    why: int, step: int, increments: pd.DataFrame, before: Finding | None, latitude_limit_deg: float
 ) -> NoReturn:
     """Refuse a step that a kernel did not make.
 
@@ -61,8 +61,8 @@ def refuse_step(
         Row of the increments, from 0.
     increments : DataFrame
         A MotionIncrements table.
-    before : str
-        The state before it in words, or nothing.
+    before : Finding or None
+        The state before it; None at the first step.
     latitude_limit_deg : float, deg
 
     Raises
@@ -75,7 +75,9 @@ def refuse_step(
     source = increments.attrs.get("source")
     if why == POLE:
         raise DivergenceError(
-            "mechanization.sample-step-comes-nearer-pole",
+            "mechanization.first-step-near-pole"
+            if before is None
+            else "mechanization.step-near-pole",
             file=source,
             quantity="lat",
             time=time,
@@ -85,7 +87,7 @@ def refuse_step(
         )
     if why == LEAP:
         raise DivergenceError(
-            "mechanization.sample-step-place-moves-more",
+            "mechanization.first-step-too-far" if before is None else "mechanization.step-too-far",
             file=source,
             quantity="state",
             time=time,
@@ -94,13 +96,12 @@ def refuse_step(
             largest_turn=LARGEST_TURN,
             before=before,
         )
-    given = ", ".join(f"{name} {row[name]:.4g}" for name in MOTION)
     raise DivergenceError(
-        "mechanization.state-diverged-sample-step",
+        "mechanization.first-step-diverges" if before is None else "mechanization.step-diverges",
         file=source,
         quantity="state",
         time=time,
         step=step + 1,
-        given=given,
+        increments=[f"{name} {row[name]:.4g}" for name in MOTION],
         before=before,
     )

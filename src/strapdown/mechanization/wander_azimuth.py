@@ -163,7 +163,8 @@ class WanderAzimuth(Mechanization):
         begin, end = time[near[0]], time[near[-1]]
         return (
             Finding(
-                "mechanization.states-within-pole-nearest-error",
+                "mechanization.states-near-pole",
+                severity="note",
                 quantity="heading",
                 size=near.size,
                 begin=begin,

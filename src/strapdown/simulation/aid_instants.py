@@ -57,10 +57,9 @@ def check_numbers(sensor: object, *names: str, above: bool = False) -> None:
         value = np.asarray(getattr(sensor, name), dtype=np.float64)
         if not np.isfinite(value).all() or (value < 0.0).any() or (above and (value == 0.0).any()):
             raise ConfigError(
-                "simulation.out-range",
+                "simulation.sensor-not-positive" if above else "simulation.sensor-negative",
                 quantity=name,
                 value=getattr(sensor, name),
-                value_2="above zero" if above else "of zero or more",
             )
 
 

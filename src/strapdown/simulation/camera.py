@@ -80,20 +80,20 @@ class Camera:
     def __post_init__(self) -> None:
         for name in ("focal", "rate"):
             if not 0.0 < getattr(self, name) < math.inf:
-                raise _refused(self, name, getattr(self, name), "give more than zero")
+                raise _refused(self, name, getattr(self, name), "simulation.camera-not-positive")
         spreads = ("position_sd", "angles_sd_deg", "focal_sd", "k1_sd", "clock_sd")
         for name in ("reading_sd", *spreads):
             if not 0.0 <= getattr(self, name) < math.inf:
-                raise _refused(self, name, getattr(self, name), "give zero or more")
+                raise _refused(self, name, getattr(self, name), "simulation.camera-negative")
         for name in ("k1", "clock_offset"):
             if not math.isfinite(getattr(self, name)):
-                raise _refused(self, name, getattr(self, name), "give a finite number")
+                raise _refused(self, name, getattr(self, name), "simulation.camera-not-finite")
         if min(self.size) < 1:
-            raise _refused(self, "size", self.size, "give width and height in px")
+            raise _refused(self, "size", self.size, "simulation.camera-size")
         length = np.linalg.norm(self.looking) * np.linalg.norm(self.up)
         across = np.linalg.norm(np.cross(self.looking, self.up))
         if not (np.isfinite(length) and length > 0.0 and across > 1e-6 * length):
-            raise _refused(self, "up", self.up, "give a direction that is not along 'looking'")
+            raise _refused(self, "up", self.up, "simulation.camera-up")
 
     @property
     def axes(self) -> Array:
@@ -156,10 +156,5 @@ def _middle(camera: Camera) -> Array:
     return 0.5 * np.asarray(camera.size, dtype=np.float64)
 
 
-def _refused(camera: Camera, name: str, value: object, remedy: str) -> ConfigError:
-    return ConfigError(
-        "simulation.message",
-        quantity=name,
-        message=f"camera '{camera.name}': {value} is out of range",
-        remedy_text=remedy,
-    )
+def _refused(camera: Camera, quantity: str, value: object, code: str) -> ConfigError:
+    return ConfigError(code, quantity=quantity, name=camera.name, value=value)

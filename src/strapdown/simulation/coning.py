@@ -57,9 +57,14 @@ class Coning(FlatMotion):
             ("duration", self.duration, np.inf, "s"),
         ):
             if not 0.0 < value < most:
-                below = f" and below {most:g} {unit}" if np.isfinite(most) else ""
                 raise ConfigError(
-                    "simulation.makes-no-cone", quantity=name, value=value, unit=unit, below=below
+                    "simulation.cone-out-of-range"
+                    if np.isfinite(most)
+                    else "simulation.cone-not-positive",
+                    quantity=name,
+                    value=value,
+                    unit=unit,
+                    most=most,
                 )
         length = float(np.linalg.norm(self.axis))
         if not (np.isfinite(length) and length > 0.0):

@@ -70,17 +70,15 @@ class Course:
         """Angle of climb there, deg."""
         return self.climb[-1][1]
 
-    def moving_speed(self, what: str) -> float:
-        """Speed there, which must not be zero."""
+    def moving_speed(self, code: str) -> float:
+        """Speed there; an error of this code where it is zero."""
         if self.speed_now <= 0.0:
-            raise unfit(
-                f"{what} needs a speed, and the vehicle stands", "accelerate before it", "speed"
-            )
+            raise ConfigError(code, quantity="speed")
         return self.speed_now
 
-    def level_speed(self, what: str) -> float:
+    def level_speed(self, code: str) -> float:
         """Horizontal part of it, m/s."""
-        return self.moving_speed(what) * math.cos(math.radians(self.climb_now))
+        return self.moving_speed(code) * math.cos(math.radians(self.climb_now))
 
 
 class Manoeuvre(Protocol):
@@ -125,12 +123,7 @@ def lay_course(
             manoeuvre.lay(course)
         except ConfigError as error:
             f = error.finding
-            raise ConfigError(
-                "simulation.message",
-                quantity=f"manoeuvre {number}, {name}, {f.quantity}",
-                message=f.what,
-                remedy_text=f.remedy,
-            ) from None
+            raise ConfigError(f, quantity=f"manoeuvre {number}, {name}, {f.quantity}") from None
     return course.time, _track(course.speed), _track(course.turn_rate), _track(course.climb)
 
 
@@ -142,9 +135,4 @@ def _track(points: list[tuple[float, float]]) -> Track:
 def check_length(value: float, name: str = "duration") -> None:
     """Refuse what is no length of a manoeuvre."""
     if not 0.0 < value < math.inf:
-        raise unfit(f"it is {value:g}", "use a number above zero", name)
-
-
-def unfit(what: str, remedy: str, quantity: str) -> ConfigError:
-    """What a manoeuvre raises; `lay_course` adds which it is."""
-    return ConfigError("simulation.message", quantity=quantity, message=what, remedy_text=remedy)
+        raise ConfigError("simulation.not-above-zero", quantity=name, value=value)

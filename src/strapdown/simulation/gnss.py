@@ -112,10 +112,13 @@ class GnssReceiver:
                 or (positive and (value == 0.0).any())
             ):
                 raise ConfigError(
-                    "simulation.out-range-2" if signed else "simulation.out-range-3",
+                    "simulation.sensor-not-finite"
+                    if signed
+                    else "simulation.sensor-not-positive"
+                    if positive
+                    else "simulation.sensor-negative",
                     quantity=f.name,
-                    given=given,
-                    value="above zero" if positive else "of zero or more",
+                    value=given,
                 )
             kept = tuple(value.tolist()) if triad else float(value[0])
             object.__setattr__(self, f.name, kept)

@@ -70,9 +70,14 @@ class GnssFault(ABC):
     def _checked(self, name: str, low: float, high: float = math.inf) -> None:
         value = getattr(self, name)
         if not (is_number(value) and math.isfinite(value) and low <= value <= high):
-            upper = f" to {high:g}" if math.isfinite(high) else " or more, finite"
             raise ConfigError(
-                "simulation.will-not-do", quantity=name, value=value, low=low, upper=upper
+                "simulation.fault-out-of-range"
+                if math.isfinite(high)
+                else "simulation.fault-below-least",
+                quantity=name,
+                value=value,
+                low=low,
+                high=high,
             )
 
 
@@ -228,12 +233,10 @@ def inject_gnss_faults(
         time = index_of(out)
         within = (time >= fault.begin) & (time < fault.end)
         if not within.any() or (within.all() and isinstance(fault, Outage)):
-            what = "every fix is" if within.any() else "there is no fix"
             raise ConfigError(
-                "simulation.between",
+                "simulation.outage-of-every-fix" if within.any() else "simulation.no-fix-between",
                 file=source_of(table),
                 quantity=type(fault).__name__,
-                what=what,
                 begin=fault.begin,
                 end=fault.end,
                 time=time[0],

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.simulation.course import Course, check_length, unfit
+from strapdown.errors import ConfigError
+from strapdown.simulation.course import Course, check_length
 from strapdown.simulation.minimum_jerk import Track, minimum_jerk
 from strapdown.simulation.track_integral import integrate_track
 
@@ -36,16 +37,24 @@ class Accelerate:
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         if not 0.0 <= self.to < math.inf:
-            raise unfit(f"a speed of {self.to:g} m/s", "use zero or more", "to")
+            raise ConfigError(
+                "simulation.speed-negative",
+                quantity="to",
+                speed=self.to,
+            )
         check_length(self.duration)
         greatest = _PEAK * abs(self.to - course.speed_now) / self.duration
         if greatest > course.limits.acceleration:
             least = self.duration * greatest / course.limits.acceleration
-            raise unfit(
-                f"from {course.speed_now:g} to {self.to:g} m/s in {self.duration:g} s takes up to "
-                f"{greatest:.3g} m/s², more than the {course.limits.acceleration:g} m/s² allowed",
-                f"take at least {least:.3g} s",
-                "duration",
+            raise ConfigError(
+                "simulation.acceleration-too-large",
+                quantity="duration",
+                speed=course.speed_now,
+                to=self.to,
+                duration=self.duration,
+                greatest=greatest,
+                limit=course.limits.acceleration,
+                least=least,
             )
         course.move(course.speed, course.time, self.duration, self.to)
         course.time += self.duration
@@ -58,10 +67,11 @@ class Brake(Accelerate):
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         if self.to >= course.speed_now:
-            raise unfit(
-                f"to brake from {course.speed_now:g} to {self.to:g} m/s",
-                "let the vehicle move faster before, or accelerate",
-                "to",
+            raise ConfigError(
+                "simulation.braking-not-slower",
+                quantity="to",
+                speed=course.speed_now,
+                to=self.to,
             )
         super().lay(course)
 
@@ -82,7 +92,11 @@ class Stop:
         """Add it to a course."""
         Brake(0.0, self.braking).lay(course)
         if not 0.0 <= self.stay < math.inf:
-            raise unfit(f"it is {self.stay:g}", "use zero or more", "stay")
+            raise ConfigError(
+                "simulation.stay-negative",
+                quantity="stay",
+                stay=self.stay,
+            )
         course.time += self.stay
 
 
@@ -118,7 +132,7 @@ class Along:
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         check_length(self.distance, "distance")
-        course.time += self.distance / course.moving_speed("a distance")
+        course.time += self.distance / course.moving_speed("simulation.distance-at-rest")
 
 
 @dataclass(frozen=True)
@@ -143,15 +157,18 @@ class Turn:
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         check_length(self.radius, "radius")
-        speed, most = course.level_speed("a turn"), course.limits.lateral
+        speed, most = course.level_speed("simulation.turn-at-rest"), course.limits.lateral
         lateral = speed * speed / self.radius
         if lateral > most:
-            raise unfit(
-                f"{speed:.4g} m/s on a radius of {self.radius:g} m take {lateral:.3g} m/s² to the "
-                f"side, more than the {most:g} m/s² allowed",
-                f"use a radius of at least {speed * speed / most:.3g} m, or at most "
-                f"{math.sqrt(most * self.radius):.3g} m/s",
-                "radius",
+            raise ConfigError(
+                "simulation.radius-too-small",
+                quantity="radius",
+                speed=speed,
+                radius=self.radius,
+                lateral=lateral,
+                limit=most,
+                least=speed * speed / most,
+                slowest=math.sqrt(most * self.radius),
             )
         _turn(course, self.angle_deg, math.degrees(speed / self.radius), self.ramp)
 
@@ -178,13 +195,14 @@ class BankedTurn:
         """Add it to a course."""
         most = course.limits.bank_deg
         if not 0.0 < self.bank_deg <= most:
-            raise unfit(
-                f"a bank of {self.bank_deg:g} deg",
-                f"use more than zero and at most {most:g} deg; the sign of the angle says where",
-                "bank",
+            raise ConfigError(
+                "simulation.bank-out-of-range",
+                quantity="bank",
+                bank=self.bank_deg,
+                most=most,
             )
         lateral = STANDARD_GRAVITY * math.tan(math.radians(self.bank_deg))
-        rate = math.degrees(lateral / course.level_speed("a turn"))
+        rate = math.degrees(lateral / course.level_speed("simulation.turn-at-rest"))
         _turn(course, self.angle_deg, rate, self.ramp)
 
 
@@ -210,12 +228,13 @@ class Climb:
         """Add it to a course."""
         most = course.limits.climb_deg
         if not 0.0 < abs(self.angle_deg) <= most:
-            raise unfit(
-                f"a climb at {self.angle_deg:g} deg",
-                f"use more than zero and at most {most:g} deg",
-                "angle",
+            raise ConfigError(
+                "simulation.climb-out-of-range",
+                quantity="angle",
+                angle=self.angle_deg,
+                most=most,
             )
-        speed = course.moving_speed("a climb")
+        speed = course.moving_speed("simulation.climb-at-rest")
         check_length(self.ramp, "ramp")
         if self.height is None:
             course.move(course.climb, course.time, self.ramp, self.angle_deg)
@@ -223,10 +242,9 @@ class Climb:
             return
         check_length(self.height, "height")
         if course.climb_now != 0.0:
-            raise unfit(
-                "a climb by a height begins level, and the vehicle climbs already",
-                "let `level` come before it",
-                "height",
+            raise ConfigError(
+                "simulation.climb-not-from-level",
+                quantity="height",
             )
         steep = abs(self.angle_deg)
         x, w = np.polynomial.legendre.leggauss(_NODES)
@@ -234,11 +252,12 @@ class Climb:
         ramps = speed * self.ramp * float(w @ rising)
         hold = (self.height - ramps) / (speed * math.sin(math.radians(steep)))
         if hold < 0.0:
-            raise unfit(
-                f"the two ramps of {self.ramp:g} s alone gain {ramps:.4g} m, more than the "
-                f"{self.height:g} m wanted",
-                "use a smaller angle, a shorter ramp or a greater height",
-                "height",
+            raise ConfigError(
+                "simulation.climb-ramps-too-high",
+                quantity="height",
+                ramp=self.ramp,
+                gain=ramps,
+                height=self.height,
             )
         course.move(course.climb, course.time, self.ramp, self.angle_deg)
         course.move(course.climb, course.time + self.ramp + hold, self.ramp, 0.0)
@@ -281,7 +300,7 @@ class LaneChange:
     def lay(self, course: Course) -> None:
         """Add it to a course."""
         check_length(self.duration)
-        speed, most = course.level_speed("a lane change"), course.limits.lateral
+        speed, most = course.level_speed("simulation.lane-change-at-rest"), course.limits.lateral
         quarter = 0.25 * self.duration
         times = tuple(quarter * k for k in range(5))
         shape = Track(times, (0.0, 1.0, 0.0, -1.0, 0.0))
@@ -297,11 +316,13 @@ class LaneChange:
         steepest = math.radians(60.0) / float(turned.max())
         rate = _solve(reached, abs(self.offset), steepest)
         if rate is None or speed * math.radians(rate) > most:
-            raise unfit(
-                f"{self.offset:g} m to the side in {self.duration:g} s at {speed:.4g} m/s take "
-                f"more than the {most:g} m/s² allowed to the side",
-                "give it more time",
-                "duration",
+            raise ConfigError(
+                "simulation.lane-change-too-fast",
+                quantity="duration",
+                offset=self.offset,
+                duration=self.duration,
+                speed=speed,
+                limit=most,
             )
         side = math.copysign(rate, self.offset)
         for k, value in enumerate((side, 0.0, -side, 0.0)):
@@ -311,7 +332,11 @@ class LaneChange:
 
 def _turn(course: Course, angle: float, rate: float, ramp: float) -> None:
     if not (math.isfinite(angle) and angle != 0.0):
-        raise unfit(f"a turn by {angle:g} deg", "give an angle other than zero", "angle")
+        raise ConfigError(
+            "simulation.turn-by-no-angle",
+            quantity="angle",
+            angle=angle,
+        )
     check_length(ramp, "ramp")
     whole = abs(angle) / rate
     ramp = min(ramp, whole)

@@ -135,11 +135,11 @@ class RecorderDesign:
             raise ConfigError("simulation.recorder-none", quantity="accelerometers", name=self.name)
         for name in ("trigger_sd", "high_g_bias"):
             if not 0.0 <= getattr(self, name) < math.inf:
-                raise _out(self, name, "give zero or more")
+                raise _out(self, name, "simulation.recorder-negative")
         if not math.isfinite(self.clock_offset):
-            raise _out(self, "clock_offset", "give a finite number")
+            raise _out(self, "clock_offset", "simulation.recorder-not-finite")
         if not abs(self.clock_drift_ppm) <= MOST_DRIFT:
-            raise _out(self, "clock_drift_ppm", f"give at most {MOST_DRIFT:g}")
+            raise _out(self, "clock_drift_ppm", "simulation.recorder-drift")
 
     def told(self, which: int) -> TriadUncertainty:
         """What is told of an accelerometer: its own, its high-g bias, what is left of warm-up."""
@@ -190,10 +190,6 @@ class RecorderTruth:
         return self.clock_offset + (1.0 + 1e-6 * self.clock_drift_ppm) * time
 
 
-def _out(design: RecorderDesign, name: str, remedy: str) -> ConfigError:
-    return ConfigError(
-        "simulation.message",
-        quantity=name,
-        message=f"recorder '{design.name}': {getattr(design, name):g} is out of range",
-        remedy_text=remedy,
-    )
+def _out(design: RecorderDesign, name: str, code: str) -> ConfigError:
+    value = getattr(design, name)
+    return ConfigError(code, quantity=name, name=design.name, value=value, most=MOST_DRIFT)

@@ -72,9 +72,14 @@ class Sculling(FlatMotion):
             ("duration", self.duration, np.inf, "s"),
         ):
             if not (0.0 < value <= most and np.isfinite(value)):
-                up = f" and at most {most:g} {unit}" if np.isfinite(most) else ""
                 raise ConfigError(
-                    "simulation.makes-no-sculling", quantity=name, value=value, unit=unit, up=up
+                    "simulation.sculling-out-of-range"
+                    if np.isfinite(most)
+                    else "simulation.sculling-not-positive",
+                    quantity=name,
+                    value=value,
+                    unit=unit,
+                    most=most,
                 )
         if not np.isfinite(self.phase):
             raise ConfigError("simulation.no-angle", quantity="phase", phase=self.phase)

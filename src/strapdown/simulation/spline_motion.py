@@ -227,12 +227,7 @@ def _check_points(time: Array, place: Array) -> None:
             Origin(lat, lon, alt)
         except ConfigError as error:
             f = error.finding
-            raise ConfigError(
-                "simulation.message",
-                quantity=f"place {k + 1}, {f.quantity}",
-                message=f.what,
-                remedy_text=f.remedy,
-            ) from None
+            raise ConfigError(f, quantity=f"place {k + 1}, {f.quantity}") from None
 
 
 def _check_euler(euler: Array, count: int) -> None:

@@ -24,18 +24,22 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
     """
     for flag, value in (("--from", from_s), ("--to", to_s), ("--duration", duration_s)):
         if value is not None and not np.isfinite(value):
-            raise ConfigError("io.no-number-5", quantity=flag, value=value)
+            raise ConfigError("io.part-not-finite", quantity=flag, value=value)
     if to_s is not None and duration_s is not None:
         raise ConfigError(
-            "io.ends-or-after-both-said",
+            "io.part-ends-twice",
             quantity="--to, --duration",
             to_s=to_s,
             duration_s=duration_s,
         )
     if duration_s is not None and not duration_s > 0.0:
-        raise ConfigError("io.no-duration", quantity="--duration", duration_s=duration_s)
+        raise ConfigError(
+            "io.part-duration-not-positive", quantity="--duration", duration_s=duration_s
+        )
     if from_s is not None and to_s is not None and not from_s < to_s:
-        raise ConfigError("io.not-after", quantity="--to", to_s=to_s, from_s=from_s)
+        raise ConfigError(
+            "io.part-ends-before-it-begins", quantity="--to", to_s=to_s, from_s=from_s
+        )
 
 
 def part_of_log(
@@ -80,11 +84,16 @@ def part_of_log(
     if kept.sum() < 2:
         ends = to_s is not None or duration_s is not None
         raise ConfigError(
-            "io.samples-lie-log-runs",
+            "io.part-between"
+            if from_s is not None and ends
+            else "io.part-up-to"
+            if ends
+            else "io.part-from",
             file=name,
             quantity="time",
             kept=int(kept.sum()),
-            words=_words(from_s, last if ends else None),
+            from_s=first,
+            to_s=last,
             time=time[0],
             time_2=time[-1],
         )
@@ -95,9 +104,3 @@ def part_of_log(
     if out.attrs.get("first_row") is not None:
         out.attrs["first_row"] += int(np.argmax(kept))
     return out
-
-
-def _words(from_s: float | None, last: float | None) -> str:
-    if from_s is None:
-        return f"up to {last:.9g} s"
-    return f"from {from_s:.9g} s on" if last is None else f"between {from_s:.9g} and {last:.9g} s"

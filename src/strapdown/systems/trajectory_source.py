@@ -262,11 +262,4 @@ def _with_key(error: ConfigError, name: str) -> ConfigError:
     f = error.finding
     parts = (f.quantity or "").split(", ")
     words = [_KEYS.get(part, part).replace("place ", "waypoint ") for part in parts]
-    return ConfigError(
-        "simulation.message",
-        file=name,
-        row=f.row,
-        quantity=", ".join(words),
-        message=f.what,
-        remedy_text=f.remedy,
-    )
+    return ConfigError(f, file=name, quantity=", ".join(words))

@@ -121,18 +121,17 @@ def barometer_from_pressure(
     if wrong.size:
         row = int(wrong[0])
         middle = float(np.median(p))
-        remedy = "give the static pressure of the air in Pa, below 11 km of height"
-        for unit, factor in (("hPa (mbar)", 100.0), ("kPa", 1000.0)):
+        code = "tables.pressure-of-no-air"
+        for other, factor in (("tables.pressure-in-hpa", 100.0), ("tables.pressure-in-kpa", 1e3)):
             if LEAST_PRESSURE <= factor * middle <= MOST_PRESSURE:
-                remedy = f"this looks like {unit}: multiply by {factor:g}"
+                code = other
                 break
         raise DataError(
-            "tables.message",
+            code,
             file=source,
             row=row + 1,
             quantity="pressure_pa",
-            message=f"{p[row]:.6g} Pa is no pressure of open air",
-            remedy_text=remedy,
+            pressure=p[row],
         )
     spread = as_array(each_row(pressure_sd_pa, p), None, "pressure_sd_pa", source)
     return barometer_table(time, standard_height(p), -standard_slope(p) * spread, source)

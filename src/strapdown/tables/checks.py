@@ -37,7 +37,7 @@ def as_array(values: ArrayLike, columns: int | None, name: str, source: str | No
 def check_same_length(source: str | None, **arrays: Array) -> None:
     """One row a sample in each."""
     if len({len(a) for a in arrays.values()}) > 1:
-        lengths = ", ".join(f"{name} {len(a)}" for name, a in arrays.items())
+        lengths = [f"{name} {len(a)}" for name, a in arrays.items()]
         raise DataError("tables.arrays-different-lengths", file=source, lengths=lengths)
 
 
@@ -116,14 +116,14 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
     if bad.any():
         row, column = (int(i) for i in np.argwhere(bad)[0])
         rows = np.flatnonzero(bad.any(axis=1))
-        more = f"; {rows.size} rows up to row {rows[-1] + 1} have such" if rows.size > 1 else ""
         raise DataError(
-            "tables.not-finite-number",
+            "tables.not-finite-numbers" if rows.size > 1 else "tables.not-finite-number",
             file=source,
             row=row + 1,
             quantity=columns[column],
             values=values[row, column],
-            more=more,
+            count=rows.size,
+            last_row=rows[-1] + 1,
         )
 
 

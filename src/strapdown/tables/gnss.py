@@ -38,6 +38,9 @@ LEAST_STEPS = 4
 # below the other; both relative to the speed.
 UNLIKE, ALIKE = 0.3, 0.15
 
+# What the places are, and not the velocities.
+_OF_PLACES = ("tables.places-in-degrees-and-minutes", "tables.places-swapped")
+
 
 def gnss_table(
     time: ArrayLike,
@@ -168,29 +171,25 @@ def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
         return
     kmh, knots = 3.6, 3600.0 / 1852.0
     readings = {
-        "they are km/h: divide them by 3.6": misfit(told / kmh),
-        "they are knots: multiply them by 0.514444": misfit(told / knots),
-        "north and east are exchanged: exchange VN and VE": misfit(told[:, ::-1]),
-        "latitude and longitude are degrees and minutes: make ddmm.mmmm to dd + mm.mmmm / 60": (
-            misfit(told, track / 0.6)
-        ),
+        "tables.velocity-in-km-h": misfit(told / kmh),
+        "tables.velocity-in-knots": misfit(told / knots),
+        "tables.velocity-north-east-exchanged": misfit(told[:, ::-1]),
+        "tables.places-in-degrees-and-minutes": misfit(told, track / 0.6),
     }
     if np.abs(place[:, 1]).max() < 90.0:
         other = place_difference(place[apart:][:, [1, 0, 2]], place[:-apart][:, [1, 0, 2]])[:, :2]
-        readings["latitude and longitude are swapped: exchange the columns"] = misfit(
-            told, (other / lasted)[clear]
-        )
-    remedy = min(readings, key=lambda name: readings[name])
-    if readings[remedy] > ALIKE:
+        readings["tables.places-swapped"] = misfit(told, (other / lasted)[clear])
+    code = min(readings, key=lambda name: readings[name])
+    if readings[code] > ALIKE:
         return
     row = int(np.flatnonzero(good)[np.flatnonzero(clear)[0]])
     raise DataError(
-        "tables.message",
+        code,
         file=source,
         row=row + 1,
-        quantity="lat, lon" if "latitude" in remedy else "VN, VE",
-        message=f"the velocity ({np.hypot(*told.T)[0]:.4g} m/s) is not that of the places, which move at {np.hypot(*track.T)[0]:.4g} m/s",
-        remedy_text=remedy,
+        quantity="lat, lon" if code in _OF_PLACES else "VN, VE",
+        speed=np.hypot(*told.T)[0],
+        moved=np.hypot(*track.T)[0],
     )
 
 

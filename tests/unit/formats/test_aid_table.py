@@ -65,7 +65,7 @@ def test_repair(tmp_path):
     ("text", "message"),
     [
         ("time,speed\n0,1\n1,x\n", "row 3, speed: 'x' is not a number"),
-        ("time,speed\n0,1\n1,\n", "row 3, speed: it is no number (1 such row in all)"),
+        ("time,speed\n0,1\n1,\n", "row 3, speed: it is no number"),
         ("time,speed\n1,1\n1,1\n", "row 3, time: it is not later than every row before"),
         ("time,speed\n2,1\n1,1\n", "row 3, time: it is not later than every row before"),
         ("time,speed,speed_sd\n1,1,0\n", "row 2, speed_sd: it is no standard deviation"),

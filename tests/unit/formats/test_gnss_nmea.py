@@ -77,9 +77,9 @@ def test_no_fix_and_a_line_that_is_spoiled(tmp_path):
         GnssOptions(position_sd=1.0),
     )
     assert table.index.tolist() == [3.0]
-    said = [(f.row, f.what) for f in table.attrs["findings"]]
-    assert said[0] == (2, "1 line left out: no sentence with a right checksum")
-    assert said[1] == (1, "1 row left out without a place")
+    said = [(f.row, f.code, f.data["count"]) for f in table.attrs["findings"][:2]]
+    assert said[0] == (2, "io.nmea-lines-left-out", 1)
+    assert said[1] == (1, "io.fixes-without-position-left-out", 1)
 
 
 @pytest.mark.parametrize(

@@ -120,7 +120,7 @@ def test_a_gap_is_named(tmp_path, gyro):
     path, t = gyro
     own = np.concatenate([t[:100], t[150:]])
     recording = read_joined([path, table(tmp_path / "a.csv", own, line_of(own))])
-    assert said(recording, "1 gap in it, the longest 0.51 s")
+    assert said(recording, "gaps in it: 1, the longest 0.51 s")
     assert "the farthest is 0.25 s" in said(recording, "interpolated")[0].what
 
 

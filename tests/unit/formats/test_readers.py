@@ -170,9 +170,8 @@ def test_repair_leaves_out_and_says_how_many(tmp_path):
     (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
     log = read_log(tmp_path / "log.csv", ReadOptions(repair=True))
     assert len(log.imu) == 17
-    words = " ".join(f.what for f in log.findings)
-    assert "1 row left out that held no finite number" in words
-    assert "2 rows left out, whose stamp is not later" in words
+    left_out = {f.code: f.data["count"] for f in log.findings if f.code.endswith("left-out")}
+    assert left_out == {"io.rows-without-number-left-out": 1, "io.rows-not-later-left-out": 2}
 
 
 def test_a_wrapped_counter_is_undone(tmp_path):

@@ -147,8 +147,10 @@ def test_arrays_of_python_ins(tmp_path):
     assert truth.attrs["findings"] == () and clock_of(truth) == Clock(RELATIVE)
     assert np.array_equal(truth.to_numpy(), table.to_numpy())
     np.savez(tmp_path / "drive.npz", time=table.index, imu=imu[:, :5])
-    with pytest.raises(DataError, match=r"shapes \(2000,\) and \(2000, 5\)"):
+    with pytest.raises(DataError) as error:
         read_log(tmp_path / "drive.npz")
+    assert error.value.finding.data["shape"] == (2000,)
+    assert error.value.finding.data["shape_2"] == (2000, 5)
 
 
 def test_tables_of_python_ins(tmp_path):

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import TIME_UNITS
-from strapdown.formats.inference.conclusion import Inference, conclude, posterior
+from strapdown.errors import Finding
+from strapdown.formats.inference.conclusion import Inference, conclude, evidence, posterior
 
 Array = NDArray[np.float64]
 
@@ -68,20 +69,21 @@ def infer_time_unit(stamps: NDArray[Any]) -> Inference:
     """
     found = time_unit_probabilities(stamps)
     if not found:
-        return Inference("time_unit", None, 1.0, ("time does not advance",), (), "--time-unit")
+        static = (evidence("io.evidence-time-does-not-advance"),)
+        return Inference("time_unit", None, 1.0, static, (), "--time-unit")
     step = mean_step(stamps)
     return conclude(
         "time_unit", dict(found), time_evidence(stamps, step, next(iter(found))), "--time-unit"
     )
 
 
-def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[str, ...]:
-    """What the stamps say for a unit, in words."""
+def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[Finding, ...]:
+    """What the stamps say for a unit."""
     factor = TIME_UNITS[unit]
-    told = [f"a mean step of {step:.6g} is then {1.0 / (step * factor):.4g} Hz"]
+    told = [evidence("io.evidence-mean-step", step=step, rate_hz=1.0 / (step * factor))]
     if _EPOCH[0] <= float(stamps[0]) * factor <= _EPOCH[1]:
         year = 1970 + float(stamps[0]) * factor / 31_556_952.0
-        told.append(f"the first stamp is then in the year {int(year)}")
+        told.append(evidence("io.evidence-year-of-first-stamp", year=int(year)))
     return tuple(told)
 
 
@@ -115,14 +117,15 @@ def infer_rate(stamps: NDArray[Any], unit: str) -> Inference:
     steps = np.diff(exact).astype(np.float64) * TIME_UNITS[unit]
     forward = steps[steps > 0]
     if not (step > 0):
-        return Inference("rate", None, 1.0, ("time does not advance",), (), "--rate")
+        static = (evidence("io.evidence-time-does-not-advance"),)
+        return Inference("rate", None, 1.0, static, (), "--rate")
     median = float(np.median(forward))
     within = float(np.mean(np.abs(forward - median) <= 0.1 * median))
     missing = float(np.maximum(np.round(forward / step) - 1.0, 0.0).sum())
     told = (
-        f"mean step {1e3 * step:.5g} ms, median {1e3 * median:.5g} ms",
-        f"{100 * within:.3g} % of the steps within a tenth of the median",
-        f"{missing:.0f} samples missing in gaps",
+        evidence("io.evidence-steps", mean_ms=1e3 * step, median_ms=1e3 * median),
+        evidence("io.evidence-regular-steps", percent=100 * within),
+        evidence("io.evidence-missing-samples", missing=missing),
     )
     # Bursts make the mean the rate of the sensor, and losses the median.
     nominal = 1.0 / median if within > 0.5 else 1.0 / step
@@ -158,7 +161,7 @@ def infer_time_faults(stamps: NDArray[Any]) -> Inference:
             faults.append(f"{jumps} jump{'s' if jumps > 1 else ''}")
         if usual < 0.5 * mean or (repeated > 0.3 * steps.size):
             faults.append("bursts")
-    told = f"{steps.size} steps"
+    told = evidence("io.evidence-count-of-steps", steps=steps.size)
     return Inference(
         "time_faults",
         ", ".join(faults) or "none",

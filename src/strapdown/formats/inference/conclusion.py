@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+
+from strapdown.errors import Finding
 
 K = TypeVar("K", bound=Hashable)
 
@@ -17,8 +19,10 @@ THRESHOLD = 0.99
 # The models here are physics with stated idealisations; no number of samples makes them surer
 # than this.
 MODEL_DOUBT = 1e-4
+# An answer less probable than this is not shown.
+LEAST_SHARE = 0.005
 
-__all__ = ["THRESHOLD", "Inference", "conclude", "posterior"]
+__all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
 
 
 @dataclass(frozen=True)
@@ -34,8 +38,8 @@ class Inference:
         The most probable answer; None where none that is known fits.
     confidence : float
         Its probability, 0 to 1.
-    evidence : tuple of str
-        The numbers that it rests on, in words.
+    evidence : tuple of Finding
+        The numbers that it rests on.
     alternatives : tuple of (value, float)
         The other answers with their probabilities, the most probable first.
     flag : str
@@ -45,7 +49,7 @@ class Inference:
     quantity: str
     value: str | float | None
     confidence: float
-    evidence: tuple[str, ...] = ()
+    evidence: tuple[Finding, ...] = ()
     alternatives: tuple[tuple[str | float | None, float], ...] = ()
     flag: str = ""
 
@@ -54,9 +58,43 @@ class Inference:
         """Whether it is sure enough to be used without asking."""
         return self.value is not None and self.confidence >= THRESHOLD
 
+    def finding(self, code: str = "io.inferred", **where: Any) -> Finding:
+        """Return it as a note.
+
+        Parameters
+        ----------
+        code : str
+            Whose sentence shows `value`, `confidence` and `evidence`.
+        **where
+            Location and further data, as of a `Finding`.
+        """
+        return Finding(
+            code,
+            severity="note",
+            value=self.value,
+            confidence=self.confidence,
+            evidence=self.evidence or (evidence("io.no-evidence"),),
+            **where,
+        )
+
+    def shares(self) -> tuple[Finding, ...]:
+        """Return the answers that are not excluded, each with its probability, as notes."""
+        pairs = ((self.value, self.confidence), *self.alternatives)
+        return tuple(
+            evidence(
+                "io.share-of-unknown" if value is None else "io.share", value=value, share=share
+            )
+            for value, share in pairs
+            if share > LEAST_SHARE
+        )
+
     def __str__(self) -> str:
-        told = "; ".join(self.evidence) or "nothing speaks for it"
-        return f"inferred: {self.value} ({told}; confidence {self.confidence:.4g})"
+        return self.finding().sentence()
+
+
+def evidence(code: str, **values: Any) -> Finding:
+    """Return what speaks for a conclusion, as a note."""
+    return Finding(code, severity="note", **values)
 
 
 def posterior(log_weights: dict[K, float]) -> dict[K, float]:
@@ -84,7 +122,7 @@ def posterior(log_weights: dict[K, float]) -> dict[K, float]:
 def conclude(
     quantity: str,
     probabilities: Mapping[str, float] | Mapping[str | None, float],
-    evidence: tuple[str, ...],
+    evidence: tuple[Finding, ...],
     flag: str = "",
 ) -> Inference:
     """The most probable answer as an `Inference`.
@@ -94,7 +132,7 @@ def conclude(
     quantity : str
     probabilities : dict
         The most probable first, as `posterior` gives them.
-    evidence : tuple of str
+    evidence : tuple of Finding
     flag : str
     """
     (value, confidence), *others = probabilities.items()

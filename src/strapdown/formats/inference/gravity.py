@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
-from strapdown.formats.inference.conclusion import Inference, conclude, posterior
+from strapdown.formats.inference.conclusion import Inference, conclude, evidence, posterior
 
 Array = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     usual = float(np.median(norms))
     flag = "--accel-unit"
     if not usual > 0:
-        nothing = ("every value is zero",)
+        nothing = (evidence("io.evidence-all-zero"),)
         return (
             Inference("accel_unit", None, 1.0, nothing, (), flag),
             Inference("accel_form", None, 1.0, nothing),
@@ -124,13 +124,13 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     forms = _summed(found, 1)
     counted = sum(p for f, p in forms.items() if str(f).startswith("counts"))
     forms["rate"] = forms.get("rate", 0.0) + counted
-    told = f"the median norm of {PIECE} s means is {usual:.5g}, spread {100 * spread:.2g} %"
+    norm = {"piece": PIECE, "norm": usual, "spread_percent": 100 * spread}
     best = next(iter(units))
     if best is not None:
-        told += f", {usual * SCALES[best]:.4g} m/s² in {best}"
+        said = evidence("io.evidence-norm", **norm, unit=best, si=usual * SCALES[best])
     else:
-        told += ", which is gravity in none of m/s2, g, mg"
-    evidence = (told,)
+        said = evidence("io.evidence-norm-of-no-unit", **norm, units=list(SCALES))
+    told = (said,)
     gravity = posterior_of(
         {
             "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
@@ -145,10 +145,10 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
             None: forms.get("other", 0.0),
         }
     )
-    tell = (*evidence, f"the mean vector is {direction:.2g} of it")
+    tell = (*told, evidence("io.evidence-mean-vector", share=direction))
     return (
-        conclude("accel_unit", units, evidence, flag),
-        conclude("accel_form", form, evidence),
+        conclude("accel_unit", units, told, flag),
+        conclude("accel_form", form, told),
         conclude("gravity", gravity, tell),
         usual,
     )
@@ -191,8 +191,8 @@ def infer_up(accel: Array, step: float | None) -> Inference:
     best = max(shares, key=lambda a: shares[a])
     share = shares[best]
     told = (
-        f"the specific force points along {best} in {100 * share:.3g} % of the log",
-        "a sensor that reports gravity with the other sign (iOS) reads this upside down",
+        evidence("io.evidence-axis-up", axis=best, percent=100 * share),
+        evidence("io.evidence-sign-turns-up-down"),
     )
     if share <= 0.5:
         return Inference("up_axis", None, 1.0 - share, told[:1], (), "--axes")

@@ -20,7 +20,7 @@ from strapdown.formats.inference.clock import (
     time_evidence,
     time_unit_probabilities,
 )
-from strapdown.formats.inference.conclusion import Inference, conclude
+from strapdown.formats.inference.conclusion import Inference, conclude, evidence
 from strapdown.formats.inference.gravity import infer_accel, infer_up
 from strapdown.formats.inference.magnetic import infer_mag_unit
 from strapdown.formats.inference.rotation_rate import infer_gyro
@@ -157,7 +157,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         out.append(infer_time_faults(stamps))
         out.append(infer_rate(stamps, signals.time_unit or best))
     elif stamps is not None:
-        nothing = ("time does not advance",)
+        nothing = (evidence("io.evidence-time-does-not-advance"),)
         out.append(Inference("time_unit", None, 1.0, nothing, (), "--time-unit"))
         out.append(infer_time_faults(stamps))
     out += turned
@@ -194,7 +194,7 @@ def _arm(signals: Signals, step: float | None) -> Arm | None:
 
 def _doubted(one: Inference, arm: Arm) -> Inference:
     """The same as a question: the norm of the force is an arm's, and need not be gravity's."""
-    told = f"a swinging arm without gravity explains {100 * arm.alone:.3g} % of the force"
+    told = evidence("io.evidence-arm-explains-force", percent=100 * arm.alone)
     return replace(one, confidence=min(one.confidence, 0.5), evidence=(*one.evidence, told))
 
 
@@ -216,8 +216,8 @@ def _increments(heard: list[Inference]) -> float:
 def _sign() -> Inference:
     """Which sign the accelerometer has: no motion tells it, only where its axes point does."""
     told = (
-        "both signs turn alike in the body: only where an axis points can tell them apart",
-        "a sensor that reports gravity (iOS) reads -1 g on the axis that points up",
+        evidence("io.evidence-signs-turn-alike"),
+        evidence("io.evidence-sign-of-gravity"),
     )
     return Inference("accel_sign", "reaction", 0.95, told, (("gravity", 0.05),), "--accel-unit")
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import MAG_UNITS
-from strapdown.formats.inference.conclusion import Inference, conclude, posterior
+from strapdown.formats.inference.conclusion import Inference, conclude, evidence, posterior
 
 Array = NDArray[np.float64]
 
@@ -27,9 +27,9 @@ def infer_mag_unit(mag: Array) -> Inference:
         Finite, as it stands in the log.
     """
     usual = float(np.median(np.linalg.norm(mag, axis=1)))
-    remedy = "no option states it: name it in the column, as in mx_uT"
+    remedy = evidence("io.evidence-unit-in-name")
     if not usual > 0:
-        return Inference("mag_unit", None, 1.0, ("every value is zero", remedy))
+        return Inference("mag_unit", None, 1.0, (evidence("io.evidence-all-zero"), remedy))
     low, high = np.log10(_FIELD)
     height = 1.0 / (high - low + 2.5 * _IRON)
     weights: dict[str | None, float] = {}
@@ -40,7 +40,9 @@ def infer_mag_unit(mag: Array) -> Inference:
     weights[None] = float(np.log(_OTHER / _DECADES))
     found = posterior(weights)
     best = next(iter(found))
-    told = f"the median norm is {usual:.4g}"
-    if best is not None:
-        told += f", {usual * MAG_UNITS[best]:.3g} µT in {best}; the Earth's field is 22 to 67 µT"
+    if best is None:
+        told = evidence("io.evidence-field", norm=usual)
+    else:
+        field = {"microtesla": usual * MAG_UNITS[best], "low": _FIELD[0], "high": _FIELD[1]}
+        told = evidence("io.evidence-field-in-unit", norm=usual, unit=best, **field)
     return conclude("mag_unit", found, (told, remedy))

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import GYRO_UNITS, TIME_UNITS
+from strapdown.errors import Finding
 from strapdown.formats.inference.clock import mean_step
-from strapdown.formats.inference.conclusion import Inference, conclude, posterior
+from strapdown.formats.inference.conclusion import Inference, conclude, evidence, posterior
 from strapdown.formats.inference.turn import Turn, signed_permutations, turns
 
 Array = NDArray[np.float64]
@@ -148,12 +149,12 @@ def infer_gyro(
             kind = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
             merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
             total[merged] = total.get(merged, 0.0) + p / len(pooled)
-    evidence = _evidence(largest, scales, total)
+    told = _evidence(largest, scales, total)
     axes = {k or None: v for k, v in _marginal(total, 2).items()}
-    said_unit = conclude("gyro_unit", _marginal(total, 0), evidence, "--gyro-unit")
-    said_form = conclude("gyro_form", _marginal(total, 1), evidence)
+    said_unit = conclude("gyro_unit", _marginal(total, 0), told, "--gyro-unit")
+    said_form = conclude("gyro_form", _marginal(total, 1), told)
     times = {str(k): v for k, v in _marginal(total, 3).items()}
-    return said_unit, said_form, conclude("gyro_axes", axes, evidence, "--columns"), times
+    return said_unit, said_form, conclude("gyro_axes", axes, told, "--columns"), times
 
 
 def _marginal(total: dict[Hypothesis, float], key: int) -> dict[str | None, float]:
@@ -167,7 +168,7 @@ def _evidence(
     largest: float,
     scales: list[tuple[Turn, float]],
     total: dict[Hypothesis, float],
-) -> tuple[str, ...]:
+) -> tuple[Finding, ...]:
     unit = next(iter(_marginal(total, 0)))
     told = []
     if scales:
@@ -179,19 +180,19 @@ def _evidence(
         m = matrices[names.index(name)].reshape(9)
         norm = float(m @ turn.gram[:9, 9] / max(m @ turn.gram[:9, :9] @ m, 1e-300))
         told.append(
-            f"over {turn.half_width:g} s gravity turns by {np.degrees(turn.signal):.3g}° rms in "
-            f"the accelerometer, and the gyro explains {100 * explained:.3g} % of that at "
-            f"{norm:.4g} rad/s a unit"
-        )
-    else:
-        told.append("no turn of gravity to hold the gyro against")
-    if unit is not None:
-        told.append(
-            f"99 % of the rates are below {largest:.4g}"
-            + (
-                f", in {unit} {np.degrees(largest * GYRO_UNITS[unit]):.4g} deg/s"
-                if unit != "deg/s"
-                else ""
+            evidence(
+                "io.evidence-gravity-turns",
+                half_width_s=turn.half_width,
+                turn_deg=np.degrees(turn.signal),
+                percent=100 * explained,
+                scale=norm,
             )
         )
+    else:
+        told.append(evidence("io.evidence-no-turn-of-gravity"))
+    if unit == "deg/s":
+        told.append(evidence("io.evidence-rates", largest=largest))
+    elif unit is not None:
+        rate = np.degrees(largest * GYRO_UNITS[unit])
+        told.append(evidence("io.evidence-rates-in-unit", largest=largest, unit=unit, deg_s=rate))
     return tuple(told)
