@@ -162,6 +162,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--mutants", type=int, help="mutants of each file")
     parser.add_argument("--known", action="store_true", help="only the mutants that are stated")
+    parser.add_argument("--again", type=Path, help="only the survivors of this earlier JSON")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", type=Path, default=ROOT / "mutation.json")
     options = parser.parse_args()
@@ -169,12 +170,20 @@ def main() -> int:
         (row["source"], row["before"], row["after"]): row["why"]
         for row in tomllib.loads((HERE / "survivors.toml").read_text(encoding="utf-8"))["survivor"]
     }
+    again = None
+    if options.again:
+        earlier = json.loads(options.again.read_text(encoding="utf-8"))
+        again = [
+            (r["source"], r["before"], r["after"]) for r in earlier if r["verdict"] != "killed"
+        ]
     rows: list[dict[str, object]] = []
     for target in targets(options.targets, options.only):
         source = (ROOT / target.source).read_text(encoding="utf-8")
         count = 0 if options.known else options.mutants or target.mutants
         chosen = sample(source, target.source, count, options.seed)
         chosen += [stated(source, *pair) for pair in target.known]
+        if again is not None:
+            chosen = [m for m in chosen if (target.source, m.before, m.after) in again]
         if not chosen:
             continue
         began = time.monotonic()
@@ -194,7 +203,7 @@ def main() -> int:
         for row in some:
             if row["verdict"] == "survived":
                 print(f"    {row['line']}: {row['before']}\n      -> {row['after']}", flush=True)
-    options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        options.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     tally = Counter(str(row["verdict"]) for row in rows)
     print(f"{len(rows)} mutants: " + ", ".join(f"{n} {name}" for name, n in sorted(tally.items())))
     return 1 if tally["survived"] else 0

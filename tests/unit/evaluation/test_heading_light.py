@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 from strapdown.evaluation.heading_light import (
-    CARRIED,
-    GROWS,
     SURE,
     doubted,
     heading_light,
@@ -62,6 +61,10 @@ def innovations(u, weight=1.0):
     }
 
 
+def test_sure_is_99_of_100():
+    assert pytest.approx(norm.ppf(0.995), rel=1e-12) == SURE
+
+
 def test_a_good_bound_without_a_witness_is_amber():
     light = heading_light(record_of(0.1), [])
     assert light.share("amber") == 1.0
@@ -94,9 +97,11 @@ def test_what_a_witness_told_holds_for_a_minute_and_grows():
     sd = np.sqrt(0.01 + 0.01 * np.maximum(np.arange(SECONDS + 1.0) - 100.0, 0.0))
     table = heading_light(record_of(sd), [heard(0.0, 0.2, end=100)]).table
     for after in (10, 40):
-        expected = SURE * 0.2 + GROWS * SURE * np.sqrt(0.01 * after)
+        expected = SURE * 0.2 + 2.0 * SURE * np.sqrt(0.01 * after)
         assert table["carried"].loc[100.0 + after] == pytest.approx(expected, rel=1e-9)
-    assert np.isinf(table["carried"].loc[100.0 + CARRIED + 1.0])
+    # A minute, the last second of it too.
+    assert np.isfinite(table["carried"].loc[160.0])
+    assert np.isinf(table["carried"].loc[161.0])
     # 3 deg are reached where 0.515 + 5.15 x sqrt(0.01 t) = 3: after 23 s.
     assert table["light"].loc[123.0] == 0
     assert table["light"].loc[124.0] == 1

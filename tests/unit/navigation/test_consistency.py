@@ -7,10 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, norm
 
 from strapdown.exceptions import ConfigError
-from strapdown.navigation.consistency import consistency_of, consistency_of_all, whiteness
+from strapdown.navigation.consistency import (
+    GROSS,
+    consistency_of,
+    consistency_of_all,
+    gross_of,
+    whiteness,
+)
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -127,6 +133,29 @@ def test_gross_errors_are_counted_and_are_not_held_against_the_filter():
     )
     assert all(one.gross == 9 and one.count == 300 for one in out.components)
     assert out.nis["nis"].max() == pytest.approx(7500.0)
+
+
+def test_a_gross_error_is_beyond_what_two_million_normal_innovations_reach():
+    # 5.7e-7 of normal numbers: half a million to two million of them hold one.
+    assert 0.5e6 < 1.0 / (2.0 * norm.sf(GROSS)) < 2e6
+    u = np.tile([0.5, -0.5], 20)[:, None]
+    u[[3, 7, 11, 15], 0] = (GROSS - 0.01, -GROSS + 0.01, GROSS + 0.01, -GROSS - 0.01)
+    assert list(np.flatnonzero(gross_of(u))) == [11, 15]
+
+
+def test_a_gross_error_is_beyond_those_that_are_usual_in_the_run():
+    """Where all scatter three times as far as they should, the threshold is three times as far.
+
+    The median of |u| is 0.6745 standard deviations of a normal number, here 3 of those expected.
+    """
+    usual = 3.0 * norm.ppf(0.75)
+    u = np.tile([usual, -usual], 20)[:, None]
+    u[[4, 9], 0] = (3.0 * GROSS - 0.01, 3.0 * GROSS + 0.01)
+    assert list(np.flatnonzero(gross_of(u))) == [9]
+    # Where they scatter less than they should it stays, and what is not there is no error.
+    u = np.column_stack([0.1 * u[:, 0], np.full(len(u), np.nan)])
+    u[9, 0] = GROSS + 0.01
+    assert [tuple(at) for at in np.argwhere(gross_of(u))] == [(9, 0)]
 
 
 def test_numbers_of_a_run():
