@@ -135,7 +135,7 @@ def _code(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _with(node: ast.AST, **changed: object) -> str:
-    fields = {name: value for name, value in ast.iter_fields(node)} | changed
+    fields = dict(ast.iter_fields(node)) | changed
     return ast.unparse(type(node)(**fields))
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binom, norm
+from scipy.stats import binom, chi2, norm
 
 from strapdown.exceptions import ConfigError
 from strapdown.navigation.consistency import (
@@ -178,6 +178,35 @@ def test_numbers_of_a_run():
     assert one.bias_in_unit == pytest.approx(2.0 * u[:, 1].mean())
     assert one.inside == pytest.approx(np.mean(np.abs(u[:, 1]) <= 1.959964))
     assert one.scale_bounds[0] < 1.0 < one.scale_bounds[1]
+
+
+def test_bounds_and_probabilities_are_those_of_normal_numbers():
+    u = np.random.default_rng(10).normal(0.3, 1.2, size=(40, 2))
+    u[7, 0] = np.nan
+    out = consistency_of("x", innovation_table(u), window=2)
+    for name, p in (("lower", 0.025), ("upper", 0.975)):
+        np.testing.assert_allclose(out.nis[name][[6, 7]], chi2.ppf(p, [2, 1]), rtol=1e-9)
+        # Of two epochs of two components, less one that is not there; by the number of them.
+        np.testing.assert_allclose(
+            out.windows[name].iloc[[2, 3]], chi2.ppf(p, [4, 3]) / [4.0, 3.0], rtol=1e-9
+        )
+    inside = out.nis["nis"].between(out.nis["lower"], out.nis["upper"])
+    assert out.inside == pytest.approx(inside.mean())
+    for k, one in enumerate(out.components):
+        x = u[~np.isnan(u[:, k]), k]
+        n, square = len(x), x @ x
+        assert one.bias_bound == pytest.approx(norm.ppf(0.975) / np.sqrt(n))
+        assert one.autocorrelation_bound == pytest.approx(norm.ppf(0.975) / np.sqrt(n))
+        np.testing.assert_allclose(
+            one.scale_bounds, np.sqrt(chi2.ppf([0.025, 0.975], n) / n), rtol=1e-9
+        )
+        # Each is the probability of as much to either side.
+        assert one.bias_p == pytest.approx(2.0 * norm.sf(abs(x.mean()) * np.sqrt(n)))
+        rho = one.autocorrelation[0]
+        assert one.lag_p == pytest.approx(2.0 * norm.sf(abs(rho) * np.sqrt(n)))
+        assert one.scale_p == pytest.approx(2.0 * min(chi2.sf(square, n), chi2.cdf(square, n)))
+        # One lag for each 25 epochs.
+        assert len(one.autocorrelation) == 1
 
 
 def test_whiteness_is_ljung_and_box():
