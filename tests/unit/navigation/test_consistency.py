@@ -20,7 +20,7 @@ from strapdown.navigation.consistency import (
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from innovations import LABELS, innovation_table
+from innovations import LABELS, exactly, innovation_table
 
 
 def verdicts(normalised):
@@ -207,6 +207,34 @@ def test_bounds_and_probabilities_are_those_of_normal_numbers():
         assert one.scale_p == pytest.approx(2.0 * min(chi2.sf(square, n), chi2.cdf(square, n)))
         # One lag for each 25 epochs.
         assert len(one.autocorrelation) == 1
+
+
+def test_a_mean_of_what_follows_itself_is_farther_from_zero_by_chance():
+    """By (1 + rho)/(1 - rho) in variance, as that of a first-order process; the scatter counts."""
+    u = exactly(20, scale=1.2, mean=0.5, rho=0.4)
+    (bias,) = [one for one in verdicts(u) if one.kind == "bias"]
+    spread = 1.2 * np.sqrt(1.4 / 0.6)
+    assert bias.p == pytest.approx(2.0 * norm.sf(0.5 * np.sqrt(600.0) / spread), rel=1e-6)
+    # One whose scatter is small is no surer for that.
+    (bias,) = [one for one in verdicts(exactly(21, scale=0.5, mean=0.3)) if one.kind == "bias"]
+    assert bias.p == pytest.approx(2.0 * norm.sf(0.3 * np.sqrt(600.0)), rel=1e-6)
+
+
+def test_a_mean_is_no_part_of_the_scatter_where_it_is_no_chance():
+    n = 600
+    (size,) = [one for one in verdicts(exactly(22, scale=1.2, mean=0.5)) if one.kind != "bias"]
+    # About the mean, with one degree of freedom less.
+    assert (size.kind, size.p) == (
+        "understated",
+        pytest.approx(2.0 * chi2.sf(n * 1.44, n - 1), rel=1e-6),
+    )
+    (size,) = verdicts(exactly(22, scale=0.8))
+    assert (size.kind, size.p) == (
+        "overstated",
+        pytest.approx(2.0 * chi2.cdf(n * 0.64, n), rel=1e-6),
+    )
+    # A mean of 0.5 is not told as a scatter of sqrt(1 + 0.25).
+    assert [one.kind for one in verdicts(exactly(22, mean=0.5))] == ["bias"]
 
 
 def test_whiteness_is_ljung_and_box():

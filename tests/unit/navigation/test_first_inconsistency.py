@@ -7,11 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from innovations import innovation_table
+from innovations import exactly, innovation_table
 
 from strapdown.navigation.consistency import consistency_of_all
 from strapdown.navigation.first_inconsistency import inconsistencies
@@ -79,22 +78,6 @@ def test_noise_that_is_understated_says_by_how_much():
     # The standard deviation of a scatter of 600 is 3 %.
     assert ones[0].factor == pytest.approx(3.0, rel=0.1)
     assert ones[0].throughout
-
-
-def exactly(seed, scale=1.0, mean=0.0, rho=0.0):
-    """Numbers whose root mean square about the mean, mean and lag-one correlation are as given."""
-    x = np.random.default_rng(seed).standard_normal(601)
-
-    def mixed(a):
-        y = x[1:] + a * x[:-1]
-        y -= y.mean()
-        return y / np.sqrt(np.mean(y**2))
-
-    def correlation(a):
-        y = mixed(a)
-        return y[1:] @ y[:-1] / (y @ y) - rho
-
-    return (mean + scale * mixed(brentq(correlation, -0.999, 0.999)))[:, None]
 
 
 def kinds(u, lasting=()):
