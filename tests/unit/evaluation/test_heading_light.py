@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -131,6 +131,30 @@ def test_observations_that_are_mostly_rejected_are_no_agreement():
     scatter = recent_scatter(record_of(0.1, innovations(u, weight)))
     # Three of four count as three standard deviations each: sqrt(0.75 x 9 + 0.25) = 2.65.
     assert scatter[60:].min() > 2.0
+
+
+def test_scatter_is_amber_beyond_two_and_red_beyond_three():
+    for scatter, colour in ((1.99, "green"), (2.01, "amber"), (2.99, "amber"), (3.01, "red")):
+        spread = np.full(SECONDS + 1, scatter)
+        light = heading_light(record_of(0.1), [heard(0.0, 0.2, begin=-1)], spread)
+        assert light.share(colour) == 1.0
+        assert set(light.table["reason"]) == ({"scatter"} if scatter > 2.0 else {""})
+
+
+def test_the_bound_of_a_second_is_that_of_the_mark_at_it_or_the_larger_one_beside_it():
+    marks = pd.Index([0.0, 1.5, 3.0], name="time")
+    record = record_of(0.1)
+    sd = pd.DataFrame({"heading": [0.1, 0.5, 0.2]}, index=marks)
+    light = heading_light(replace(record, sd=sd), [])
+    # Beyond the last mark it is the last one's.
+    expected = norm.ppf(0.975) * np.array([0.1, 0.5, 0.5, 0.2, 0.2])
+    np.testing.assert_allclose(light.table["bound"].loc[:4.0], expected, rtol=1e-9)
+
+
+def test_before_a_witness_has_told_anything_nothing_is_carried():
+    table = heading_light(record_of(0.1), [heard(0.0, 0.2, begin=30)]).table
+    assert np.isinf(table["carried"].loc[:30.0]).all()
+    assert table["carried"].loc[31.0] == pytest.approx(SURE * 0.2)
 
 
 def test_spans_cover_the_run():
