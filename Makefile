@@ -7,7 +7,7 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds examples check format bench docs messages statements pictures clean
+.PHONY: demo test test-slow test-bounds mutation examples check format bench docs messages statements pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -48,6 +48,9 @@ examples: $(VENV)/.test
 
 test-bounds: $(VENV)/.test
 	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
+
+mutation: $(VENV)/.test
+	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python tests/mutation --jobs 2
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .
