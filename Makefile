@@ -7,7 +7,7 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds examples record check format bench docs messages statements pictures clean
+.PHONY: demo test test-slow test-bounds examples record mutation check format bench docs messages statements pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -52,6 +52,9 @@ test-bounds: $(VENV)/.test
 
 record: $(VENV)/.run
 	$(BIN)/python tests/record
+
+mutation: $(VENV)/.test
+	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python tests/mutation --jobs 2
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .

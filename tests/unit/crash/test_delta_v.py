@@ -162,6 +162,9 @@ def test_the_course_of_the_change_and_what_a_recorder_gives():
     assert np.all(np.abs(course[["dv_x", "dv_y", "dv_z"]] - exact) <= trapezoid_bound(1e3) + 1e-13)
     assert course.index[0] == 0.0 and course.iloc[0].abs().max() == 0.0
     tenths = cumulative_delta_v(made, 0.0004, 0.2504, every=0.010)
+    for no_step in (0.0, -0.010):
+        with pytest.raises(ConfigError):
+            cumulative_delta_v(made, 0.0004, 0.2504, every=no_step)
     assert np.allclose(tenths.index, np.arange(26) * 0.01, atol=1e-12)
     event = detect_events(made).first
     kept = recorder_delta_v(made, event)

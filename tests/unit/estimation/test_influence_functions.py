@@ -49,8 +49,11 @@ def test_derivatives_symmetry_and_bounds(f):
 
 
 @pytest.mark.parametrize("f", **named(ALL))
-def test_psi_is_continuous_and_bends_one_way_between_knots(f):
+def test_rho_and_psi_are_continuous_and_psi_bends_one_way_between_knots(f):
     for knot in f.knots:
+        assert f.rho(math.nextafter(knot, 0.0)) == pytest.approx(
+            f.rho(math.nextafter(knot, 99.0)), abs=1e-13
+        )
         assert f.psi(math.nextafter(knot, 0.0)) == pytest.approx(
             f.psi(math.nextafter(knot, 99.0)), abs=1e-14
         )

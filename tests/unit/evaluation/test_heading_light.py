@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.stats import norm
 
 from strapdown.errors import ConfigError
 from strapdown.evaluation.heading_light import (
-    CARRIED,
-    GROWS,
     SURE,
     doubted,
     heading_light,
@@ -62,6 +61,10 @@ def innovations(u, weight=1.0):
     }
 
 
+def test_sure_is_99_of_100():
+    assert pytest.approx(norm.ppf(0.995), rel=1e-12) == SURE
+
+
 def test_a_good_bound_without_a_witness_is_amber():
     light = heading_light(record_of(0.1), [])
     assert light.share("amber") == 1.0
@@ -94,9 +97,11 @@ def test_what_a_witness_told_holds_for_a_minute_and_grows():
     sd = np.sqrt(0.01 + 0.01 * np.maximum(np.arange(SECONDS + 1.0) - 100.0, 0.0))
     table = heading_light(record_of(sd), [heard(0.0, 0.2, end=100)]).table
     for after in (10, 40):
-        expected = SURE * 0.2 + GROWS * SURE * np.sqrt(0.01 * after)
+        expected = SURE * 0.2 + 2.0 * SURE * np.sqrt(0.01 * after)
         assert table["carried"].loc[100.0 + after] == pytest.approx(expected, rel=1e-9)
-    assert np.isinf(table["carried"].loc[100.0 + CARRIED + 1.0])
+    # A minute, the last second of it too.
+    assert np.isfinite(table["carried"].loc[160.0])
+    assert np.isinf(table["carried"].loc[161.0])
     # 3 deg are reached where 0.515 + 5.15 x sqrt(0.01 t) = 3: after 23 s.
     assert table["light"].loc[123.0] == 0
     assert table["light"].loc[124.0] == 1
@@ -126,6 +131,30 @@ def test_observations_that_are_mostly_rejected_are_no_agreement():
     scatter = recent_scatter(record_of(0.1, innovations(u, weight)))
     # Three of four count as three standard deviations each: sqrt(0.75 x 9 + 0.25) = 2.65.
     assert scatter[60:].min() > 2.0
+
+
+def test_scatter_is_amber_beyond_two_and_red_beyond_three():
+    for scatter, colour in ((1.99, "green"), (2.01, "amber"), (2.99, "amber"), (3.01, "red")):
+        spread = np.full(SECONDS + 1, scatter)
+        light = heading_light(record_of(0.1), [heard(0.0, 0.2, begin=-1)], spread)
+        assert light.share(colour) == 1.0
+        assert set(light.table["reason"]) == ({"scatter"} if scatter > 2.0 else {""})
+
+
+def test_the_bound_of_a_second_is_that_of_the_mark_at_it_or_the_larger_one_beside_it():
+    marks = pd.Index([0.0, 1.5, 3.0], name="time")
+    record = record_of(0.1)
+    sd = pd.DataFrame({"heading": [0.1, 0.5, 0.2]}, index=marks)
+    light = heading_light(replace(record, sd=sd), [])
+    # Beyond the last mark it is the last one's.
+    expected = norm.ppf(0.975) * np.array([0.1, 0.5, 0.5, 0.2, 0.2])
+    np.testing.assert_allclose(light.table["bound"].loc[:4.0], expected, rtol=1e-9)
+
+
+def test_before_a_witness_has_told_anything_nothing_is_carried():
+    table = heading_light(record_of(0.1), [heard(0.0, 0.2, begin=30)]).table
+    assert np.isinf(table["carried"].loc[:30.0]).all()
+    assert table["carried"].loc[31.0] == pytest.approx(SURE * 0.2)
 
 
 def test_spans_cover_the_run():

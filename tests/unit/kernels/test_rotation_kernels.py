@@ -798,3 +798,16 @@ def test_orthogonalise_touches_the_nine_entries_only():
     state = np.append(disturbed(1e-3, 0).ravel(), [7.0, 9.0])
     attitude_kernel.orthogonalise(state)
     assert np.array_equal(state[9:], [7.0, 9.0])
+
+
+@pytest.mark.parametrize(
+    ("turn", "heading"),
+    [(0.0, 0.0), (90.0, 90.0), (-90.0, 270.0), (179.0, 179.0), (-1e-3, 359.999), (-1e-15, 0.0)],
+)
+def test_a_heading_in_degrees_is_at_least_zero_and_below_360(turn, heading):
+    half = 0.5 * math.radians(turn)
+    q = math.cos(half), 0.0, 0.0, math.sin(half)
+    told = kernel.euler_degrees_from_quat(*q)
+    # Rounding of an angle up to pi, in degrees, twice.
+    assert told == pytest.approx((0.0, 0.0, heading), abs=2.0 * 360.0 * U)
+    assert 0.0 <= told[2] < 360.0

@@ -7,14 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, chi2, norm
 
 from strapdown.errors import ConfigError
-from strapdown.navigation.consistency import consistency_of, consistency_of_all, whiteness
+from strapdown.navigation.consistency import (
+    GROSS,
+    consistency_of,
+    consistency_of_all,
+    gross_of,
+    whiteness,
+)
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from innovations import LABELS, innovation_table
+from innovations import LABELS, exactly, innovation_table
 
 
 def verdicts(normalised):
@@ -129,6 +135,29 @@ def test_gross_errors_are_counted_and_are_not_held_against_the_filter():
     assert out.nis["nis"].max() == pytest.approx(7500.0)
 
 
+def test_a_gross_error_is_beyond_what_two_million_normal_innovations_reach():
+    # 5.7e-7 of normal numbers: half a million to two million of them hold one.
+    assert 0.5e6 < 1.0 / (2.0 * norm.sf(GROSS)) < 2e6
+    u = np.tile([0.5, -0.5], 20)[:, None]
+    u[[3, 7, 11, 15], 0] = (GROSS - 0.01, -GROSS + 0.01, GROSS + 0.01, -GROSS - 0.01)
+    assert list(np.flatnonzero(gross_of(u))) == [11, 15]
+
+
+def test_a_gross_error_is_beyond_those_that_are_usual_in_the_run():
+    """Where all scatter three times as far as they should, the threshold is three times as far.
+
+    The median of |u| is 0.6745 standard deviations of a normal number, here 3 of those expected.
+    """
+    usual = 3.0 * norm.ppf(0.75)
+    u = np.tile([usual, -usual], 20)[:, None]
+    u[[4, 9], 0] = (3.0 * GROSS - 0.01, 3.0 * GROSS + 0.01)
+    assert list(np.flatnonzero(gross_of(u))) == [9]
+    # Where they scatter less than they should it stays, and what is not there is no error.
+    u = np.column_stack([0.1 * u[:, 0], np.full(len(u), np.nan)])
+    u[9, 0] = GROSS + 0.01
+    assert [tuple(at) for at in np.argwhere(gross_of(u))] == [(9, 0)]
+
+
 def test_numbers_of_a_run():
     rng = np.random.default_rng(9)
     u = rng.normal(size=(95, 2))
@@ -149,6 +178,63 @@ def test_numbers_of_a_run():
     assert one.bias_in_unit == pytest.approx(2.0 * u[:, 1].mean())
     assert one.inside == pytest.approx(np.mean(np.abs(u[:, 1]) <= 1.959964))
     assert one.scale_bounds[0] < 1.0 < one.scale_bounds[1]
+
+
+def test_bounds_and_probabilities_are_those_of_normal_numbers():
+    u = np.random.default_rng(10).normal(0.3, 1.2, size=(40, 2))
+    u[7, 0] = np.nan
+    out = consistency_of("x", innovation_table(u), window=2)
+    for name, p in (("lower", 0.025), ("upper", 0.975)):
+        np.testing.assert_allclose(out.nis[name][[6, 7]], chi2.ppf(p, [2, 1]), rtol=1e-9)
+        # Of two epochs of two components, less one that is not there; by the number of them.
+        np.testing.assert_allclose(
+            out.windows[name].iloc[[2, 3]], chi2.ppf(p, [4, 3]) / [4.0, 3.0], rtol=1e-9
+        )
+    inside = out.nis["nis"].between(out.nis["lower"], out.nis["upper"])
+    assert out.inside == pytest.approx(inside.mean())
+    for k, one in enumerate(out.components):
+        x = u[~np.isnan(u[:, k]), k]
+        n, square = len(x), x @ x
+        assert one.bias_bound == pytest.approx(norm.ppf(0.975) / np.sqrt(n))
+        assert one.autocorrelation_bound == pytest.approx(norm.ppf(0.975) / np.sqrt(n))
+        np.testing.assert_allclose(
+            one.scale_bounds, np.sqrt(chi2.ppf([0.025, 0.975], n) / n), rtol=1e-9
+        )
+        # Each is the probability of as much to either side.
+        assert one.bias_p == pytest.approx(2.0 * norm.sf(abs(x.mean()) * np.sqrt(n)))
+        rho = one.autocorrelation[0]
+        assert one.lag_p == pytest.approx(2.0 * norm.sf(abs(rho) * np.sqrt(n)))
+        assert one.scale_p == pytest.approx(2.0 * min(chi2.sf(square, n), chi2.cdf(square, n)))
+        # One lag for each 25 epochs.
+        assert len(one.autocorrelation) == 1
+
+
+def test_a_mean_of_what_follows_itself_is_farther_from_zero_by_chance():
+    """By (1 + rho)/(1 - rho) in variance, as that of a first-order process; the scatter counts."""
+    u = exactly(20, scale=1.2, mean=0.5, rho=0.4)
+    (bias,) = [one for one in verdicts(u) if one.kind == "bias"]
+    spread = 1.2 * np.sqrt(1.4 / 0.6)
+    assert bias.p == pytest.approx(2.0 * norm.sf(0.5 * np.sqrt(600.0) / spread), rel=1e-6)
+    # One whose scatter is small is no surer for that.
+    (bias,) = [one for one in verdicts(exactly(21, scale=0.5, mean=0.3)) if one.kind == "bias"]
+    assert bias.p == pytest.approx(2.0 * norm.sf(0.3 * np.sqrt(600.0)), rel=1e-6)
+
+
+def test_a_mean_is_no_part_of_the_scatter_where_it_is_no_chance():
+    n = 600
+    (size,) = [one for one in verdicts(exactly(22, scale=1.2, mean=0.5)) if one.kind != "bias"]
+    # About the mean, with one degree of freedom less.
+    assert (size.kind, size.p) == (
+        "understated",
+        pytest.approx(2.0 * chi2.sf(n * 1.44, n - 1), rel=1e-6),
+    )
+    (size,) = verdicts(exactly(22, scale=0.8))
+    assert (size.kind, size.p) == (
+        "overstated",
+        pytest.approx(2.0 * chi2.cdf(n * 0.64, n), rel=1e-6),
+    )
+    # A mean of 0.5 is not told as a scatter of sqrt(1 + 0.25).
+    assert [one.kind for one in verdicts(exactly(22, mean=0.5))] == ["bias"]
 
 
 def test_whiteness_is_ljung_and_box():

@@ -80,3 +80,40 @@ def test_what_is_missing_says_nothing():
 def test_a_monitor_that_makes_no_sense_is_refused():
     with pytest.raises(ConfigError, match="larger"):
         InnovationMonitor(larger=1.0)
+
+
+@pytest.mark.parametrize(
+    ("u", "what", "ratio"),
+    [
+        # Of a mean of half a deviation: u/2 - 1/8.
+        ([1.0], "high", 0.375),
+        ([-1.0], "low", 0.375),
+        # Of a deviation of 1.5: (1 - 1/2.25) u²/2 - ln 1.5, with 4 for what is beyond it.
+        ([2.0, -2.0], "larger", 4.0 * 5.0 / 18.0 - math.log(1.5)),
+        ([1000.0, -1000.0], "larger", 16.0 * 5.0 / 18.0 - math.log(1.5)),
+    ],
+)
+def test_an_alarm_is_raised_where_the_sum_of_the_ratios_comes_to_a_million(u, what, ratio):
+    u = np.resize(u, (200, 1))
+    first = min(alarms_of(InnovationMonitor(), u), key=lambda a: a.known)
+    assert (first.component, first.what, first.since) == (0, what, 0.0)
+    # The epoch k makes the sum (k + 1) ratios.
+    assert first.known == math.ceil(math.log(1e6) / ratio) - 1
+
+
+def test_a_sum_that_comes_to_zero_begins_anew():
+    u = np.concatenate([np.full(40, 1.0), np.full(200, -0.5), np.full(60, 1.0)])[:, None]
+    high = [a for a in alarms_of(InnovationMonitor(), u) if a.what == "high"]
+    # 40 ratios of 3/8 are 15; each epoch of -1/2 takes 3/8 off; 37 of 3/8 are 13.8 and more.
+    assert [(a.since, a.known) for a in high] == [(0.0, 36.0), (240.0, 276.0)]
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"threshold": 0.0}, {"larger": 1.0}, {"apart": 0.0}, {"clip": 0.0}]
+)
+def test_each_setting_is_above_its_limit(wrong):
+    (name,) = wrong
+    with pytest.raises(ConfigError) as refused:
+        InnovationMonitor(**wrong)
+    assert refused.value.finding.quantity == name
+    InnovationMonitor(**{name: wrong[name] + 1e-3})
