@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from strapdown.bundle.seal import Seal
-    from strapdown.errors import Finding
+    from strapdown.errors import Finding, Words
     from strapdown.report.document import TableBlock
 
 
@@ -158,11 +158,13 @@ def _broken(name: str) -> str:
     return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
 
 
-def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
+def print_findings(
+    findings: Sequence[Finding], most: int | None = None, words: Words = "cli"
+) -> None:
     """Print what a person should know, to stderr; the first alone of more than `most`."""
     out = console(err=True)
     for finding in findings[:most]:
-        head, _, remedy = str(finding).partition("\n")
+        head, _, remedy = finding.text(words).partition("\n")
         out.print(f"note: {head}", style="yellow")
         if remedy:
             out.print(remedy, style="dim")

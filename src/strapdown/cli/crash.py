@@ -52,5 +52,5 @@ def crash(
         return
     console().print(spec.title, style="bold")
     print_crash(result)
-    print_findings(result.findings)
+    print_findings(result.findings, words="file")
     print_seal(seal, "report.html")

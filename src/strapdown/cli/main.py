@@ -28,7 +28,7 @@ from strapdown.cli import (
     verify,
 )
 from strapdown.cli.interrupts import keep_interrupts
-from strapdown.errors import Finding, StrapdownError
+from strapdown.errors import Finding, StrapdownError, Words
 
 EXIT_CODES = (
     "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
@@ -100,7 +100,9 @@ def run() -> None:
     try:
         app()
     except StrapdownError as error:
-        _fail(str(error), error.exit_code)
+        # A crash is asked for by a case file, and its keys are what a remedy can name.
+        words: Words = "file" if sys.argv[1:2] == ["crash"] else "cli"
+        _fail(error.finding.text(words), error.exit_code)
     except OSError as error:
         if error.errno == errno.EPIPE:
             _reader_gone()

@@ -108,17 +108,15 @@ def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
     if term.input != other.input:
         return
     if (term.equals is None) != (other.equals is None):
-        what, remedy = "is a number in one term and a category in another", "make it one of them"
+        code = "crash.term-number-and-category"
     elif term.unit != other.unit:
-        what, remedy = (
-            f"is in {term.unit} here and in {other.unit} before",
-            f"write both in one unit; speeds: {', '.join(SPEEDS)}",
-        )
+        code = "crash.term-in-two-units"
     elif (term.transform, term.equals) == (other.transform, other.equals):
-        what, remedy = "has this term twice", "keep one of the two"
+        code = "crash.term-twice"
     else:
         return
-    raise _bad(file, place, f"'{term.input}' {what}", remedy)
+    units = {"unit": term.unit, "before": other.unit, "speeds": SPEEDS.keys()}
+    raise _bad(file, place, code, input=term.input, **units)
 
 
 def _validity(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
@@ -157,12 +155,9 @@ def _number(file: Path, value: Any, key: str) -> float:
 def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> str:
     value = table.get(key)
     if not isinstance(value, str) or not value.strip():
-        why = {
-            "table": 'name where in the publication the coefficients stand: table = "Table 3"',
-            "unit": f'write unit = "…"; speeds: {", ".join(SPEEDS)}',
-        }
-        remedy = why.get(key, f'write {key} = "…"')
-        raise _bad(file, f"{prefix}{key}", "it is missing, or no text", remedy)
+        code = {"table": "crash.table-missing", "unit": "crash.unit-missing"}
+        said = {"name": key, "speeds": SPEEDS.keys()}
+        raise _bad(file, f"{prefix}{key}", code.get(key, "crash.text-missing"), **said)
     return value
 
 
@@ -172,7 +167,5 @@ def _known(file: Path, table: Mapping[str, Any], known: tuple[str, ...], prefix:
             raise _bad(file, f"{prefix}{key}", "crash.no-such-key", word=key, known=known)
 
 
-def _bad(file: Path, key: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError(
-        "crash.message", file=file.name, quantity=key, message=what, remedy_text=remedy
-    )
+def _bad(file: Path, key: str, code: str, **values: Any) -> ConfigError:
+    return ConfigError(code, file=file.name, quantity=key, data=values)

@@ -149,14 +149,13 @@ def compare_redundant(
     if abs(gain - 1.0) > gain_error:
         findings.append(Finding("sensors.gain-other", quantity=label, gain=gain))
     if share > integral_share:
-        since = "" if apart_at is None else f", for good from {apart_at:.4f} s on"
         findings.append(
             Finding(
-                "sensors.their-integrals-differ-up-greatest",
+                "sensors.integrals-differ" if apart_at is None else "sensors.integrals-part",
                 quantity=label,
                 apart=apart.max(),
                 share=100 * share,
-                since=since,
+                since=apart_at,
             )
         )
     return RedundantComparison(

@@ -172,14 +172,14 @@ def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
         try:
             found.append((find_delay(_length(first[-1]), _length(second[-1])), what))
         except DataError as error:
-            errors.append(f"{what}: {error.finding.what}")
+            errors.append(error.finding.replace(shown=what))
     if not found:
         raise DataError(
-            "sensors.cannot-laid-over",
+            "sensors.cannot-laid-over" if errors else "sensors.no-triads-to-lay-over",
             file=u.unit.name,
             quantity="time",
             name=reference.unit.name,
-            errors="; ".join(errors) or "no triads",
+            errors=errors,
         )
     return min(found, key=lambda f: f[0].sd)
 

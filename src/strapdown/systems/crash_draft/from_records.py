@@ -110,9 +110,8 @@ def _nothing(
 ) -> DataError:
     told = [f"{', '.join(p.channels.values())}: {p.kind}" for p in parts]
     told += [f"{s.what}: {s.why}" for s in skipped]
-    shown = "; ".join(told[:8]) + ("; …" if len(told) > 8 else "")
     return DataError(
-        "crash.no-accelerometer-made-out",
+        "crash.no-accelerometer-found" if told else "crash.nothing-in-record",
         file=", ".join(r.path.name for r in records[:3]),
-        value_shown=shown or "there is nothing in it",
+        parts=told[:8] + ["…"] * (len(told) > 8),
     )

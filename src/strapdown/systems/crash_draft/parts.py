@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import Finding
+
 Array = NDArray[np.float64]
 
 __all__ = ["Clock", "Part", "Skipped"]
@@ -137,5 +139,13 @@ class Skipped:
 
     path: str
     what: str
-    why: str
+    reason: str | Finding
     names: tuple[str, ...] = field(default=())
+
+    @property
+    def why(self) -> str:
+        """The reason in words, with its row."""
+        if isinstance(self.reason, str):
+            return self.reason
+        row = "" if self.reason.row is None else f" in row {self.reason.row}"
+        return f"{self.reason.sentence('file')}{row}"
