@@ -126,7 +126,7 @@ def line_of(text, key):
         (GOOD.replace("lat_deg = 55.0", "lat_deg = 95.0"), "lat_deg", "beyond a pole", "-90 to 90"),
         (GOOD.replace("55.0", '"?"'), None, "still open", "question|what you know"),
         (GOOD.replace("fog-1000", "fog-100"), "sensor", "fog-100", "fog-1000"),
-        (GOOD.replace('sensor = "fog-1000"', ""), None, "how good the sensors are", "catalogue"),
+        (GOOD.replace('sensor = "fog-1000"', ""), None, "sensors are not stated", "catalogue"),
         (GOOD + '[coarse]\nkind = "inertial"\n', "kind", "no 'inertial'", "inertial_frame"),
         (GOOD + "[coarse]\nblocks = 3\n", "blocks", "no such key", ""),
         (GOOD + '[coarse]\nkind = "two_vector"\nblocks = 1\n', "blocks", "1 is no number", "2 to"),
@@ -156,7 +156,7 @@ def line_of(text, key):
         (
             GOOD + '[axes]\naxes = "x,y,z"\ndesign = "chernodarov-2009"\n',
             "design",
-            "says it already",
+            "states it already",
             "keep one",
         ),
         (
@@ -173,7 +173,7 @@ def line_of(text, key):
             "no such key",
             "simulation",
         ),
-        (GOOD.replace("60.0", "-1.0"), "duration_s", "-1.0 does not fit", ""),
+        (GOOD.replace("60.0", "-1.0"), "duration_s", "-1.0 is out of range", "above 0"),
         ('name = "x"\n' + GOOD, "name", "no such key", "title"),
     ],
 )

@@ -81,16 +81,21 @@ def test_all_that_does_not_fit_is_told_at_once(tmp_path):
     with pytest.raises(ConfigError) as caught:
         read(tmp_path, text + "\n[filter]\nstep_s = 0.0\n")
     said = str(caught.value)
-    assert "3 things do not fit" in said
+    faults = caught.value.finding.data["faults"]
+    assert [f.code for f in faults] == [
+        "config.latitude-longitude-exchanged",
+        "sensors.unknown-sensor",
+        "navigation.step",
+    ]
     assert [int(n) for n in re.findall(r"line (\d+)", said)] == [4, 11, 14]
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "nothing says when"),
+        ("", "spans_s: the time is not stated"),
         ("spans_s = [[1.0, 2.0]]\nlengths_s = [3.0]\n", "lengths_s is given, too"),
-        ("spans_s = [[2.0, 1.0]]\n", "there is no time"),
+        ("spans_s = [[2.0, 1.0]]\n", "the span from 2 to 1 s is empty"),
         ('aid = "rtc"\nlengths_s = [3.0]\n', "did you mean 'rtk'"),
     ],
 )
