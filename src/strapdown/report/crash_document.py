@@ -242,10 +242,8 @@ def _findings(result: CaseResult) -> tuple[Block, ...]:
 
 
 def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
-    rows = how_to_verify(name)
-    command = dict(rows)["Command"]
     return (
-        Items(tuple(r for r in rows if r[0] != "Command")),
-        Paragraph(command, "mono"),
+        Items(how_to_verify()),
+        Paragraph(f"strapdown verify {name}", "mono"),
         sources.inputs_table(result),
     )

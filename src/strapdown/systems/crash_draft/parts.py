@@ -34,7 +34,9 @@ class Clock:
     candidates : str
         Units that it may be, in words, where `unit` is empty.
     stated : bool
-        There is no column, and a line above the table states the rate.
+        There is no column, and a line above the table states the rate; or its stamps are rounded.
+    rate_why : str
+        What the rate of rounded stamps was concluded from.
     """
 
     column: str
@@ -44,6 +46,7 @@ class Clock:
     rate: float
     candidates: str = ""
     stated: bool = False
+    rate_why: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +65,7 @@ class Part:
     unit : str
         Empty where it is not known.
     why : str
-        How kind, axes and unit are known.
+        How kind and axes are known.
     candidates : str
         Units that it may be, in words, where `unit` is empty.
     time : ndarray, (n,), s
@@ -71,6 +74,8 @@ class Part:
         In SI, by the likeliest unit where it is not known; NaN for axes that are missing.
     label : str
         What tells it from the others of its record.
+    unit_why : tuple of str
+        How the unit is known, where it is not with the axes.
     zeroed : bool
         Gravity at rest has been taken off.
     sampling : str
@@ -103,6 +108,7 @@ class Part:
     values: Array
     candidates: str = ""
     label: str = ""
+    unit_why: tuple[str, ...] = ()
     zeroed: bool = False
     sampling: str = ""
     full_scale: float | None = None
