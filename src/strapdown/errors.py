@@ -4,7 +4,8 @@ A `Finding` says in a form that programs can read what a stage noticed; an error
 ended the work. Neither holds a sentence. The sentences stand in one catalogue, `messages/*.toml`,
 a file for each room: ``code = {what, remedy}`` as templates over the data, with the words of an
 interface where they differ (``remedy_cli`` for options, ``remedy_file`` for the keys of a
-configuration). `Finding.sentence` and `Finding.advice` fill them in. No logic reads them: it
+configuration, which is given to a command: without words of its own it takes those of options).
+`Finding.sentence` and `Finding.advice` fill them in. No logic reads them: it
 reads `code`, `severity` and `data`.
 
 Templates are those of `str.format`, and besides:
@@ -272,7 +273,8 @@ def _catalogue(room: str) -> Mapping[str, Mapping[str, str]]:
 def _template(code: str, part: str, words: Words) -> str:
     room, _, name = code.partition(".")
     entry = _catalogue(room)[name]
-    return entry.get(f"{part}_{words}", entry.get(part, ""))
+    forms = {"python": (), "cli": ("_cli",), "file": ("_file", "_cli")}[words]
+    return next((entry[part + form] for form in (*forms, "") if part + form in entry), "")
 
 
 def _text(finding: Finding, part: str, words: Words) -> str:

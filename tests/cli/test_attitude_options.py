@@ -84,7 +84,7 @@ def test_a_second_log_and_rests(here, run_cli, logs):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--rates", "abc"], "'abc' is no list of numbers"),
+        (["--rates", "abc"], "'abc' is not a list of numbers"),
         (["--rates=-5"], "-5 Hz is no rate"),
         (["--rates", "nan"], "nan Hz is no rate"),
         (["--rates", "50,0"], "0 Hz is no rate"),

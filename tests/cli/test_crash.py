@@ -265,7 +265,7 @@ def test_a_folder_of_somebody_else_is_refused_even_when_forced(run_cli, quick, t
     (tmp_path / "letter.txt").write_text("mine")
     done = run_cli("crash", quick, "--out", tmp_path, "--force")
     assert done.code == 4
-    assert "it exists and is no bundle" in done.err
+    assert "it exists and is not a bundle" in done.err
     assert [p.name for p in tmp_path.iterdir()] == ["letter.txt"]
 
 

@@ -144,7 +144,7 @@ def test_without_a_sample_there_is_no_bundle(live):
     job = start(live, "--live", "-")
     _, err = job.communicate("imu,1,2\n", timeout=120)
     assert job.returncode == 3
-    assert "line 1 is not used: 2 numbers follow imu" in err
+    assert "line 1: not used: 2 numbers follow imu" in err
     assert "no sample came" in err
     assert [p.name for p in live.iterdir()] == ["run.toml"]
 
@@ -167,7 +167,7 @@ def test_a_live_run_needs_lines(live, run_cli):
 @pytest.mark.parametrize(
     ("options", "what"),
     [
-        (["--live", "tcp://1"], "nothing comes from 'tcp://1'"),
+        (["--live", "tcp://1"], "'tcp://1' is not a source"),
         (["--live", "-", "--pace", "1"], "--pace"),
         (["--live", "-", "--from", "3"], "--from"),
         (["--live", "udp://127.0.0.1:0", "--lines", "xml"], "json or csv"),

@@ -43,7 +43,7 @@ def test_a_folder_is_no_file(tmp_path, monkeypatch, run_cli):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.toml").mkdir()
     done = run_cli("simulate", "bad.toml")
-    assert (done.code, "it is no file" in done.err) == (4, True)
+    assert (done.code, "it is not a file" in done.err) == (4, True)
 
 
 def test_the_mark_that_an_editor_begins_a_file_with_is_passed_over(tmp_path, monkeypatch, run_cli):

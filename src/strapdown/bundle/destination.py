@@ -30,15 +30,13 @@ def check_destination(out: Path, force: bool) -> None:
     if out.is_dir() and not any(out.iterdir()):
         return
     if not force:
-        raise ConfigError("bundle.exists-already", file=str(out), quantity="--out")
+        raise ConfigError("bundle.folder-exists", file=str(out), quantity="--out")
     if not (out.is_dir() and (out / MANIFEST).is_file()):
-        raise ConfigError("bundle.exists-no-bundle-force-replaces", file=str(out), quantity="--out")
+        raise ConfigError("bundle.not-a-bundle", file=str(out), quantity="--out")
 
 
 def _refuse_unwritable(out: Path) -> None:
     """Say before a long run what would fail after it."""
     parent = next(p for p in out.absolute().parents if p.exists())
     if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise ConfigError(
-            "bundle.cannot-made-no-folder-may", file=str(out), quantity="--out", parent=parent
-        )
+        raise ConfigError("bundle.not-writable", file=str(out), quantity="--out", parent=parent)

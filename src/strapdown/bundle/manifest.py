@@ -62,7 +62,7 @@ def make_manifest(
 
 def _refuse_changed(file: Path, digest: str) -> None:
     if not file.is_file() or sha256(file) != digest:
-        raise DataError("bundle.changed-or-gone-since-read", file=file.name)
+        raise DataError("bundle.input-changed", file=file.name)
 
 
 def _keep(

@@ -35,14 +35,14 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
     if not bundle.exists():
         raise DataError("bundle.no-such-folder", file=str(bundle))
     if not path.is_file():
-        raise DataError("bundle.no-manifest-json-no-bundle", file=str(bundle))
+        raise DataError("bundle.no-manifest", file=str(bundle))
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
-        raise DataError("bundle.no-json-any-more", file=MANIFEST, error=error) from None
+        raise DataError("bundle.not-json", file=MANIFEST, reason=error) from None
     wanted = {"schema", "command", "configuration", "inputs", "outputs", "versions", "platform"}
     if not isinstance(manifest, dict) or wanted - set(manifest) or manifest["schema"] != SCHEMA:
-        raise DataError("bundle.not-manifest-form-strapdown-bundle", file=MANIFEST)
+        raise DataError("bundle.unknown-form", file=MANIFEST)
     _refuse_escape(manifest)
     return manifest
 
@@ -65,7 +65,7 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
         if not isinstance(manifest["command"], str):
             raise ValueError
     except (TypeError, KeyError, ValueError, AttributeError):
-        raise DataError("bundle.malformed-or-names-files-outside", file=MANIFEST) from None
+        raise DataError("bundle.malformed", file=MANIFEST) from None
 
 
 def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:

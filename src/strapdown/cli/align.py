@@ -104,9 +104,9 @@ def align(
     """
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_timing
-    from strapdown.cli.align_options import flag_words, spec_of_flags
+    from strapdown.cli.align_options import refuse_beside_file, spec_of_flags
     from strapdown.cli.align_tables import print_alignment
-    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.alignment_file import read_alignment_spec
     from strapdown.report.alignment import write_alignment
@@ -126,7 +126,8 @@ def align(
     refuse_result(source, "log")
     own = source.suffix.lower() == ".toml"
     if own:
-        flag_words(source, given)
+        refuse_beside_file(source, given)
+        WORDS.set("file")
     asked = read_alignment_spec(source) if own else None
     folder = out or default_folder(source, "align", None if asked is None else source_name(asked))
     check_destination(folder, write.force)

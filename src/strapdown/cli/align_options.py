@@ -12,15 +12,16 @@ from strapdown.cli.shared_options import log_keys
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.alignment_checks import NOT_BEFORE_FINE
 from strapdown.config.alignment_file import alignment_spec
-from strapdown.errors import ConfigError, StrapdownError
+from strapdown.config.spec import misfit
+from strapdown.errors import ConfigError, Finding
 from strapdown.formats import read_raw
 
 __all__ = [
     "LOG_FLAGS",
     "as_flag",
     "flag_of",
-    "flag_words",
     "module_of_flag",
+    "refuse_beside_file",
     "refused_flag",
     "spec_of_flags",
 ]
@@ -51,21 +52,18 @@ FLAGS = {
 _STAGES = {"coarse": "--method", "prefilter": "--prefilter"}
 
 
-def flag_words(
+def refuse_beside_file(
     source: Path,
     given: Mapping[str, Any],
-    what: str = "the file of an alignment",
     flags: Mapping[str, str] = FLAGS,
 ) -> None:
-    """Refuse flags beside a file that says all of it, and name the key that says the same.
+    """Refuse options beside a file that states all of them, and name the key that does.
 
     Parameters
     ----------
     source : Path
     given : mapping
         By flag, None where it is not given.
-    what : str
-        What the file is of.
     flags : mapping
         Flags by the place in a specification.
 
@@ -77,28 +75,21 @@ def flag_words(
     if not written:
         return
     flag = flag_of(written[0])
+    places = {**flags, **{f"{stage}, kind": name for stage, name in _STAGES.items()}}
+    place = next((place for place, name in places.items() if name == flag), None)
+    if place is None:
+        raise ConfigError("cli.option-beside-file", file=source.name, quantity=flag)
+    table, key = place.rsplit(", ", 1)
+    entry = f'{key} = "rts"' if flag == "--smooth" else key
+    table = table.replace(", ", ".")
     raise ConfigError(
-        "cli.says-how-run-said-beside",
-        file=source.name,
-        quantity=flag,
-        what=what,
-        key=_key(flag, flags),
+        "cli.option-of-key-beside-file", file=source.name, quantity=flag, entry=entry, table=table
     )
 
 
 def flag_of(name: str) -> str:
     """The flag of a parameter of a command."""
     return "--" + name.removesuffix("_s").replace("_", "-")
-
-
-def _key(flag: str, flags: Mapping[str, str]) -> str:
-    places = {**flags, **{f"{stage}, kind": name for stage, name in _STAGES.items()}}
-    place = next((place for place, name in places.items() if name == flag), None)
-    if place is None:
-        return "it"
-    table, key = place.rsplit(", ", 1)
-    value = ' = "rts"' if flag == "--smooth" else ""
-    return f"{key}{value} under [{table.replace(', ', '.')}]"
 
 
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
@@ -123,7 +114,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     """
     keys = log_keys(given)
     if given["sensor"] is None:
-        raise ConfigError("cli.nothing-says-how-good-sensors", quantity="--sensor")
+        raise ConfigError("cli.no-sensor-for-alignment", quantity="--sensor")
     coarse = module_of_flag(given["method"] or "inertial_frame")
     alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
     table = {
@@ -146,7 +137,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
 
 
 def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> ConfigError:
-    """What pydantic finds in flags, in our words.
+    """Return what pydantic finds in options, as an error that names the option.
 
     Parameters
     ----------
@@ -156,27 +147,17 @@ def refused_flag(error: Any, flag: Callable[[str], str] | None = None) -> Config
         The flag of a place in a specification; those of ``strapdown align``, if not given.
     """
     path = [str(p) for p in error["loc"]]
-    context = error.get("ctx", {})
+    finding = misfit(error)
     if error["type"] == "missing":
-        what, remedy = "it is missing", f"write it after the colon: {path[-1]}=…"
-    elif error["type"] == "finite_number":
-        what, remedy = f"{error['input']} is no number", "give a finite number"
-    else:
-        what = context.get("what") or f"{error['input']!r} does not fit: {error['msg'].lower()}"
-        remedy = context.get("remedy") or "give another value"
-    if context.get("key"):
-        path.append(context["key"])
-    return ConfigError(
-        "cli.message", quantity=(flag or _flag)(", ".join(path)), message=what, remedy_text=remedy
-    )
+        finding = Finding("cli.module-option-missing", key=path[-1])
+    elif error["type"] == "refused" and error["ctx"]["key"]:
+        path.append(error["ctx"]["key"])
+    return ConfigError(finding, quantity=(flag or _flag)(", ".join(path)))
 
 
-def as_flag(error: StrapdownError, flag: Callable[[str], str] | None = None) -> StrapdownError:
-    """The error with the flag in place of the place in a specification."""
-    f = error.finding
-    return type(error)(
-        f.what, file=f.file, row=f.row, quantity=(flag or _flag)(f.quantity or ""), remedy=f.remedy
-    )
+def as_flag(error: ConfigError, flag: Callable[[str], str] | None = None) -> ConfigError:
+    """Return the error with the option in place of the place in a specification."""
+    return error.replaced(quantity=(flag or _flag)(error.finding.quantity or ""))
 
 
 def _flag(place: str) -> str:
@@ -201,7 +182,7 @@ def _site(log: Path, given: Mapping[str, Any]) -> dict[str, float]:
             return {k: v if place[k] is None else place[k] for k, v in said.items()}
     for key, flag in (("lat_deg", "--lat"), ("lon_deg", "--lon")):
         if place[key] is None:
-            raise ConfigError("cli.nothing-says-body-stands-rate", quantity=flag)
+            raise ConfigError("cli.no-position", quantity=flag)
     return {k: float(v) for k, v in place.items() if v is not None}
 
 
@@ -212,7 +193,7 @@ def module_of_flag(text: str) -> dict[str, Any]:
     for part in (p for p in rest.split(",") if p.strip()):
         key, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or not value:
-            raise ConfigError("cli.no-option", quantity=kind, part=part)
+            raise ConfigError("cli.bad-module-option", quantity=kind, part=part)
         out[key] = _value(value)
     return out
 

@@ -252,7 +252,7 @@ def _numbers(text: str | None) -> list[float]:
     try:
         return [float(word) for word in (text or "").replace(",", " ").split()]
     except ValueError:
-        raise ConfigError("cli.no-list-numbers", quantity="--rates", text=text) from None
+        raise ConfigError("cli.bad-rates", quantity="--rates", text=text) from None
 
 
 def _split(text: str) -> list[str]:

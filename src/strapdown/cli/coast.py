@@ -153,7 +153,7 @@ def coast(
     from strapdown.bundle.timing import write_timing
     from strapdown.cli.coast_options import coast_of_flags
     from strapdown.cli.coast_tables import print_coast
-    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, source_name
     from strapdown.report.coast import read_coasting_run, write_coast
     from strapdown.systems.coasting.run import run_coast
@@ -196,6 +196,8 @@ def coast(
                 "duration_s": duration,
             },
         )
+        if navigation is not None:
+            WORDS.set("file")
         result = run_coast(spec, navigation, file, report)
         seal = write_coast(result, folder, force=write.force, progress=report)
         report.stop()

@@ -73,13 +73,13 @@ def coast_of_flags(
     _refuse_others(source, of_run, motion, start, keep, run)
     parts = [key for key in ("from_s", "to_s", "duration_s") if run.get(key) is not None]
     if run.get("at_s") is not None and parts:
-        raise ConfigError("cli.says-outage", quantity=FLAGS[parts[0]])
+        raise ConfigError("cli.part-beside-at", quantity=FLAGS[parts[0]])
     aiding: dict[str, Any] = {}
     for text in keep:
         module = module_of_flag(text)
         kind = module.pop("kind")
         if kind in aiding:
-            raise ConfigError("cli.stands-twice", quantity="--with", kind=kind)
+            raise ConfigError("cli.aid-repeated", quantity="--with", kind=kind)
         aiding[kind] = module
     sensor = str(Path(source).absolute()) if source.lower().endswith(".toml") else source
     table = {
@@ -120,7 +120,5 @@ def _refuse_others(
     if not said:
         return
     if of_run:
-        raise ConfigError(
-            "cli.run-navigation-says-how-moved", file=Path(source).name, quantity=said[0]
-        )
-    raise ConfigError("cli.sensor-alone-no-record-take", quantity=said[0])
+        raise ConfigError("cli.motion-option-of-run", file=Path(source).name, quantity=said[0])
+    raise ConfigError("cli.record-option-of-sensor", quantity=said[0])

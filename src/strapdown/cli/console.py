@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from strapdown.report.document import TableBlock
 
 
+#: Whose words messages speak: those of options, or the keys of the file that a command runs.
+WORDS: ContextVar[Words] = ContextVar("words", default="cli")
 # Redirected output has no width of its own; a table is then as wide as it is.
 PIPE_WIDTH = 160
 # A name with many options is broken where many numbers stand beside it.
@@ -158,13 +161,11 @@ def _broken(name: str) -> str:
     return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
 
 
-def print_findings(
-    findings: Sequence[Finding], most: int | None = None, words: Words = "cli"
-) -> None:
-    """Print what a person should know, to stderr; the first alone of more than `most`."""
+def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
+    """Print findings to stderr, in `WORDS`; the first alone of more than `most`."""
     out = console(err=True)
     for finding in findings[:most]:
-        head, _, remedy = finding.text(words).partition("\n")
+        head, _, remedy = finding.text(WORDS.get()).partition("\n")
         out.print(f"note: {head}", style="yellow")
         if remedy:
             out.print(remedy, style="dim")

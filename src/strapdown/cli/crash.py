@@ -28,7 +28,14 @@ def crash(
     """
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_timing
-    from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
+    from strapdown.cli.console import (
+        WORDS,
+        Stopwatch,
+        console,
+        print_findings,
+        print_seal,
+        progress,
+    )
     from strapdown.cli.crash_tables import print_crash
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.config.crash_case_file import read_case_spec
@@ -38,6 +45,7 @@ def crash(
     refuse_result(case, "case")
     folder = out or default_folder(case, "crash")
     check_destination(folder, write.force)
+    WORDS.set("file")
     spec = read_case_spec(case)
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
@@ -52,5 +60,5 @@ def crash(
         return
     console().print(spec.title, style="bold")
     print_crash(result)
-    print_findings(result.findings, words="file")
+    print_findings(result.findings)
     print_seal(seal, "report.html")

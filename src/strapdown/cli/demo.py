@@ -83,7 +83,7 @@ def _check(out: Path, names: list[str], force: bool) -> None:
         if "." not in name:
             check_destination(out / name, force)
         elif (out / name).exists() and not force:
-            raise ConfigError("cli.exists-already", file=str(out / name), quantity="--out")
+            raise ConfigError("cli.folder-exists", file=str(out / name), quantity="--out")
 
 
 def _write_whole(path: Path, text: str) -> None:

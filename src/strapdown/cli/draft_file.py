@@ -29,9 +29,9 @@ def check_free(path: Path, usual: str, *, force: bool) -> None:
         A file is there and may not be replaced, or a folder is.
     """
     if path.is_dir():
-        raise ConfigError("cli.folder", file=str(path), quantity="--out", path=path / usual)
+        raise ConfigError("cli.out-is-folder", file=str(path), quantity="--out", path=path / usual)
     if path.exists() and not force:
-        raise ConfigError("cli.file-exists-may-hold-you", file=str(path), quantity="--out")
+        raise ConfigError("cli.file-exists", file=str(path), quantity="--out")
 
 
 def write_file(path: Path, text: str, usual: str, *, force: bool) -> None:

@@ -27,8 +27,9 @@ from strapdown.cli import (
     simulate,
     verify,
 )
+from strapdown.cli.console import WORDS
 from strapdown.cli.interrupts import keep_interrupts
-from strapdown.errors import Finding, StrapdownError, Words
+from strapdown.errors import Finding, StrapdownError
 
 EXIT_CODES = (
     "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
@@ -61,6 +62,7 @@ def main(
     ),
 ) -> None:
     """From an inertial sensor log to an answer that you can trust."""
+    WORDS.set("cli")
 
 
 app.command("attitude", epilog=attitude.EPILOG)(attitude.attitude)
@@ -100,19 +102,17 @@ def run() -> None:
     try:
         app()
     except StrapdownError as error:
-        # A crash is asked for by a case file, and its keys are what a remedy can name.
-        words: Words = "file" if sys.argv[1:2] == ["crash"] else "cli"
-        _fail(error.finding.text(words), error.exit_code)
+        _fail(error.finding.text(WORDS.get()), error.exit_code)
     except OSError as error:
         if error.errno == errno.EPIPE:
             _reader_gone()
         what = Finding(
-            "cli.message",
+            "cli.system-error",
+            severity="error",
             file=str(error.filename) if error.filename else None,
-            message=error.strerror or str(error),
-            remedy_text="check the path and the free space, or name another folder with --out",
+            reason=error.strerror or str(error),
         )
-        _fail(str(what), 4)
+        _fail(what.text(WORDS.get()), 4)
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -146,8 +146,8 @@ def navigate(
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_latency, write_timing
-    from strapdown.cli.align_options import flag_of, flag_words
-    from strapdown.cli.console import Stopwatch, print_findings, print_seal, progress
+    from strapdown.cli.align_options import flag_of, refuse_beside_file
+    from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency
     from strapdown.cli.navigate_options import FLAGS, navigation_of_flags, smoothed_too
     from strapdown.cli.navigate_tables import print_navigation
@@ -174,7 +174,9 @@ def navigate(
     }
     own = source.suffix.lower() == ".toml"
     if own and live is None:
-        flag_words(source, {**given, "smooth": None}, "the file of a run", FLAGS)
+        refuse_beside_file(source, {**given, "smooth": None}, FLAGS)
+    if own:
+        WORDS.set("file")
     asked = read_navigation_spec(source) if own else None
     if asked is not None and smooth:
         asked = smoothed_too(asked)

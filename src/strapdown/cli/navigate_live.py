@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -15,11 +15,11 @@ import typer
 from strapdown.bundle.reading import read_manifest
 from strapdown.bundle.seal import Seal
 from strapdown.bundle.timing import write_latency, write_timing
-from strapdown.cli.console import Stopwatch, print_seal, progress
+from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
 from strapdown.cli.latency_table import print_latency
 from strapdown.cli.navigate_tables import print_navigation
 from strapdown.config.navigation_file import read_navigation_spec
-from strapdown.errors import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.live.clock import MachineClock
 from strapdown.live.received import live_spec
 from strapdown.live.run import LiveRun, receive, result_of
@@ -68,11 +68,13 @@ def navigate_live(
     flag = next((name for name, value in given.items() if value is not None), None)
     if flag is not None or file.suffix.lower() != ".toml":
         raise ConfigError(
-            "cli.live-takes-file-run-no", quantity="--live", value="log" if flag is None else flag
+            "cli.live-without-file" if flag is None else "cli.option-beside-live",
+            quantity="--live",
+            option=flag,
         )
     received = folder.parent / f"{folder.name}-received"
     if received.exists():
-        raise ConfigError("cli.run-before-received-could-not", file=str(received), quantity="--out")
+        raise ConfigError("cli.received-before", file=str(received), quantity="--out")
     clock = MachineClock()
     spec = live_spec(read_navigation_spec(file))
     live = receive(
@@ -85,7 +87,7 @@ def navigate_live(
         every,
     )
     if not len(live.got.samples):
-        raise DataError("cli.no-sample-came", quantity="--live")
+        raise DataError("cli.no-sample", quantity="--live")
     with redirect_stdout(sys.stderr):
         seal = _sealed(live, file, folder, received, force=force, quiet=quiet)
         if not quiet and live.latency is not None:
@@ -133,9 +135,9 @@ def _write(text: str) -> None:
         raise
 
 
-def _warner(quiet: bool) -> Any:
-    def warn(text: str) -> None:
+def _warner(quiet: bool) -> Callable[[Finding], None]:
+    def warn(finding: Finding) -> None:
         if not quiet:
-            typer.echo(f"note: {text}", err=True)
+            typer.echo(f"note: {finding.text(WORDS.get())}", err=True)
 
     return warn

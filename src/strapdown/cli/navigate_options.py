@@ -72,26 +72,19 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     )
     if given["sensor"] is None:
         near = proposal.table.get("sensors", {}).get("sensor")
-        raise ConfigError(
-            "cli.message",
-            quantity="--sensor",
-            message="nothing says how good the sensors are, and without that no position has a bound, and no aid a weight",
-            remedy_text="name one of the catalogue (strapdown modules) or a .toml file of your own"
-            + (f"; nearest by the noise of the log is {near}" if near else ""),
-        )
+        code = "cli.no-sensor-near-one" if near else "cli.no-sensor-for-navigation"
+        raise ConfigError(code, quantity="--sensor", near=near)
     whole = {"name": log.resolve().stem, **proposal.table}
     if "position_sd_m" in whole.get("aiding", {}).get("gnss", {}):
-        raise ConfigError(
-            "cli.fixes-do-not-state-how", file=Path(given["gnss"]).name, quantity="--gnss"
-        )
+        raise ConfigError("cli.fixes-without-sd", file=Path(given["gnss"]).name, quantity="--gnss")
     coarse = whole["coarse"]
     if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
-        raise ConfigError("cli.nothing-tells-heading-neither-rest", quantity="--heading")
+        raise ConfigError("cli.no-heading", quantity="--heading")
     if "site" not in whole and proposal.gnss is None:
-        raise ConfigError("cli.nothing-says-begins-no-fixes", quantity="--lat")
+        raise ConfigError("cli.no-initial-position", quantity="--lat")
     if given["lever_arm"] is not None:
         if "aiding" not in whole:
-            raise ConfigError("cli.no-receiver-whose-antenna-would", quantity="--lever-arm")
+            raise ConfigError("cli.lever-arm-without-receiver", quantity="--lever-arm")
         whole["aiding"]["gnss"]["lever_arm_m"] = _arm(given["lever_arm"])
     if given["truth"] is not None:
         whole["truth"] = {"path": str(given["truth"])}
@@ -133,7 +126,7 @@ def _site(given: Mapping[str, Any]) -> tuple[float, float, float] | None:
         return None
     for value, flag in ((lat, "--lat"), (lon, "--lon")):
         if value is None:
-            raise ConfigError("cli.place-latitude-longitude", quantity=flag, flag=flag)
+            raise ConfigError("cli.half-a-position", quantity=flag, flag=flag)
     return lat, lon, alt or 0.0
 
 
@@ -141,5 +134,5 @@ def _arm(text: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError("cli.no-lever-arm", quantity="--lever-arm", text=text) from None
+        raise ConfigError("cli.bad-lever-arm", quantity="--lever-arm", text=text) from None
     return x, y, z

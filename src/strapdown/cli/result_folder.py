@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
     from strapdown.config.alignment import AlignmentSpec
@@ -79,22 +80,24 @@ def refuse_result(source: str | Path, wanted: str) -> None:
         # Others, too, write a file of this name; what is wrong with one of ours, verify tells.
         return
     command = str(manifest["command"])
+    data: dict[str, Any] = {"command": command, "wanted": wanted}
+    code = "cli.result-of-run"
     if (path / "case.toml").is_file():
-        remedy = f"give the case in it: strapdown crash {path / 'case.toml'}"
+        code, data["case"] = "cli.result-with-case", path / "case.toml"
     elif command == "simulate":
         logs = [p for p in sorted(path.glob("log.*")) if p.is_file()]
-        remedy = f"give the log in it: {logs[0] if logs else path / 'log.csv'}"
+        code, data["log"] = "cli.result-with-log", logs[0] if logs else path / "log.csv"
     else:
-        remedy = f"open {path / 'report.html'} to read it; strapdown verify {path} runs it again"
-        if command == "navigate":
-            remedy += f"; strapdown coast {path} foretells its drift without fixes"
-        own = next((i for i in manifest["inputs"] if i["role"] in ("log", "case")), None)
-        if own is not None:
-            at = path / own["name"] if own["kept"] == "copy" else Path(own["name"])
-            remedy += f"; its {own['role']} is {at}"
-    raise ConfigError(
-        "cli.message",
-        file=path.resolve().name,
-        message=f"it is a result that strapdown {command} wrote, and no {wanted}",
-        remedy_text=remedy,
-    )
+        data["hints"] = list(_hints(path, command, manifest))
+    raise ConfigError(code, file=path.resolve().name, **data)
+
+
+def _hints(path: Path, command: str, manifest: Mapping[str, Any]) -> Iterator[Finding]:
+    """Yield what can be done with a folder of results."""
+    yield Finding("cli.hint-open", severity="note", report=path / "report.html", folder=path)
+    if command == "navigate":
+        yield Finding("cli.hint-coast", severity="note", folder=path)
+    own = next((i for i in manifest["inputs"] if i["role"] in ("log", "case")), None)
+    if own is not None:
+        at = path / own["name"] if own["kept"] == "copy" else Path(own["name"])
+        yield Finding("cli.hint-input", severity="note", role=own["role"], input=at)

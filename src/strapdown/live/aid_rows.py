@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
 from strapdown.config.navigation import AidSpec
-from strapdown.errors import nearest
 from strapdown.formats import csv
 from strapdown.live.lines import BadLineError
 from strapdown.systems.sins.aid_files import COLUMN_UNITS
@@ -75,21 +74,12 @@ class AidRows:
         name = self.aid.name
         for column in values:
             if column not in self._columns:
-                raise BadLineError(
-                    name, f"'{column}' is no column", nearest(column, list(self._columns))
-                )
+                raise BadLineError(name, "live.unknown-column", word=column, known=self._columns)
         whole = self._whole_fix(dict(values)) if self.of_fixes else values
         missing = [column for column in self._columns if column not in whole]
         if missing:
-            raise BadLineError(
-                name,
-                f"{', '.join(missing)} missing",
-                "send the columns " + ", ".join(self._columns)
-                if not self.of_fixes
-                else "send lat, lon, alt with north_sd, east_sd, down_sd, or state position_sd_m; "
-                "of a velocity VN, VE and VD with VN_sd, VE_sd, VD_sd, or state "
-                "velocity_sd_m_per_s",
-            )
+            code = "live.fix-incomplete" if self.of_fixes else "live.columns-missing"
+            raise BadLineError(name, code, missing=missing, columns=self._columns)
         return [float(whole[column]) for column in self._columns]
 
     def _whole_fix(self, values: dict[str, float]) -> dict[str, float]:

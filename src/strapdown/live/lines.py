@@ -15,8 +15,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from strapdown.errors import nearest
+from strapdown.errors import Finding
 from strapdown.formats.sensorstream import blocks_of
 
 __all__ = ["END", "BadLineError", "Measured", "Sample", "Word", "parse_line"]
@@ -27,6 +28,8 @@ IMU, COMMAND = "imu", "command"
 #: Blocks of Sensorstream.
 _ACCEL, _GYRO = 3, 4
 _FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ"
+#: Characters of a line that a message shows.
+LONGEST = 40
 
 
 class BadLineError(Exception):
@@ -36,12 +39,16 @@ class BadLineError(Exception):
     ----------
     kind : str
         What all lines of its kind have in common, by which they are counted.
-    what, remedy : str
+    code : str or Finding
+        As of `StrapdownError`.
+    **data
+        As of `Finding`.
     """
 
-    def __init__(self, kind: str, what: str, remedy: str) -> None:
-        super().__init__(what)
-        self.kind, self.what, self.remedy = kind, what, remedy
+    def __init__(self, kind: str, code: str | Finding, /, **data: Any) -> None:
+        self.kind = kind
+        self.finding = code if isinstance(code, Finding) else Finding(code, **data)
+        super().__init__(self.finding)
 
 
 @dataclass(frozen=True)
@@ -93,32 +100,33 @@ def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | Non
     head, *fields = (part.strip() for part in text.split(","))
     if head == IMU:
         if len(fields) != 7:
-            raise BadLineError(
-                "imu", f"{len(fields)} numbers follow imu, and not 7", f"write {_FORM}, SI units"
-            )
+            raise BadLineError("imu", "live.wrong-number-of-values", count=len(fields), form=_FORM)
         time, *values = (_number(field, IMU) for field in fields)
         return Sample(time, tuple(values))
     if head == COMMAND:
         if len(fields) != 1 or not fields[0]:
-            raise BadLineError("command", "a command is one word", f"write command,{END}")
+            raise BadLineError("command", "live.command-not-one-word", end=END)
         return Word(fields[0])
     if head in aids:
         return _measured(head, fields)
     if head[:1].isdigit() or head[:1] in ("-", "+", "."):
         return _streamed(text)
     known = [IMU, COMMAND, *aids]
-    raise BadLineError("word", f"'{_shown(head)}' begins no line", nearest(head, known))
+    raise BadLineError(
+        "word", "live.unknown-line", given=_shown(head), word=head[:LONGEST], known=known
+    )
 
 
 def _measured(name: str, fields: Sequence[str]) -> Measured:
-    form = f"write {name},TIME,COLUMN=VALUE,…"
     if len(fields) < 2:
-        raise BadLineError(name, f"a time and what was measured follow {name}", form)
+        raise BadLineError(name, "live.measurement-incomplete", name=name)
     values: dict[str, float] = {}
     for field in fields[1:]:
         column, equals, value = field.partition("=")
-        if not equals or column.strip() in values:
-            raise BadLineError(name, f"'{_shown(field)}' is no column=value, or there twice", form)
+        if not equals:
+            raise BadLineError(name, "live.not-column-value", name=name, given=_shown(field))
+        if column.strip() in values:
+            raise BadLineError(name, "live.column-repeated", name=name, given=_shown(field))
         values[column.strip()] = _number(value.strip(), name)
     return Measured(name, _number(fields[0], name), values)
 
@@ -126,19 +134,18 @@ def _measured(name: str, fields: Sequence[str]) -> Measured:
 def _streamed(text: str) -> Sample:
     found = blocks_of(text)
     if found is None:
-        raise BadLineError(
-            "sensorstream", "it is not a stamp and blocks of an id and values", _FORM
-        )
+        raise BadLineError("sensorstream", "live.not-sensorstream", form=_FORM)
     time, blocks = found
     if _GYRO not in blocks or _ACCEL not in blocks:
         raise BadLineError(
             "sensorstream without a sensor",
-            "a line without gyroscope (4) or accelerometer (3) is no sample",
-            "switch both on in the app, at one rate",
+            "live.sensorstream-without-sensor",
+            gyro=_GYRO,
+            accel=_ACCEL,
         )
     values = (*blocks[_GYRO], *blocks[_ACCEL])
     if not all(map(math.isfinite, (time, *values))):
-        raise BadLineError("sensorstream", "a value is not finite", "send finite numbers")
+        raise BadLineError("sensorstream", "live.value-not-finite")
     return Sample(time, values)
 
 
@@ -148,9 +155,9 @@ def _number(text: str, kind: str) -> float:
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise BadLineError(kind, f"'{_shown(text)}' is no finite number", "leave such lines out")
+        raise BadLineError(kind, "live.not-a-finite-number", given=_shown(text))
     return value
 
 
 def _shown(text: str) -> str:
-    return text if len(text) <= 40 else f"{text[:40]}…"
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.aiding.aid import TableAid
 from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec, aids_of
-from strapdown.errors import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.stamps import EPOCH
 from strapdown.live.aid_rows import AidRows
@@ -56,7 +56,7 @@ class Reception:
     show : callable
         Given the piece of each sample.
     warn : callable
-        Given a message for each first line of its kind that is not used.
+        Given a finding for each first line of its kind that is not used.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Reception:
         recording: Recording,
         clock: Clock,
         show: Callable[[ChainPiece], None],
-        warn: Callable[[str], None],
+        warn: Callable[[Finding], None],
     ) -> None:
         self._live = spec.live or LiveTable()
         self._chain, self._recording, self._clock = chain, recording, clock
@@ -151,11 +151,7 @@ class Reception:
     def _sample(self, said: Sample, arrived: float) -> None:
         time = self._own(said.time)
         if not time > self._newest:
-            raise BadLineError(
-                "time",
-                f"{said.time:.9g} s is not later than the sample before",
-                "send samples in the order in which they were taken, each stamp once",
-            )
+            raise BadLineError("time", "live.sample-not-later", time=said.time)
         values = np.array(said.values)
         for part, turn in ((slice(0, 3), self._gyro), (slice(3, 6), self._accel)):
             if turn is not None:
@@ -202,18 +198,10 @@ class Reception:
         rows = self.rows[said.name]
         row = rows.row(said.values)
         if math.isnan(self._origin):
-            raise BadLineError(
-                f"{said.name} before the first sample",
-                "no sample has come yet, whose clock it would be on",
-                "nothing: what comes later is used",
-            )
+            raise BadLineError(f"{said.name} before the first sample", "live.before-first-sample")
         time = said.time - self._origin
         if not time > rows.newest:
-            raise BadLineError(
-                f"{said.name} time",
-                f"{said.time:.9g} s is not later than the row before",
-                "send rows in the order of their stamps, each once",
-            )
+            raise BadLineError(f"{said.name} time", "live.row-not-later", time=said.time)
         table = rows.table(time, row)
         try:
             at = rows.aid.epochs(table).time
@@ -221,29 +209,30 @@ class Reception:
                 self.late[said.name] += 1
                 if self.late[said.name] == 1:
                     self._warn(
-                        f"{said.name}: what is of {said.time:.9g} s came when the samples of then "
-                        f"were navigated; hold_s above {self._newest - time:.3g} in [live] waits "
-                        "for it"
+                        Finding(
+                            "live.late",
+                            quantity=said.name,
+                            time=said.time,
+                            delay=self._newest - time,
+                        )
                     )
                 return
             self._state = self._chain.tell(self._state, said.name, table)
         except DataError as error:
-            raise BadLineError(
-                said.name, error.finding.what, error.finding.remedy or "correct it"
-            ) from None
+            raise BadLineError(said.name, error.finding) from None
         rows.keep(time, row)
 
     def _word(self, word: str) -> None:
         try:
             self._chain.command(self._state, word)
         except ConfigError as error:
-            raise BadLineError("command", error.finding.what, error.finding.remedy or "") from None
+            raise BadLineError("command", error.finding) from None
         self._words.append(word)
 
     def _not_used(self, bad: BadLineError, line: Line) -> None:
         self.unused[bad.kind] += 1
         if self.unused[bad.kind] == 1:
-            self._warn(f"line {line.number} is not used: {bad.what}; {bad.remedy}")
+            self._warn(Finding("live.line-not-used", line=line.number, reason=bad.finding))
 
 
 def _turns(spec: NavigationSpec) -> tuple[Array | None, Array | None]:

@@ -50,7 +50,7 @@ def parse_pace(text: str) -> float:
     except ValueError:
         pace = math.nan
     if not 0.0 < pace < math.inf:
-        raise ConfigError("live.no-pace", quantity="--pace", text=text)
+        raise ConfigError("live.bad-pace", quantity="--pace", text=text)
     return pace
 
 

@@ -16,7 +16,7 @@ from strapdown.config.choice import make_choice
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import given_of, sensors_of
 from strapdown.config.slots import SLOTS
-from strapdown.errors import DataError, StrapdownError
+from strapdown.errors import DataError, Finding, StrapdownError
 from strapdown.live.clock import Clock
 from strapdown.live.latency import Latency
 from strapdown.live.received import write_received
@@ -79,7 +79,7 @@ def receive(
     source: LineSource,
     clock: Clock,
     write: Callable[[str], None],
-    warn: Callable[[str], None],
+    warn: Callable[[Finding], None],
     form: str = "json",
     every: float = 1.0,
 ) -> LiveRun:
@@ -94,7 +94,7 @@ def receive(
     write : callable
         Given each line of the state.
     warn : callable
-        Given each message.
+        Given each finding.
     form, every
         As `StateLines`.
 
@@ -116,7 +116,7 @@ def receive(
         got = Reception(chain, spec, recording, clock, lines.take, warn)
         with _until_a_signal() as wanted:
             warm_up(chain, got.sampling)
-            warn(f"listening to {source.name}")
+            warn(Finding("live.listening", severity="note", source=source.name))
             source.begin()
             while wanted() and reader.there:
                 try:

@@ -54,9 +54,9 @@ class StateLines:
         every: float = 1.0,
     ) -> None:
         if form not in LINE_FORMS:
-            raise ConfigError("live.no-form", quantity="--lines", form=form)
+            raise ConfigError("live.unknown-line-form", quantity="--lines", form=form)
         if not 0.0 <= every < math.inf:
-            raise ConfigError("live.no-interval", quantity="--every", every=every)
+            raise ConfigError("live.bad-interval", quantity="--every", every=every)
         self._used, self._write, self._form, self._every = navigator, write, form, every
         self._next = -math.inf
         self._mark: Mark | None = None

@@ -158,7 +158,7 @@ def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
     except ValueError:
         parts, host, port = urlsplit(""), _LOCAL, None
     if parts.scheme != "udp" or port is None or parts.path.strip("/"):
-        raise ConfigError("live.nothing-comes", quantity="--live", where=where)
+        raise ConfigError("live.not-a-source", quantity="--live", where=where)
     bound = _bound(host, port)
     bound.settimeout(LOOK)
     name = f"udp://{host}:{bound.getsockname()[1]}"
@@ -176,6 +176,6 @@ def _bound(host: str, port: int) -> socket.socket:
             raise
     except OSError as error:
         raise ConfigError(
-            "live.cannot-listened", quantity="--live", strerror=error.strerror or error
+            "live.cannot-listen", quantity="--live", reason=error.strerror or error
         ) from None
     return made

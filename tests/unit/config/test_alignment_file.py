@@ -16,8 +16,8 @@ from strapdown.config.alignment_file import (
 )
 from strapdown.config.choice import ChoiceSpec, choice_form, make_choice
 from strapdown.config.slots import GIVEN, SLOTS, UNITS, options_of
-from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.errors import ConfigError
+from strapdown.estimation.robust_update import RobustUpdate
 from strapdown.mechanization import NorthEastDown
 
 GOOD = """\

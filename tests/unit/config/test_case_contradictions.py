@@ -57,7 +57,10 @@ BAD = {
         ("[-0.1, 0.75]", "[0.1, 0.75]"),
         ["line 74", "time_s = 0.0 (as nothing else is written)"],
     ),
-    "length in mm": (("length_m = 4.2", "length_m = 4200"), ["config.vehicle-size-out-of-range", "4200 m", "_mm"]),
+    "length in mm": (
+        ("length_m = 4.2", "length_m = 4200"),
+        ["config.vehicle-size-out-of-range", "4200 m", "_mm"],
+    ),
     "negative front": ((FRONT, "front_m = -2"), ["front_m = -2", "(line 7)"]),
     "outline in mm": ((SIZE, "outline_m = [[2000, 0], [2000, 800], [0, 0]]"), ["outline_mm"]),
     "flat outline": ((SIZE, "outline_m = [[2, 0], [1, 0], [-1, 0]]"), ["it encloses 0 m²"]),
@@ -109,7 +112,10 @@ BAD = {
         (TRIGGER, "", "trigger_s = 0", "", OPTIONS, '[options]\nclock = "correlation"'),
         ["line 21, unit 1, trigger_s: it is missing", "no unit has one"],
     ),
-    "assumed of nothing missing": ((GYRO, f"[units.assumed]\n{GYRO}"), ["config.nothing-to-assume"]),
+    "assumed of nothing missing": (
+        (GYRO, f"[units.assumed]\n{GYRO}"),
+        ["config.nothing-to-assume"],
+    ),
     "assumed beside a borrowed gyro": (
         (BORROWED, f"{BORROWED}\n{ASSUMED} }}"),
         ["turn_sd_deg = 2 contradicts gyro_from = 'IMU1' (line 55)"],
@@ -174,7 +180,10 @@ BAD = {
         ("[-0.1, 0.75]", "[-2, -0.5]", KIND, "time_s = -1"),
         ["ends before the trigger"],
     ),
-    "gravity of one": ((OPTIONS, "[options]\ngravity_m_per_s2 = 1"), ["config.gravity-out-of-range"]),
+    "gravity of one": (
+        (OPTIONS, "[options]\ngravity_m_per_s2 = 1"),
+        ["config.gravity-out-of-range"],
+    ),
     "a model twice": (
         ('["wang_2022_front_mais3"]', '["wang_2022_all_mais3", "wang_2022_all_mais3"]'),
         ["severity 2", "named twice"],

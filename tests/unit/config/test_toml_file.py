@@ -62,7 +62,10 @@ def test_a_list_that_does_not_end_is_named_at_the_end_of_the_file(tmp_path):
         ("[t]\n[[t]]\n", "line 2, t: the key is repeated; it is in line 1 too"),
         ("[[t]]\n[t]\n", "line 2, t: the key is repeated; it is in line 1 too"),
         ("a = { b = 1 }\n[u]\nc = { d = 1, d = 2 }", "line 3, u, c, d: the key is repeated"),
-        ("[[u]]\nname = 1\n\nname = 2\n", "line 4, u 1, name: the key is repeated; it is in line 2"),
+        (
+            "[[u]]\nname = 1\n\nname = 2\n",
+            "line 4, u 1, name: the key is repeated; it is in line 2",
+        ),
     ],
 )
 def test_what_stands_twice_has_both_lines(text, said, tmp_path):

@@ -117,7 +117,8 @@ def test_a_fix_that_comes_too_late_is_counted_and_not_used(tmp_path):
     live, _, told = received(lines(0.4))
     assert live.got.late["gnss"] == 9
     assert len(told) == 1
-    assert "hold_s above 0.4 in [live] waits for it" in told[0]
+    assert told[0].code == "live.late"
+    assert told[0].data["delay"] == pytest.approx(0.4, abs=1e-9)
     assert live.got.rows["gnss"].count == 0
     assert live.run.record.innovations == {}
     # It runs again without any: the aid has states, but no file.
@@ -145,8 +146,10 @@ def test_a_line_that_cannot_be_used_changes_nothing():
     assert live.got.unused == {"imu": 2, "word": 2, "time": 1, "gnss": 3, "command": 1}
     # Once a kind, with its line and a remedy.
     assert len(told) == 5
-    assert told[0].startswith("line 41 is not used: 3 numbers follow imu")
-    assert all("; " in text for text in told)
+    assert {one.code for one in told} == {"live.line-not-used"}
+    assert told[0].line == 41
+    assert told[0].data["reason"].code == "live.wrong-number-of-values"
+    assert all(one.remedy for one in told)
 
 
 def test_a_row_that_repeats_its_stamp_is_not_used():
@@ -154,7 +157,7 @@ def test_a_row_that_repeats_its_stamp_is_not_used():
     place = next(k for k, text in enumerate(good) if text.startswith("gnss"))
     live, _, told = received([*good[: place + 1], good[place], *good[place + 1 :]])
     assert live.got.unused == {"gnss time": 1}
-    assert "not later than the row before" in told[0]
+    assert told[0].data["reason"].code == "live.row-not-later"
 
 
 def test_an_end_that_is_commanded():
@@ -271,9 +274,9 @@ def test_datagrams_to_a_commanded_end_are_the_batch_run():
     texts = [*lines(), "command,end"]
 
     def send(note):
-        if "listening" not in note:
+        if note.code != "live.listening":
             return
-        address = urlsplit(note.split()[-1])
+        address = urlsplit(note.data["source"])
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for first in range(0, len(texts), 10):
                 data = "\n".join(texts[first : first + 10]).encode()
