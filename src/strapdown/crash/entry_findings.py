@@ -67,6 +67,7 @@ def findings(
         found.append(
             Finding(
                 "crash.last-fix-used-before-anchor",
+                severity="note",
                 file=source,
                 quantity="fixes",
                 impact=impact - used[-1],

@@ -81,12 +81,12 @@ def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
     missing = [c for c in columns if c not in triad.table.columns]
     if missing:
         raise DataError(
-            "sensors.no-motion-space-needs-three"
+            "sensors.accelerometer-axes-missing"
             if columns == ACCEL
-            else "sensors.no-motion-space-needs-three-2",
+            else "sensors.gyro-axes-missing",
             file=source,
             quantity=missing[0],
-            missing=" and no ".join(missing),
+            missing=missing,
         )
     if triad.table.attrs.get("sampling") not in SAMPLINGS:
         raise DataError(

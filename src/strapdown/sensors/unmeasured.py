@@ -129,6 +129,7 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
         found.append(
             Finding(
                 "sensors.roll-assumed" if "roll" in kept else "sensors.turning-assumed",
+                severity="note",
                 file=unit.name,
                 quantity="gyro",
                 missing=["gyro"] if len(absent) == 3 else [GYRO[k] for k in absent],
@@ -148,6 +149,7 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
         found.append(
             Finding(
                 "sensors.velocity-change-assumed",
+                severity="note",
                 file=unit.name,
                 quantity=names[0],
                 missing=names,
