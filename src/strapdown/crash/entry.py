@@ -73,7 +73,7 @@ class Entry:
         for name, unit in NUMBERS:
             if not finite(getattr(self, name)):
                 raise ConfigError(
-                    "crash.no-number",
+                    "crash.entry-not-a-number",
                     quantity=f"entry, {name}",
                     value=getattr(self, name),
                     unit=unit,
@@ -187,7 +187,9 @@ class Entry:
             raise ConfigError("crash.no-symmetric-matrix-x", quantity="covariance")
         values, vectors = np.linalg.eigh(given)
         if values[0] < -1e-9 * values[-1]:
-            raise ConfigError("crash.eigenvalue", quantity="covariance", values=values[0])
+            raise ConfigError(
+                "crash.covariance-not-positive", quantity="covariance", values=values[0]
+            )
         columns = vectors * np.sqrt(np.maximum(values, 0.0))
         roll, pitch, heading = triple(
             roll_pitch_heading, "roll_pitch_heading", "sensors.angles-not-three-numbers"

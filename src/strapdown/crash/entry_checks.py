@@ -41,10 +41,13 @@ def check_arguments(
         raise ConfigError("crash.anchor-impact", quantity="anchor", anchor=anchor, impact=impact)
     if not 1.0 <= window <= LONGEST_WINDOW:
         raise ConfigError(
-            "crash.window", quantity="window", window=window, longest_window=LONGEST_WINDOW
+            "crash.gnss-window-out-of-range",
+            quantity="window",
+            window=window,
+            longest_window=LONGEST_WINDOW,
         )
     if len(antenna) != 3 or not all(math.isfinite(x) for x in antenna):
-        raise ConfigError("crash.not-three-finite-numbers-2", quantity="antenna", antenna=antenna)
+        raise ConfigError("crash.antenna-not-three-numbers", quantity="antenna", antenna=antenna)
     sensed = index_of(imu)
     step = float(np.median(np.diff(sensed)))
     if not sensed[0] < anchor <= sensed[-1] + step:

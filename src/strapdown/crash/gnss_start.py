@@ -62,7 +62,9 @@ class GnssEntry:
         for name in ("impact", "window", "before"):
             if not finite(getattr(self, name)):
                 raise ConfigError(
-                    "crash.no-number-2", quantity=f"GNSS entry, {name}", value=getattr(self, name)
+                    "crash.gnss-entry-not-a-number",
+                    quantity=f"GNSS entry, {name}",
+                    value=getattr(self, name),
                 )
         triple(self.antenna, "GNSS entry, antenna", "sensors.point-not-three-numbers")
         for name in self.priors:

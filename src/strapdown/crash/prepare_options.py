@@ -36,7 +36,11 @@ def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
     for name in options:
         if name not in OPTIONS:
             raise ConfigError(
-                "crash.no-option", quantity="preparation", name=name, word=str(name), known=OPTIONS
+                "crash.preparation-option-unknown",
+                quantity="preparation",
+                name=name,
+                word=str(name),
+                known=OPTIONS,
             )
     return dict(options)
 
@@ -68,7 +72,9 @@ def check_options(unit: str, **given: Any) -> None:
             )
     for name in ("impact", "margin", "hysteresis", "fade"):
         if not finite(given[name]):
-            raise ConfigError("crash.no-number-3", file=unit, quantity=name, given=given[name])
+            raise ConfigError(
+                "crash.preparation-not-a-number", file=unit, quantity=name, given=given[name]
+            )
     check_sd(given["steady_acceleration"], "steady_acceleration", "m/s²", unit)
     check_sd(given["steady_rate"], "steady_rate", "rad/s", unit)
 

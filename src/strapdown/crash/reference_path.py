@@ -80,7 +80,11 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         least one instant after it.
     """
     if not isinstance(reference, pd.DataFrame):
-        raise DataError("crash.kind-2", quantity="reference path", name=type(reference).__name__)
+        raise DataError(
+            "crash.reference-of-wrong-type",
+            quantity="reference path",
+            name=type(reference).__name__,
+        )
     time, values, sd = _columns(reference)
     from scipy.interpolate import CubicHermiteSpline
 

@@ -192,14 +192,18 @@ def _check_options(
 ) -> None:
     if outside not in OUTSIDE:
         raise ConfigError(
-            "crash.no-option-2", quantity="outside", outside=outside, word=outside, known=OUTSIDE
+            "crash.outside-option-unknown",
+            quantity="outside",
+            outside=outside,
+            word=outside,
+            known=OUTSIDE,
         )
     if not 0.0 < coverage < 1.0:
         raise ConfigError("crash.coverage-none", quantity="coverage", coverage=coverage)
     for name, value in sd.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise ConfigError(
-                "crash.no-standard-deviation-2", quantity=f"sd of {name}", value=value
+                "crash.standard-deviation-negative", quantity=f"sd of {name}", value=value
             )
 
 

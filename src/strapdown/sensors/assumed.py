@@ -87,7 +87,9 @@ class Assumed:
         object.__setattr__(self, "over", _stretch(self.over))
         if not isinstance(self.because, str):
             raise ConfigError(
-                "sensors.kind", quantity="assumed, because", name=type(self.because).__name__
+                "sensors.reason-not-text",
+                quantity="assumed, because",
+                name=type(self.because).__name__,
             )
 
     def sd_of(self, name: str) -> Triad:

@@ -150,7 +150,7 @@ def _read(path: Path) -> Sensor:
         raise _bad(path, "class", "sensors.no-class", grade=grade, word=grade, known=GRADES)
     documents = table.get("sources", {})
     if not isinstance(documents, dict):
-        raise _bad(path, "sources", "sensors.no-table")
+        raise _bad(path, "sources", "sensors.sources-not-a-table")
     figures: list[Figure] = []
     triads: dict[str, TriadErrors] = {}
     spreads: dict[str, dict[str, Spread]] = {}
@@ -160,7 +160,7 @@ def _read(path: Path) -> Sensor:
             triads[triad], spreads[triad] = _triad(table[triad], triad, documents, path, figures)
             rates.update((triad, f.value[0]) for f in figures if f.key == f"{triad}.output_rate_hz")
     if not triads:
-        raise _bad(path, "gyro, accel", "sensors.neither")
+        raise _bad(path, "gyro, accel", "sensors.sensor-without-triads")
     return Sensor(
         path.stem,
         title,
@@ -177,7 +177,7 @@ def _triad(
     table: Any, triad: str, documents: Mapping[str, Any], path: Path, figures: list[Figure]
 ) -> tuple[TriadErrors, dict[str, Spread]]:
     if not isinstance(table, dict):
-        raise _bad(path, triad, "sensors.no-table-2", triad=triad)
+        raise _bad(path, triad, "sensors.triad-not-a-table", triad=triad)
     _known(table, KEYS[triad], path, f"{triad}.")
     errors: dict[str, Any] = {}
     spreads: dict[str, Spread] = {}
@@ -218,7 +218,7 @@ def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) ->
         isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) and x >= 0.0
         for x in numbers
     ):
-        raise _bad(path, place, "sensors.value", given=given)
+        raise _bad(path, place, "sensors.figure-not-a-number", given=given)
     source, assumed = entry.get("source", ""), entry.get("assumed", "")
     if bool(source) == bool(assumed):
         raise _bad(path, place, "sensors.figure-source-or-reason")

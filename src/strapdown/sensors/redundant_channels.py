@@ -115,7 +115,7 @@ def compare_redundant(
     both = np.column_stack([first, second])
     bad = np.flatnonzero(~np.isfinite(both).all(axis=1))
     if bad.size:
-        raise DataError("sensors.not-finite-number-2", row=int(bad[0]) + 1, quantity=label)
+        raise DataError("sensors.compared-not-finite", row=int(bad[0]) + 1, quantity=label)
     if not bandwidth > 0.0:
         raise ConfigError("sensors.bandwidth-hz-none", quantity="bandwidth", bandwidth=bandwidth)
     if rest_until is not None:

@@ -56,9 +56,9 @@ def clipped_findings(
                 if rows.size:
                     found.append(
                         Finding(
-                            "sensors.samples-record-end-range-count"
+                            "sensors.gyro-clipped-before-resampling"
                             if gyro
-                            else "sensors.samples-record-end-range-count-2",
+                            else "sensors.accel-clipped-before-resampling",
                             file=f"{name}, {t.triad.name}",
                             quantity=column,
                             size=rows.size,

@@ -240,7 +240,11 @@ def _numbers(column: pd.Series, name: str, source: str) -> Array:
         bad = pd.to_numeric(column, errors="coerce").isna().to_numpy() & column.notna().to_numpy()
         row = int(np.argmax(bad))
         raise DataError(
-            "sensors.no-number", file=source, row=row + 1, quantity=name, iloc=column.iloc[row]
+            "sensors.sample-not-a-number",
+            file=source,
+            row=row + 1,
+            quantity=name,
+            iloc=column.iloc[row],
         ) from None
 
 

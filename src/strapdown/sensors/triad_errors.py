@@ -200,7 +200,9 @@ def _check_range(name: str, value: Any) -> None:
 def _check_matrix(misalignment: Sequence[Sequence[float]]) -> None:
     for i, row in enumerate(misalignment):
         if row[i] != 0.0:
-            raise _refused("misalignment", "sensors.element", i=i + 1, at_row=row[i])
+            raise _refused(
+                "misalignment", "sensors.misalignment-diagonal-not-zero", i=i + 1, at_row=row[i]
+            )
         if sum(abs(x) for x in row) >= 1.0:
             raise _refused(
                 "misalignment", "sensors.row-sums-rad", i=i + 1, sum=sum(abs(x) for x in row)

@@ -55,5 +55,9 @@ def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> N
     """
     if not finite(given) or given < 0.0:
         raise ConfigError(
-            "sensors.no-standard-deviation-2", file=file, quantity=quantity, given=given, unit=unit
+            "sensors.standard-deviation-invalid",
+            file=file,
+            quantity=quantity,
+            given=given,
+            unit=unit,
         )

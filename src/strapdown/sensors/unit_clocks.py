@@ -123,7 +123,7 @@ def clocks_by_correlation(
 def _trigger(unit: CrashUnit) -> float:
     if unit.trigger is None or not math.isfinite(unit.trigger):
         raise DataError(
-            "sensors.no-trigger" if unit.trigger is None else "sensors.trigger",
+            "sensors.no-trigger" if unit.trigger is None else "sensors.trigger-not-finite",
             file=unit.name,
             quantity="trigger",
             trigger=unit.trigger,

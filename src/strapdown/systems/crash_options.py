@@ -75,7 +75,7 @@ def _check_units(units: object) -> None:
     if isinstance(units, CrashUnit):
         raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
     if units is None or (isinstance(units, Sequence) and not units):
-        raise DataError("crash.none-4", quantity="units")
+        raise DataError("crash.no-units-given", quantity="units")
     if not isinstance(units, Sequence) or isinstance(units, str):
         raise _wrong_type("units", units)
     for unit in units:
@@ -89,7 +89,7 @@ def _check_window(window: Any) -> None:
     except (TypeError, ValueError):
         begin = end = math.nan
     if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
-        raise ConfigError("crash.no-window-2", quantity="window", window=window)
+        raise ConfigError("crash.window-not-a-pair", quantity="window", window=window)
 
 
 def _wrong_type(quantity: str, given: object) -> ConfigError:

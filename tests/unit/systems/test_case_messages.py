@@ -23,7 +23,7 @@ PYTHON = re.compile(
         (Finding("crash.record-starts-in-crash", begin=0.01, impact=0.0), "levelling_sd_deg = 1.5"),
         (Finding("crash.no-rest", begin=-0.3, impact=0.0), "rest_s = [start, end]"),
         (Finding("crash.no-stationary-stretch-quiet-without"), 'kind = "standstill"'),
-        (Finding("crash.nothing-says-how-fast-vehicle"), 'kind = "speed"'),
+        (Finding("crash.entry-speed-unknown-quiet"), 'kind = "speed"'),
         (Finding("crash.vertical-velocity-upward-vehicle-points"), "climb_sd_m_per_s"),
         (Finding("crash.stated-crash-began-ms-before", first=-0.0012), "time_s = -0.001 under"),
         (Finding("crash.no-event-perhaps-in-g"), 'unit = "g"'),

@@ -78,7 +78,9 @@ def olc(
     0.300 - 0.065 = 0.235 m). Exact for acceleration that is linear between samples.
     """
     if not (math.isfinite(whole) and 0.0 <= free < whole):
-        raise ConfigError("crash.ways", quantity="free, whole", free=free, whole=whole)
+        raise ConfigError(
+            "crash.olc-ways-out-of-order", quantity="free, whole", free=free, whole=whole
+        )
     t, a = from_start(*checked(time, accel_x, None, "accel_x"), start, "start")
     lost, ahead = integrals(t, -a)
     begin = first_reach(t, ahead, lost, free)

@@ -47,7 +47,9 @@ def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
             real = file.resolve()
             if real in seen:
                 raise ConfigError(
-                    "crash.named-twice" if seen[real] != str(given) else "crash.named-twice-2",
+                    "crash.record-named-twice-differently"
+                    if seen[real] != str(given)
+                    else "crash.record-named-twice",
                     file=file.name,
                     quantity="RECORD",
                     seen=seen[real],
