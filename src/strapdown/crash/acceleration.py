@@ -68,7 +68,7 @@ class Acceleration:
         for name, known in (("frame", FRAMES), ("sampling", SAMPLINGS)):
             if getattr(self, name) not in known:
                 raise ConfigError(
-                    "crash.unknown",
+                    "crash.sampling-or-frame-unknown",
                     file=self.source,
                     quantity=name,
                     value=getattr(self, name),

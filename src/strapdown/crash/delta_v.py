@@ -260,7 +260,7 @@ def trailing_delta_v(
         The record, or what was asked of it, is shorter than the window.
     """
     if not (math.isfinite(window) and window > 0.0):
-        raise ConfigError("crash.no-window", quantity="window", window=window)
+        raise ConfigError("crash.peak-window-not-positive", quantity="window", window=window)
     time = acceleration.time
     # A record of just the window's length may lack a rounding of it.
     slack = 8.0 * float(np.spacing(np.abs(time[[0, -1]]).max()))

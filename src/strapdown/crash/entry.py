@@ -68,12 +68,12 @@ class Entry:
     source: str = "stated"
 
     def __post_init__(self) -> None:
-        how = "give north, east, down in m/s, or use Entry.from_speed"
-        object.__setattr__(self, "velocity", triple(self.velocity, "velocity", how))
+        code = "crash.velocity-not-three-numbers"
+        object.__setattr__(self, "velocity", triple(self.velocity, "velocity", code))
         for name, unit in NUMBERS:
             if not finite(getattr(self, name)):
                 raise ConfigError(
-                    "crash.no-number",
+                    "crash.entry-not-a-number",
                     quantity=f"entry, {name}",
                     value=getattr(self, name),
                     unit=unit,
@@ -187,10 +187,14 @@ class Entry:
             raise ConfigError("crash.no-symmetric-matrix-x", quantity="covariance")
         values, vectors = np.linalg.eigh(given)
         if values[0] < -1e-9 * values[-1]:
-            raise ConfigError("crash.eigenvalue", quantity="covariance", values=values[0])
+            raise ConfigError(
+                "crash.covariance-not-positive", quantity="covariance", values=values[0]
+            )
         columns = vectors * np.sqrt(np.maximum(values, 0.0))
-        roll, pitch, heading = triple(roll_pitch_heading, "roll_pitch_heading", "give deg")
-        north, east, down = triple(velocity, "velocity", "give north, east, down in m/s")
+        roll, pitch, heading = triple(
+            roll_pitch_heading, "roll_pitch_heading", "sensors.angles-not-three-numbers"
+        )
+        north, east, down = triple(velocity, "velocity", "crash.velocity-not-three-numbers")
         return cls(
             time=time,
             velocity=(north, east, down),

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.crash.entry_estimate import Fixes
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.tables import ACCEL, POSITION_SD, VELOCITY_SD, check_gnss, check_imu
 from strapdown.tables.checks import index_of, values_of
 
@@ -41,10 +41,13 @@ def check_arguments(
         raise ConfigError("crash.anchor-impact", quantity="anchor", anchor=anchor, impact=impact)
     if not 1.0 <= window <= LONGEST_WINDOW:
         raise ConfigError(
-            "crash.window", quantity="window", window=window, longest_window=LONGEST_WINDOW
+            "crash.gnss-window-out-of-range",
+            quantity="window",
+            window=window,
+            longest_window=LONGEST_WINDOW,
         )
     if len(antenna) != 3 or not all(math.isfinite(x) for x in antenna):
-        raise ConfigError("crash.not-three-finite-numbers-2", quantity="antenna", antenna=antenna)
+        raise ConfigError("crash.antenna-not-three-numbers", quantity="antenna", antenna=antenna)
     sensed = index_of(imu)
     step = float(np.median(np.diff(sensed)))
     if not sensed[0] < anchor <= sensed[-1] + step:
@@ -67,23 +70,27 @@ def check_arguments(
         )
 
 
-def check_enough(fixes: Fixes, why: list[str], source: str | None) -> None:
+def check_enough(fixes: Fixes, why: list[tuple[Finding, ...]], source: str | None) -> None:
     """Refuse to make one of too few fixes, and say where the others went."""
     span = float(np.ptp(fixes.instants)) if len(fixes.instants) else 0.0
     placed = int(np.isfinite(fixes.sd[:, :3]).all(axis=1).sum())
     if min(len(fixes.instants), placed) >= LEAST_FIXES and span >= LEAST_SPAN:
         return
-    # The instant at the end of a reason is one of many.
-    reasons = Counter(w.split(" of ")[0] for w in why if w)
-    told = "; ".join(f"{count} {what}" for what, count in reasons.items()) or "none was refused"
+    # Of each kind of reason its first stands for all.
+    counts = Counter(f.code for found in why for f in found)
+    first = {f.code: f for found in reversed(why) for f in found}
+    refused = [
+        Finding("crash.fixes-refused", severity="note", count=count, reason=first[code])
+        for code, count in counts.items()
+    ]
     raise DataError(
-        "crash.fixes-over-left-before-impact",
+        "crash.too-few-fixes" if refused else "crash.too-few-fixes-given",
         file=source,
         quantity="fixes",
         count=len(fixes.instants),
         span=span,
         placed=placed,
-        told=told,
+        refused=refused,
         least_fixes=LEAST_FIXES,
         least_span=LEAST_SPAN,
     )

@@ -15,6 +15,10 @@ from strapdown.errors import Finding
 WIDE_HEADING = 5.0  # deg
 # Misfits of all fixes that chance makes more seldom are told.
 UNLIKELY = 1e-4
+#: Reasons that need no word: such fixes are not of the drive before the impact.
+LATE = frozenset(
+    ("crash.fix-after-impact", "crash.fix-perhaps-after-impact", "crash.fix-after-anchor")
+)
 
 
 def say_outliers(record: pd.DataFrame) -> None:
@@ -22,11 +26,10 @@ def say_outliers(record: pd.DataFrame) -> None:
     for name in ("position", "velocity"):
         lower = record["used"] & (record[f"{name}_weight"] < 1.0)
         misfits = record.loc[lower, f"{name}_misfit"].to_numpy(dtype=np.float64)
-        before = record.loc[lower, "why"].tolist()
-        record.loc[lower, "why"] = [
-            f"{said}{'; ' if said else ''}{name} {t:.3g} sd from what the others say"
-            for said, t in zip(before, misfits.tolist(), strict=True)
-        ]
+        for row, misfit in zip(np.flatnonzero(lower), misfits.tolist(), strict=True):
+            reason = Finding(f"crash.fix-{name}-misfit", severity="note", misfit=misfit)
+            column = record.columns.get_loc("why")
+            record.iat[row, column] = (*record.iat[row, column], reason)
 
 
 def findings(
@@ -34,7 +37,7 @@ def findings(
 ) -> list[Finding]:
     """What a person should know of an estimate."""
     found = []
-    late = record["why"].str.contains("after the anchor|impact")
+    late = record["why"].map(lambda why: any(f.code in LATE for f in why))
     refused = record[~record["used"] & ~late]
     if len(refused):
         found.append(
@@ -43,11 +46,11 @@ def findings(
                 file=source,
                 quantity="fixes",
                 count=len(refused),
-                index=refused.index[0],
-                iloc=refused["why"].iloc[0],
+                time=refused.index[0],
+                reasons=refused["why"].iloc[0],
             )
         )
-    lower = record[record["used"] & (record["why"] != "")]
+    lower = record[record["used"] & (record["why"].map(len) > 0)]
     if len(lower):
         found.append(
             Finding(
@@ -55,8 +58,8 @@ def findings(
                 file=source,
                 quantity="fixes",
                 count=len(lower),
-                index=lower.index[0],
-                iloc=lower["why"].iloc[0],
+                time=lower.index[0],
+                reasons=lower["why"].iloc[0],
             )
         )
     used = record.index[record["used"]]
@@ -64,6 +67,7 @@ def findings(
         found.append(
             Finding(
                 "crash.last-fix-used-before-anchor",
+                severity="note",
                 file=source,
                 quantity="fixes",
                 impact=impact - used[-1],
@@ -89,7 +93,8 @@ def findings(
                 quantity="fixes",
                 chi_square=best.chi_square,
                 degrees_of_freedom=best.degrees_of_freedom,
-                chi_square_2=best.chi_square / best.degrees_of_freedom,
+                variance_factor=best.chi_square / best.degrees_of_freedom,
+                sd_factor=math.sqrt(best.chi_square / best.degrees_of_freedom),
             )
         )
     return found

@@ -31,7 +31,7 @@ def check_standing(at_point: AtPoint, entry: Entry | None) -> None:
     rest = at_point.rest
     if entry is None and rest is not None and rest.grade == "steady":
         raise DataError(
-            "crash.nothing-says-how-fast-vehicle",
+            "crash.entry-speed-unknown-quiet",
             file=at_point.name,
             quantity="entry",
             start=rest.start,

@@ -10,9 +10,9 @@ from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.triad_uncertainty import TriadUncertainty
 
 
-def _positive(value: float, name: str, kind: str) -> None:
+def _positive(value: float, name: str, code: str) -> None:
     if not (math.isfinite(value) and value > 0.0):
-        raise ConfigError("crash.no", quantity=name, value=value, kind=kind[2:])
+        raise ConfigError(code, quantity=name, value=value)
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class FixCorrelation:
     def __post_init__(self) -> None:
         if not 0.0 <= self.share <= 1.0:
             raise ConfigError("crash.no-share", quantity="share", share=self.share)
-        _positive(self.time, "time", "a correlation time")
+        _positive(self.time, "time", "crash.correlation-time-not-positive")
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,14 @@ class EntryPriors:
                 raise ConfigError("crash.not-finite-number", quantity=name, value=value)
         for name in ("tilt_sd_deg", "heading_sd_deg", "side_slip_sd_deg"):
             if getattr(self, name) is not None:
-                _positive(getattr(self, name), name, "a standard deviation")
+                _positive(getattr(self, name), name, "crash.standard-deviation-not-positive")
         for name in ("antenna_sd", "time_offset_sd"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
-                raise ConfigError("crash.no-standard-deviation-2", quantity=name, value=value)
+                raise ConfigError("crash.standard-deviation-negative", quantity=name, value=value)
         if len(self.no_slip_point) != 3 or not all(map(math.isfinite, self.no_slip_point)):
             raise ConfigError(
-                "crash.not-three-finite-numbers-3",
+                "crash.no-slip-point-not-three-numbers",
                 quantity="no_slip_point",
                 no_slip_point=self.no_slip_point,
             )

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.errors import Finding
 from strapdown.mechanization import NavigationRun
 
 Array = NDArray[np.float64]
@@ -51,8 +52,8 @@ def strain(run: NavigationRun) -> tuple[Array, Array]:
 
 def judge_fixes(
     instants: Array, quality: Array, run: NavigationRun, impact: float, anchor: float, slack: float
-) -> list[str]:
-    """Say of each fix why it is not believed.
+) -> list[tuple[Finding, ...]]:
+    """Find out of each fix why it is not believed.
 
     Parameters
     ----------
@@ -67,22 +68,22 @@ def judge_fixes(
 
     Returns
     -------
-    list of str
+    list of tuple of Finding
         Empty where there is nothing against it.
     """
     acceleration, jerk = strain(run)
     hard, rough = acceleration > LARGEST_ACCELERATION, jerk > LARGEST_JERK
     strained = np.flatnonzero(hard | rough)
-    why = []
+    why: list[tuple[Finding, ...]] = []
     for t, q in zip(instants, quality, strict=True):
         if t >= impact:
-            why.append("from the impact on")
+            why.append((_reason("crash.fix-after-impact"),))
         elif t >= impact - slack:
-            why.append("perhaps after the impact: its stamp is not so well known")
+            why.append((_reason("crash.fix-perhaps-after-impact"),))
         elif t > anchor:
-            why.append("after the anchor")
+            why.append((_reason("crash.fix-after-anchor"),))
         elif q == 0:
-            why.append("the receiver had no fix (quality 0)")
+            why.append((_reason("crash.fix-without-quality"),))
         else:
             recent = strained[
                 (run.time[strained] >= t - RECOVERY) & (run.time[strained] <= t + slack)
@@ -91,25 +92,31 @@ def judge_fixes(
     return why
 
 
-def _excess(time: Array, acceleration: Array, jerk: Array, at: NDArray[np.intp]) -> str:
+def _reason(code: str, **values: float) -> Finding:
+    return Finding(code, severity="note", data=values)
+
+
+def _excess(
+    time: Array, acceleration: Array, jerk: Array, at: NDArray[np.intp]
+) -> tuple[Finding, ...]:
     """What exceeded a limit at these stamps, and when it last did."""
     if not at.size:
-        return ""
-    said = []
-    if acceleration[at].max() > LARGEST_ACCELERATION:
-        said.append(f"acceleration of {acceleration[at].max():.3g} m/s²")
-    if jerk[at].max() > LARGEST_JERK:
-        said.append(f"jerk of {jerk[at].max():.3g} m/s³")
-    return f"{' and '.join(said)}, last at {time[at[-1]]:.6g} s"
+        return ()
+    most, roughest = float(acceleration[at].max()), float(jerk[at].max())
+    said = {"acceleration": most, "jerk": roughest, "last": float(time[at[-1]])}
+    if most > LARGEST_ACCELERATION and roughest > LARGEST_JERK:
+        return (_reason("crash.fix-under-acceleration-and-jerk", **said),)
+    hard = most > LARGEST_ACCELERATION
+    return (_reason("crash.fix-under-acceleration" if hard else "crash.fix-under-jerk", **said),)
 
 
-def record_of_fixes(stamps: Array, why: list[str]) -> pd.DataFrame:
+def record_of_fixes(stamps: Array, why: list[tuple[Finding, ...]]) -> pd.DataFrame:
     """Begin the record of the fixes: all that are not believed have no weight."""
     used = np.array([not w for w in why], dtype=np.bool_)
     return pd.DataFrame(
         {
             "used": used,
-            "why": why,
+            "why": pd.array(np.fromiter(why, dtype=object, count=len(why)), dtype=object),
             "position_weight": used.astype(np.float64),
             "velocity_weight": used.astype(np.float64),
             "position_misfit": np.full(len(why), np.nan),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration
@@ -55,14 +56,7 @@ class CrashEvents:
             There is none; the message tells the largest change that was found.
         """
         if not self.events:
-            finding = self.findings[-1]
-            raise DataError(
-                "crash.message",
-                file=finding.file,
-                quantity=finding.quantity,
-                message=finding.what,
-                remedy_text=finding.remedy,
-            )
+            raise DataError(self.findings[-1])
         return self.events[0]
 
     @property
@@ -187,28 +181,33 @@ def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) ->
 
 def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
     rule, (size, axis, when) = detector.rule, detector.largest_change
-    length = acceleration.end - acceleration.begin
-    remedy = "check that the record holds the crash, and its axes and units"
-    if size * STANDARD_GRAVITY >= rule.trigger:
-        remedy = "if the record is in g, multiply it by 9.80665; otherwise " + remedy
-    what = (
-        f"the largest change of velocity in {rule.trigger_window * 1e3:g} ms is "
-        f"{size / KMH:.2f} km/h ({axis}, up to {when:.4f} s)"
-        if size > 0.0
-        else "the velocity does not change"
-    )
-    what = f"no crash in it: {what}, and an event needs {rule.trigger / KMH:g} km/h"
-    if length < rule.trigger_window:
-        what += f"; the record is only {length * 1e3:.4g} ms long"
-        remedy = "use a longer record; otherwise " + remedy
-    elif detector.woken:
-        often = "once" if detector.woken == 1 else f"{detector.woken} times"
-        what += f"; it changed by more than {rule.wake / KMH:g} km/h in "
-        what += f"{rule.wake_window * 1e3:g} ms {often}, and not for long"
+    changes = size > 0.0
+    short = acceleration.end - acceleration.begin < rule.trigger_window
+    in_g = size * STANDARD_GRAVITY >= rule.trigger
+    said: dict[str, Any] = {
+        "change": size / KMH,
+        "axis": axis,
+        "end": when,
+        "trigger": rule.trigger / KMH,
+        "window_ms": rule.trigger_window * 1e3,
+        "record_ms": (acceleration.end - acceleration.begin) * 1e3,
+        "wake": rule.wake / KMH,
+        "wake_window_ms": rule.wake_window * 1e3,
+        "woken": detector.woken,
+    }
+    largest = Finding("crash.largest-change" if changes else "crash.no-change", data=said)
+    more = []
+    if detector.woken and not short:
+        code = "crash.woken-once" if detector.woken == 1 else "crash.woken"
+        more.append(Finding(code, severity="note", data=said))
+    code = "crash.no-event"
+    if short:
+        code = "crash.no-event-short-record"
+    if in_g:
+        code += "-perhaps-in-g"
     return Finding(
-        "crash.message",
+        code,
         file=acceleration.source,
         quantity="delta-V",
-        message=what,
-        remedy_text=remedy,
+        data={**said, "largest": largest.replace(severity="note"), "more": more},
     )

@@ -62,10 +62,11 @@ class GnssEntry:
         for name in ("impact", "window", "before"):
             if not finite(getattr(self, name)):
                 raise ConfigError(
-                    "crash.no-number-2", quantity=f"GNSS entry, {name}", value=getattr(self, name)
+                    "crash.gnss-entry-not-a-number",
+                    quantity=f"GNSS entry, {name}",
+                    value=getattr(self, name),
                 )
-        how = "give forward, right, down in m from the vehicle's origin"
-        triple(self.antenna, "GNSS entry, antenna", how)
+        triple(self.antenna, "GNSS entry, antenna", "sensors.point-not-three-numbers")
         for name in self.priors:
             if name not in OTHER_PRIORS:
                 raise ConfigError(

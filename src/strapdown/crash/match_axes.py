@@ -163,39 +163,38 @@ def axis_findings(match: AxisMatch, first: str, second: str) -> list[Finding]:
     if kind == "agree":
         return []
     parts = {
-        "unit": [("the unit", match.accelerometers, match.accelerometers_lead)],
-        "accelerometers": [("its accelerometers", match.accelerometers, match.accelerometers_lead)],
-        "gyro": [("its gyro", match.gyro, match.gyro_lead)],
+        "unit": [("unit", match.accelerometers, match.accelerometers_lead)],
+        "accelerometers": [("accelerometers", match.accelerometers, match.accelerometers_lead)],
+        "gyro": [("gyro", match.gyro, match.gyro_lead)],
         "both": [
-            ("its accelerometers", match.accelerometers, match.accelerometers_lead),
-            ("its gyro", match.gyro, match.gyro_lead),
+            ("accelerometers", match.accelerometers, match.accelerometers_lead),
+            ("gyro", match.gyro, match.gyro_lead),
         ],
     }[kind]
     found = []
-    for who, matrix, lead in parts:
+    for part, matrix, lead in parts:
         moved = [
-            f"{AXES[i]} of {first} is {'minus ' if matrix[i, j] < 0 else ''}{AXES[j]} of it"
+            Finding(
+                "crash.axis-opposite" if matrix[i, j] < 0 else "crash.axis-along",
+                severity="note",
+                name=first,
+                axis=AXES[i],
+                other=AXES[j],
+            )
             for i in range(3)
             for j in [int(np.argmax(np.abs(matrix[i])))]
             if matrix[i, j] != 1.0 or i != j
         ]
-        doubt = (
-            f"; the motion does not tell which way {' and '.join(match.ambiguous)} go"
-            if match.ambiguous and who != "its gyro"
-            else ""
-        )
-        have = "have" if who.endswith("s") else "has"
+        doubt = []
+        if match.ambiguous and part != "gyro":
+            doubt = [Finding("crash.axes-ambiguous", severity="note", axes=match.ambiguous)]
         found.append(
             Finding(
-                "crash.other-axes-than-stated-standard"
-                if who == "the unit"
-                else "crash.other-axes-than-stated-standard-2",
+                f"crash.{part}-axes-differ",
                 file=second,
                 quantity="axes",
-                who=who,
-                have=have,
                 moved=moved,
-                sqrt=math.sqrt(lead),
+                lead=math.sqrt(lead),
                 doubt=doubt,
             )
         )

@@ -142,12 +142,14 @@ def sample_paths(
 
 def _check(path: object, runs: object, seed: object, workers: object) -> None:
     if not isinstance(path, CrashPath):
-        raise ConfigError("crash.kind", quantity="path", name=type(path).__name__)
+        raise ConfigError("crash.path-of-wrong-type", quantity="path", name=type(path).__name__)
     if not _is_whole(runs, 2, MOST_RUNS):
-        raise ConfigError("crash.runs", quantity="runs", runs=runs, most_runs=MOST_RUNS)
+        raise ConfigError(
+            "crash.runs-out-of-range", quantity="runs", runs=runs, most_runs=MOST_RUNS
+        )
     for name, given, least in (("seed", seed, 0), ("workers", workers, 1)):
         if not (_is_whole(given, least) or (name == "workers" and given is None)):
-            raise ConfigError("crash.none", quantity=name, given=given, least=least)
+            raise ConfigError("crash.count-not-whole", quantity=name, given=given, least=least)
 
 
 def _is_whole(given: object, least: int, most: float = math.inf) -> bool:

@@ -274,7 +274,7 @@ def _carried(
         )
     if entry is None and level_time is None:
         raise DataError(
-            "crash.nothing-says-how-fast-vehicle-2",
+            "crash.entry-speed-unknown",
             file=imu.attrs.get("source"),
             quantity="entry speed",
         )

@@ -51,13 +51,19 @@ def path_rows(imu: pd.DataFrame, at: float, window: Sequence[float] | None) -> t
         )
     begin, end = (float(x) for x in (_usual(time, at) if window is None else window))
     if not begin < end or begin < time[0] - slack or end > time[-1] + slack:
+        # What both have, in whole ms.
+        low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
+        high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
         raise DataError(
-            "crash.message",
+            "crash.window-partly-in-record" if low < high else "crash.window-not-in-record",
             file=imu.attrs.get("source"),
             quantity="window",
-            message=f"the window from {begin:g} s to {end:g} s is not within the record, which has {time[0]:.6g} s to {time[-1]:.6g} s",
-            remedy_text="choose a window within it, its start before its end, in s from the trigger"
-            + _overlap(begin, end, time),
+            begin=begin,
+            end=end,
+            first=time[0],
+            last=time[-1],
+            low=low,
+            high=high,
         )
     anchor = int(np.argmin(np.abs(time - at)))
     first = min(int(np.searchsorted(time, begin - 1e-9)), anchor)
@@ -71,9 +77,3 @@ def _usual(time: Array, at: float) -> tuple[float, float]:
         min(max(WINDOW[0], float(time[0])), at),
         max(min(WINDOW[1], float(time[-1])), at + 1e-6),
     )
-
-
-def _overlap(begin: float, end: float, time: Array) -> str:
-    low = max(begin, math.ceil(1e3 * float(time[0])) / 1e3)
-    high = min(end, math.floor(1e3 * float(time[-1])) / 1e3)
-    return f": {low:g} to {high:g} s" if low < high else ""

@@ -42,33 +42,13 @@ def rest_findings(
         There is neither, and no levelling is stated.
     """
     if rest is None:
-        if time[0] > impact - SHORTEST:
-            what = (
-                f"the record starts at {time[0]:.4g} s, in the crash (impact at {impact:.4g} s): "
-                "nothing before it tells biases or attitude"
-            )
-        else:
-            what = (
-                f"no stationary stretch and none at a constant velocity between {time[0]:.4g} s "
-                f"and the impact at {impact:.4g} s"
-            )
+        late = time[0] > impact - SHORTEST
+        said = {"begin": time[0], "impact": impact}
         if not levelled:
-            raise DataError(
-                "crash.message",
-                file=unit.name,
-                quantity="rest",
-                message=what,
-                remedy_text="give levelling=(roll, pitch, sd) in deg, as (0, 0, 1.5) for a level road, and the biases stay at their stated standard deviations; or name the stretch, rest=(start, end) in s (of reconstruct_crash: in preparation={...})",
-            )
-        return [
-            Finding(
-                "crash.message",
-                file=unit.name,
-                quantity="rest",
-                message=what,
-                remedy_text="the stated attitude is used, and the biases stay at their stated standard deviations; a record that begins before the vehicle moves off would do better",
-            )
-        ]
+            code = "crash.record-starts-in-crash" if late else "crash.no-rest"
+            raise DataError(code, file=unit.name, quantity="rest", data=said)
+        code = "crash.record-starts-in-crash-levelled" if late else "crash.no-rest-levelled"
+        return [Finding(code, file=unit.name, quantity="rest", data=said)]
     if rest.grade == "steady":
         return [
             Finding(
@@ -141,24 +121,10 @@ def saturation_findings(
     for j, (triad, limit) in enumerate(zip(unit.accelerometers, limits, strict=True)):
         found += _ends(unit, triad, limit, "m/s²", "accel")
         if j == last:
-            found += _clipped(
-                unit,
-                triad,
-                data.time,
-                limit,
-                "accel",
-                "what is cut off is missing from delta-V: it is a lower bound on this axis",
-            )
+            found += _clipped(unit, triad, data.time, limit, "accel")
     assert unit.gyro is not None
     found += _ends(unit, unit.gyro, gyro_limits, "rad/s", "gyro")
-    found += _clipped(
-        unit,
-        unit.gyro,
-        data.time,
-        gyro_limits,
-        "gyro",
-        "the attitude after it is not known; borrow the gyro of another unit with a wider range",
-    )
+    found += _clipped(unit, unit.gyro, data.time, gyro_limits, "gyro")
     return found
 
 
@@ -195,12 +161,7 @@ def _ends(
 
 
 def _clipped(
-    unit: CrashUnit,
-    triad: RecordedTriad,
-    time: Array,
-    limits: RangeLimits,
-    quantity: str,
-    remedy: str,
+    unit: CrashUnit, triad: RecordedTriad, time: Array, limits: RangeLimits, quantity: str
 ) -> list[Finding]:
     found = []
     for k, axis in enumerate("xyz"):
@@ -208,11 +169,12 @@ def _clipped(
         if rows.size:
             found.append(
                 Finding(
-                    "crash.message",
+                    f"crash.{quantity}-clipped",
                     file=f"{unit.name}, {triad.name}",
                     quantity=f"{quantity}_{axis}",
-                    message=f"{rows.size} samples are at the end of the range, the first {time[rows[0]]:.5g} s from the trigger, the last {time[rows[-1]]:.5g} s",
-                    remedy_text=remedy,
+                    count=rows.size,
+                    first=time[rows[0]],
+                    last=time[rows[-1]],
                 )
             )
     return found
@@ -230,16 +192,15 @@ def bias_findings(
         triad = unit.accelerometers[j]
         source = f"{unit.name}, {triad.name}"
         if bias_from[j] is None:
-            why = "there is no quiet stretch before the crash"
-            if rest is not None:
-                why = f"{unit.accelerometers[j - 1].name} is at its end in the quiet stretch"
             found.append(
                 Finding(
-                    "crash.bias-not-known-because",
+                    "crash.bias-unknown-without-rest"
+                    if rest is None
+                    else "crash.bias-unknown-range-at-end",
                     file=source,
                     quantity="bias",
-                    why=why,
-                    axis=max(triad.uncertainty.axis("bias")),
+                    name=unit.accelerometers[j - 1].name,
+                    sd=max(triad.uncertainty.axis("bias")),
                 )
             )
             continue

@@ -36,7 +36,11 @@ def checked_options(options: Mapping[str, Any]) -> dict[str, Any]:
     for name in options:
         if name not in OPTIONS:
             raise ConfigError(
-                "crash.no-option", quantity="preparation", name=name, word=str(name), known=OPTIONS
+                "crash.preparation-option-unknown",
+                quantity="preparation",
+                name=name,
+                word=str(name),
+                known=OPTIONS,
             )
     return dict(options)
 
@@ -57,19 +61,20 @@ def check_options(unit: str, **given: Any) -> None:
     if not (isinstance(rest, str) and rest == "auto") and not _is_stretch(rest):
         raise ConfigError("crash.no-stretch", file=unit, quantity="rest", rest=rest)
     if levelling is not None:
-        how = "give roll, pitch and their standard deviation in deg, as in (0, 0, 1)"
-        _, pitch, sd = triple(levelling, "levelling", how, unit)
+        code = "crash.levelling-not-three-numbers"
+        _, pitch, sd = triple(levelling, "levelling", code, unit)
         if abs(pitch) > 90.0 or sd < 0.0:
             raise ConfigError(
-                "crash.message",
+                "crash.levelling-out-of-range",
                 file=unit,
                 quantity="levelling",
-                message=f"{levelling!r} is no attitude with its standard deviation",
-                remedy_text=how,
+                levelling=repr(levelling),
             )
     for name in ("impact", "margin", "hysteresis", "fade"):
         if not finite(given[name]):
-            raise ConfigError("crash.no-number-3", file=unit, quantity=name, given=given[name])
+            raise ConfigError(
+                "crash.preparation-not-a-number", file=unit, quantity=name, given=given[name]
+            )
     check_sd(given["steady_acceleration"], "steady_acceleration", "m/s²", unit)
     check_sd(given["steady_rate"], "steady_rate", "rad/s", unit)
 

@@ -67,12 +67,12 @@ def prepare_together(
             if hint is None or error.finding.quantity != "gyro":
                 raise
             raise DataError(
-                "crash.message",
+                "crash.no-gyro-for-path",
                 file=error.finding.file,
                 row=error.finding.row,
                 quantity="gyro",
-                message=error.finding.what,
-                remedy_text=f"{hint.remedy}; or state how far the vehicle turned (assumed)",
+                reason=error.finding,
+                hint=hint,
             ) from None
         if hint is not None:
             prepared = replace(prepared, findings=(*prepared.findings, hint))
@@ -91,12 +91,11 @@ def _gyro_to_borrow(unit: SynchronisedUnit, turning: Sequence[str]) -> Finding |
     if unit.lender is not None or _turns(unit) or not turning:
         return None
     return Finding(
-        "crash.no-gyro-borrows-none",
+        "crash.gyro-not-borrowed" if len(turning) == 1 else "crash.gyros-not-borrowed",
         file=unit.unit.name,
         quantity="gyro",
         turning=turning,
-        value="have one" if len(turning) > 1 else "has one",
-        turning_2=turning[0],
+        lender=turning[0],
     )
 
 

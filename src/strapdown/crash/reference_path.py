@@ -80,7 +80,11 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         least one instant after it.
     """
     if not isinstance(reference, pd.DataFrame):
-        raise DataError("crash.kind-2", quantity="reference path", name=type(reference).__name__)
+        raise DataError(
+            "crash.reference-of-wrong-type",
+            quantity="reference path",
+            name=type(reference).__name__,
+        )
     time, values, sd = _columns(reference)
     from scipy.interpolate import CubicHermiteSpline
 
@@ -152,19 +156,17 @@ def _columns(reference: pd.DataFrame) -> tuple[Array, Array, Array]:
     values, sd = both[:, :3], both[:, 3:] if some else np.zeros((len(both), 3))
     bad = ~(np.isfinite(values).all(axis=1) & np.isfinite(sd).all(axis=1) & np.isfinite(time))
     stuck = np.r_[False, np.diff(time) <= 0.0]
-    for what, rows, remedy in (
-        ("a value is not finite", bad, "drop such rows"),
-        ("a standard deviation is negative", (sd < 0.0).any(axis=1), "give zero or more, in m"),
-        ("time does not advance", stuck, "sort by time and drop repeated stamps"),
+    for code, rows in (
+        ("crash.reference-not-finite", bad),
+        ("crash.reference-sd-negative", (sd < 0.0).any(axis=1)),
+        ("crash.reference-time-does-not-advance", stuck),
     ):
         if rows.any():
             raise DataError(
-                "crash.message",
+                code,
                 file=reference.attrs.get("source"),
                 row=int(np.argmax(rows)) + 1,
                 quantity="reference path",
-                message=what,
-                remedy_text=remedy,
             )
     if not len(time):
         raise DataError(

@@ -52,7 +52,7 @@ def level_at_rest(rest: RestStretch, unknown: float, gravity: float, source: str
         roll, pitch = level(rest.accel_mean)
     except DataError as error:
         raise DataError(
-            "crash.reason-start",
+            "crash.rest-not-level",
             file=source,
             quantity="levelling",
             reason=error.finding,

@@ -47,7 +47,7 @@ def load_severity_model(path: str | Path) -> SeverityModel:
     texts = {key: _text(file, table, key) for key in TEXTS}
     year = table.get("year")
     if isinstance(year, bool) or not isinstance(year, int):
-        raise _bad(file, "year", "crash.year", year=year)
+        raise _bad(file, "year", "crash.year-not-whole", year=year)
     note = table.get("note", "")
     if not isinstance(note, str):
         raise _bad(file, "note", "crash.no-text")
@@ -76,7 +76,7 @@ def _table(file: Path) -> dict[str, Any]:
 def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
     rows = table.get("terms")
     if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) for r in rows):
-        raise _bad(file, "terms", "crash.none-2")
+        raise _bad(file, "terms", "crash.terms-missing")
     terms: list[Term] = []
     for k, row in enumerate(rows, start=1):
         place = f"terms {k}"
@@ -92,7 +92,7 @@ def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
                 raise _bad(
                     file,
                     f"{place}.transform",
-                    "crash.none-3",
+                    "crash.transform-unknown",
                     transform=transform,
                     word=str(transform),
                     known=TRANSFORMS,
@@ -108,22 +108,20 @@ def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
     if term.input != other.input:
         return
     if (term.equals is None) != (other.equals is None):
-        what, remedy = "is a number in one term and a category in another", "make it one of them"
+        code = "crash.term-number-and-category"
     elif term.unit != other.unit:
-        what, remedy = (
-            f"is in {term.unit} here and in {other.unit} before",
-            f"write both in one unit; speeds: {', '.join(SPEEDS)}",
-        )
+        code = "crash.term-in-two-units"
     elif (term.transform, term.equals) == (other.transform, other.equals):
-        what, remedy = "has this term twice", "keep one of the two"
+        code = "crash.term-twice"
     else:
         return
-    raise _bad(file, place, f"'{term.input}' {what}", remedy)
+    units = {"unit": term.unit, "before": other.unit, "speeds": SPEEDS.keys()}
+    raise _bad(file, place, code, input=term.input, **units)
 
 
 def _validity(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
     if not isinstance(given, dict):
-        raise _bad(file, "validity", "crash.no-table")
+        raise _bad(file, "validity", "crash.validity-not-a-table")
     numbers = {t.input: t for t in terms if t.equals is None}
     ranges: dict[str, tuple[float, float]] = {}
     for name, pair in given.items():
@@ -131,7 +129,7 @@ def _validity(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tupl
         if name not in numbers:
             raise _bad(file, place, "crash.no-term-number-input", word=name, known=numbers)
         if not isinstance(pair, list) or len(pair) != 2:
-            raise _bad(file, place, "crash.pair", pair=pair, name=name)
+            raise _bad(file, place, "crash.validity-not-a-pair", pair=pair, name=name)
         low, high = (_number(file, value, place) for value in pair)
         if not low < high:
             raise _bad(file, place, "crash.no-range", low=low, high=high)
@@ -141,28 +139,27 @@ def _validity(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tupl
 
 def _applies(file: Path, given: Any) -> dict[str, tuple[str, ...]]:
     if not isinstance(given, dict):
-        raise _bad(file, "applies", "crash.no-table-2")
+        raise _bad(file, "applies", "crash.applies-not-a-table")
     for name, words in given.items():
         if not isinstance(words, list) or not words or not all(isinstance(w, str) for w in words):
-            raise _bad(file, f"applies.{name}", "crash.words", words=words, name=name)
+            raise _bad(
+                file, f"applies.{name}", "crash.categories-not-texts", words=words, name=name
+            )
     return {name: tuple(words) for name, words in given.items()}
 
 
 def _number(file: Path, value: Any, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise _bad(file, key, "crash.value", value=value)
+        raise _bad(file, key, "crash.coefficient-not-a-number", value=value)
     return float(value)
 
 
 def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> str:
     value = table.get(key)
     if not isinstance(value, str) or not value.strip():
-        why = {
-            "table": 'name where in the publication the coefficients stand: table = "Table 3"',
-            "unit": f'write unit = "…"; speeds: {", ".join(SPEEDS)}',
-        }
-        remedy = why.get(key, f'write {key} = "…"')
-        raise _bad(file, f"{prefix}{key}", "it is missing, or no text", remedy)
+        code = {"table": "crash.table-missing", "unit": "crash.unit-missing"}
+        said = {"name": key, "speeds": SPEEDS.keys()}
+        raise _bad(file, f"{prefix}{key}", code.get(key, "crash.text-missing"), **said)
     return value
 
 
@@ -172,7 +169,5 @@ def _known(file: Path, table: Mapping[str, Any], known: tuple[str, ...], prefix:
             raise _bad(file, f"{prefix}{key}", "crash.no-such-key", word=key, known=known)
 
 
-def _bad(file: Path, key: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError(
-        "crash.message", file=file.name, quantity=key, message=what, remedy_text=remedy
-    )
+def _bad(file: Path, key: str, code: str, **values: Any) -> ConfigError:
+    return ConfigError(code, file=file.name, quantity=key, data=values)

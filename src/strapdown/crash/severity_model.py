@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from strapdown.errors import ConfigError, DataError, Finding
 
@@ -191,23 +192,30 @@ def _check_options(
 ) -> None:
     if outside not in OUTSIDE:
         raise ConfigError(
-            "crash.no-option-2", quantity="outside", outside=outside, word=outside, known=OUTSIDE
+            "crash.outside-option-unknown",
+            quantity="outside",
+            outside=outside,
+            word=outside,
+            known=OUTSIDE,
         )
     if not 0.0 < coverage < 1.0:
         raise ConfigError("crash.coverage-none", quantity="coverage", coverage=coverage)
     for name, value in sd.items():
         if not (math.isfinite(value) and value >= 0.0):
             raise ConfigError(
-                "crash.no-standard-deviation-2", quantity=f"sd of {name}", value=value
+                "crash.standard-deviation-negative", quantity=f"sd of {name}", value=value
             )
 
 
 def _given(model: SeverityModel, inputs: Mapping[str, float | str], name: str) -> float | str:
     if name not in inputs:
         unit = model.unit(name)
-        how = "a word" if not unit else "m/s" if unit in SPEEDS else unit
         raise DataError(
-            "crash.needs-not-given", quantity=name, name=model.name, name_2=name, how=how
+            "crash.model-needs-number" if unit else "crash.model-needs-word",
+            quantity=name,
+            name=model.name,
+            input=name,
+            unit="m/s" if unit in SPEEDS else unit,
         )
     return inputs[name]
 
@@ -220,7 +228,7 @@ def _value(model: SeverityModel, name: str, given: float | str) -> float:
             quantity=name,
             given=given,
             name=name,
-            value="m/s" if model.unit(name) in SPEEDS else model.unit(name),
+            unit="m/s" if model.unit(name) in SPEEDS else model.unit(name),
         )
     return float(given) / SPEEDS.get(model.unit(name), 1.0)
 
@@ -262,38 +270,23 @@ def _validity(
                 )
             )
         elif inputs[name] not in categories:
-            what = f"{model.name} is for {' and '.join(categories)}, and this is {inputs[name]}"
-            findings.append(_outside(what, name, "take a model for it", outside))
+            said = {"name": model.name, "categories": categories, "category": inputs[name]}
+            findings.append(_outside("crash.model-for-others", name, outside, **said))
     for name, (low, high) in model.validity.items():
         value = _value(model, name, _given(model, inputs, name))
         error = reach * sd.get(name, 0.0) / SPEEDS.get(model.unit(name), 1.0)
-        limits = f"valid from {low:g} to {high:g} {model.unit(name)}"
+        said = {"name": model.name, "value": value, "unit": model.unit(name)}
+        said |= {"low": low, "high": high}
         if not low <= value <= high:
-            what = f"{value:.4g} {model.unit(name)}: {model.name} is {limits}"
-            findings.append(
-                _outside(what, name, "take another model; this one is not extrapolated", outside)
-            )
+            findings.append(_outside("crash.outside-model-range", name, outside, **said))
         elif not low <= value - error <= value + error <= high:
             findings.append(
-                Finding(
-                    "crash.bound-leaves-range",
-                    quantity=name,
-                    value=value,
-                    error=error,
-                    unit=model.unit(name),
-                    name=model.name,
-                    limits=limits,
-                )
+                Finding("crash.bound-leaves-range", quantity=name, error=error, data=said)
             )
     return findings
 
 
-def _outside(what: str, name: str, remedy: str, outside: str) -> Finding:
+def _outside(code: str, quantity: str, outside: str, **values: Any) -> Finding:
     if outside == "refuse":
-        raise DataError(
-            "crash.message",
-            quantity=name,
-            message=what,
-            remedy_text=f"{remedy}; or pass outside='tell'",
-        )
-    return Finding("crash.message", quantity=name, message=what, remedy_text=remedy)
+        raise DataError(f"{code}-refused", quantity=quantity, data=values)
+    return Finding(code, quantity=quantity, data=values)

@@ -147,14 +147,8 @@ def method(result: CaseResult) -> tuple[str, ...]:
     return tuple(steps)
 
 
-def how_to_verify(name: str) -> tuple[tuple[str, str], ...]:
-    """Return how anybody checks the report.
-
-    Parameters
-    ----------
-    name : str
-        Of its folder.
-    """
+def how_to_verify() -> tuple[tuple[str, str], ...]:
+    """Return how anybody checks the report, beside the command."""
     return (
         (
             "Run it again",
@@ -163,7 +157,6 @@ def how_to_verify(name: str) -> tuple[tuple[str, str], ...]:
             "from the records, and compares each byte; it names every file and every option that "
             "was changed.",
         ),
-        ("Command", f"strapdown verify {name}"),
         (
             "The seal",
             "is the SHA-256 of manifest.json, which holds that of every file of the folder. It was "

@@ -67,7 +67,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
             (
                 answer.model.outcome,
                 "–" if risk is None else f"{100.0 * risk.probability:.2g} %",
-                answer.because
+                ("" if answer.because is None else answer.because.sentence("file"))
                 if risk is None
                 else f"{100.0 * risk.low:.2g} to {100.0 * risk.high:.2g} %",
                 *((answer.model.source,) if len(sources) > 1 else ()),

@@ -9,7 +9,7 @@ from strapdown.report import crash_tables as tables
 from strapdown.report.chart import Chart
 from strapdown.report.crash_assumptions import CONVENTIONS, assumptions, how_to_verify, method
 from strapdown.report.crash_figures import CrashFigures
-from strapdown.report.crash_limits import limitations
+from strapdown.report.crash_limits import grave_limitations, limitations
 from strapdown.report.crash_notes import notes, record_facts
 from strapdown.report.crash_values import GAP, plain
 from strapdown.report.crash_words import headline, key_figures, lead
@@ -24,7 +24,6 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
-from strapdown.systems.case_words import in_case_words
 from strapdown.systems.crash_case import CaseResult
 
 __all__ = ["crash_document"]
@@ -172,9 +171,7 @@ def _vehicle(result: CaseResult) -> str:
 
 
 def _worst(result: CaseResult) -> str:
-    """The heads of what is grave: what makes an answer wrong, and not only less precise."""
-    grave = ("do not agree", "end of its range", "not everything", "not determined", "the record")
-    found = [head for head, _ in limitations(result) if any(word in head for word in grave)]
+    found = grave_limitations(result)
     return "; ".join(found) + " (see Limitations)." if found else ""
 
 
@@ -194,9 +191,8 @@ def _agreement(result: CaseResult, figures: CrashFigures) -> tuple[Block, ...]:
         return (Paragraph("There is one recorder, and nothing to hold it against."),)
     comparison = result.reconstruction.comparison
     assert comparison is not None
-    found = [in_case_words(f) for f in comparison.findings]
-    words = notes(found, result, remedies=False)
-    remedies = dict.fromkeys(f.remedy for f in found if f.remedy)
+    words = notes(comparison.findings, result, remedies=False)
+    remedies = dict.fromkeys(text for f in comparison.findings if (text := f.advice("file")))
     return _blocks(
         table,
         *_charts(figures.units, figures.accelerations),
@@ -230,7 +226,7 @@ def _limitations(result: CaseResult) -> tuple[Block, ...]:
 
 def _findings(result: CaseResult) -> tuple[Block, ...]:
     comparison = result.reconstruction.comparison
-    told = [] if comparison is None else [in_case_words(f) for f in comparison.findings]
+    told = () if comparison is None else comparison.findings
     rows = notes([f for f in result.findings if f not in told], result)
     if not rows:
         return (Paragraph("Nothing was noticed in the records that a reader should know."),)
@@ -246,10 +242,8 @@ def _findings(result: CaseResult) -> tuple[Block, ...]:
 
 
 def _verify(result: CaseResult, name: str) -> tuple[Block, ...]:
-    rows = how_to_verify(name)
-    command = dict(rows)["Command"]
     return (
-        Items(tuple(r for r in rows if r[0] != "Command")),
-        Paragraph(command, "mono"),
+        Items(how_to_verify()),
+        Paragraph(f"strapdown verify {name}", "mono"),
         sources.inputs_table(result),
     )

@@ -14,6 +14,7 @@ from strapdown.crash.pdof import NedPdof
 from strapdown.crash.unit_comparison import UnitComparison
 from strapdown.crash.unit_reconstruction import UnitReconstruction
 from strapdown.crash.velocity_change import EventChanges, VelocityChange
+from strapdown.errors import Finding
 from strapdown.report import crash_assumptions, crash_limits, crash_words
 from strapdown.report.crash_values import spaced
 from strapdown.systems.case_references import ReferenceAnswer
@@ -53,7 +54,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_assumptions.assumptions(result)),
         "limitations": _pairs(crash_limits.limitations(result)),
-        "findings": [vars(f) for f in result.findings],
+        "findings": [_finding(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
     return {key: _numbers(value) for key, value in found.items()}
@@ -195,6 +196,12 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
     }
 
 
+def _finding(finding: Finding) -> dict[str, Any]:
+    """The finding as data, and its sentence and remedy for people."""
+    said = {"what": finding.sentence("file"), "remedy": finding.advice("file")}
+    return {**finding.plain(), **said}
+
+
 def _severity(answer: SeverityAnswer) -> dict[str, Any]:
     risk = answer.risk
     return {
@@ -204,7 +211,7 @@ def _severity(answer: SeverityAnswer) -> dict[str, Any]:
         "probability": None if risk is None else risk.probability,
         "low": None if risk is None else risk.low,
         "high": None if risk is None else risk.high,
-        "because": answer.because,
+        "because": "" if answer.because is None else answer.because.sentence("file"),
     }
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
@@ -14,7 +14,6 @@ __all__ = ["notes", "record_facts"]
 
 # A number whose digits beyond the sixth tell nothing, as 15.858333333.
 LONG = re.compile(r"-?\d+\.\d{5,}")
-NUMBER = re.compile(r"[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 # Keys of a record that end with their unit.
 UNITS = {"_m_per_s": "m/s", "_kg": "kg", "_m": "m", "_deg": "deg"}
 
@@ -39,6 +38,7 @@ def notes(
     """
     combined = result.reconstruction.combined
     told: dict[tuple[str, str], list[str]] = {}
+    alike_by: dict[tuple[str, str], Finding] = {}
     for finding in findings:
         file = finding.file or ""
         if combined is not None:
@@ -48,11 +48,12 @@ def notes(
             None if finding.line is None else f"line {finding.line}",
             finding.quantity,
         ]
-        remedy = finding.remedy or "" if remedies else ""
-        text = _sentence(finding.what) + (f" {_sentence(remedy)}" if remedy else "")
+        remedy = finding.advice("file") or "" if remedies else ""
+        text = _sentence(finding.sentence("file")) + (f" {_sentence(remedy)}" if remedy else "")
         place = ", ".join(r for r in rest if r)
         key = place, text
-        alike = [k for k in told if _alike(k, key)]
+        alike = [k for k in told if _alike(alike_by[k], finding)]
+        alike_by[key] = finding
         if file == MEAN and alike:
             # What differs from the mean's in its numbers alone is said once, with those of it.
             files = [f for k in alike for f in told.pop(k)]
@@ -65,8 +66,24 @@ def notes(
     )
 
 
-def _alike(first: tuple[str, str], second: tuple[str, str]) -> bool:
-    return [NUMBER.sub("#", t) for t in first] == [NUMBER.sub("#", t) for t in second]
+def _alike(first: Finding, second: Finding) -> bool:
+    """Whether two say the same with other numbers."""
+    return (
+        first.code == second.code
+        and first.quantity == second.quantity
+        and _words(first.data) == _words(second.data)
+    )
+
+
+def _words(data: object) -> object:
+    """Return data without their numbers."""
+    if isinstance(data, Mapping):
+        return {key: _words(value) for key, value in data.items()}
+    if isinstance(data, tuple):
+        return tuple(_words(value) for value in data)
+    if isinstance(data, Finding):
+        return data.code, _words(data.data)
+    return None if isinstance(data, int | float) else data
 
 
 def _places(files: Sequence[str]) -> str:

@@ -27,7 +27,7 @@ def _prepared(result: CaseResult) -> Iterator[tuple[UnitReconstruction, Prepared
             yield unit, unit.at_point.prepared
 
 
-def clipping(result: CaseResult) -> Iterator[tuple[str, str]]:
+def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return which sensors were at the end of their range."""
     cut: dict[str, list[tuple[str, str]]] = {"accelerometer": [], "gyro": []}
     for unit, prepared in _prepared(result):
@@ -54,6 +54,7 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str]]:
             else ("the vehicle turned more", "what is resolved with its attitude is off")
         )
         yield (
+            "clipped",
             f"{', '.join(name for name, _ in found)}: the {what} was at the end of its range, and "
             f"{follows}",
             f"{'; '.join(said for _, said in found)}; no wider range stands behind it. What was "
@@ -62,7 +63,7 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str]]:
         )
 
 
-def assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
+def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return what was not measured, once for all recorders of which the same is true."""
     told: dict[str, list[str]] = {}
     for spec in result.spec.units:
@@ -91,7 +92,7 @@ def assumed(result: CaseResult) -> Iterator[tuple[str, str]]:
             parts.append(f"Reason stated: {given.because.rstrip('.')}.")
         told.setdefault(" ".join(parts), []).append(spec.name)
     for text, names in told.items():
-        yield f"{', '.join(names)}: not everything was measured", text
+        yield "assumed", f"{', '.join(names)}: not everything was measured", text
 
 
 def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
@@ -101,7 +102,7 @@ def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
     return f"{sd[0]:g}, {sd[1]:g} and {sd[2]:g}{unit} ({names})"
 
 
-def rest(result: CaseResult) -> Iterator[tuple[str, str]]:
+def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return what the stretch before the crash does not tell."""
     told: dict[tuple[str, str], list[str]] = {}
     for unit, prepared in _prepared(result):
@@ -131,10 +132,10 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str]]:
             continue
         told.setdefault(said, []).append(unit.name)
     for (head, text), names in told.items():
-        yield f"{', '.join(names)}: {head}", text
+        yield "rest", f"{', '.join(names)}: {head}", text
 
 
-def borrowed(result: CaseResult) -> Iterator[tuple[str, str]]:
+def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return who has no gyro, and whose turning it takes."""
     told: dict[str, list[str]] = {}
     for unit in result.units:
@@ -142,13 +143,14 @@ def borrowed(result: CaseResult) -> Iterator[tuple[str, str]]:
             told.setdefault(unit.gyro_from, []).append(unit.name)
     for lender, names in told.items():
         yield (
+            "borrowed-gyro",
             f"{', '.join(names)}: no gyro",
             f"The turning is that of {lender}: a rigid vehicle turns everywhere alike. An error of "
             "that gyro is in all of them, and the comparison of recorders does not show it.",
         )
 
 
-def ringing(result: CaseResult) -> Iterator[tuple[str, str]]:
+def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return whose samples are too few for a structure that rings."""
     slow = []
     for unit in result.units:
@@ -160,6 +162,7 @@ def ringing(result: CaseResult) -> Iterator[tuple[str, str]]:
     if slow:
         which = ", ".join(f"{name} ({rate:.4g} Hz)" for name, rate in slow)
         yield (
+            "ringing",
             "Ringing of the structure is not seen at this rate",
             f"{which}: what swings faster than a quarter of the rate cannot be integrated from "
             "samples. Ringing of 10 g at 195 Hz that decays in 30 ms moves the path by 1 m within "

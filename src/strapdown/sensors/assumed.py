@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,17 +76,20 @@ class Assumed:
     def __post_init__(self) -> None:
         if self.turn_sd_deg is None and self.delta_v_sd is None:
             raise ConfigError("sensors.nothing-assumed", quantity="assumed")
-        for name, unit, most in (
-            ("turn_sd_deg", "deg: roll, pitch, heading", MOST_TURN),
-            ("delta_v_sd", "m/s: forward, right, down", MOST_CHANGE),
+        turns, axes = ("roll", "pitch", "heading"), ("forward", "right", "down")
+        for name, said in (
+            ("turn_sd_deg", {"unit": "deg", "axes": turns, "most": MOST_TURN}),
+            ("delta_v_sd", {"unit": "m/s", "axes": axes, "most": MOST_CHANGE}),
         ):
             given = getattr(self, name)
             if given is not None:
-                object.__setattr__(self, name, _sds(given, name, unit, most))
+                object.__setattr__(self, name, _sds(given, name, said))
         object.__setattr__(self, "over", _stretch(self.over))
         if not isinstance(self.because, str):
             raise ConfigError(
-                "sensors.kind", quantity="assumed, because", name=type(self.because).__name__
+                "sensors.reason-not-text",
+                quantity="assumed, because",
+                name=type(self.because).__name__,
             )
 
     def sd_of(self, name: str) -> Triad:
@@ -125,17 +129,14 @@ def _grown(time: Array, over: tuple[float, float]) -> Array:
     return np.array([whole, ON_THE_WAY * np.sin(np.pi * u) ** 2])
 
 
-def _sds(given: object, name: str, unit: str, most: float) -> Triad:
-    remedy = f"give one number, or three, in {unit}, zero to {most:g}"
+def _sds(given: object, name: str, limits: dict[str, Any]) -> Triad:
     if finite(given):
         given = (given, given, given)
-    numbers = triple(given, f"assumed, {name}", remedy)
-    if any(x < 0.0 or x > most for x in numbers):
+    quantity = f"assumed, {name}"
+    numbers = triple(given, quantity, "sensors.assumed-not-three-numbers", **limits)
+    if any(x < 0.0 or x > limits["most"] for x in numbers):
         raise ConfigError(
-            "sensors.message",
-            quantity=f"assumed, {name}",
-            message=f"{given!r} is out of range",
-            remedy_text=remedy,
+            "sensors.assumed-out-of-range", quantity=quantity, given=repr(given), **limits
         )
     return numbers
 

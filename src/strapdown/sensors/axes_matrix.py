@@ -58,42 +58,38 @@ def check_axes_matrix(matrix: ArrayLike, quantity: str = "matrix") -> Array:
     product = m @ m.T
     worst = np.unravel_index(np.argmax(np.abs(product - np.eye(3))), (3, 3))
     if abs(product[worst] - (worst[0] == worst[1])) > ROUNDING:
-        raise ConfigError(
-            "sensors.message",
-            quantity=quantity,
-            message=_not_square(product, (int(worst[0]), int(worst[1]))),
-            remedy_text="write cosines with four decimals or more; scale factors and misalignments of the sensor do not belong here",
-        )
+        raise _not_square(product, (int(worst[0]), int(worst[1])), quantity)
     if np.linalg.det(m) < 0.0:
         raise ConfigError(
-            "sensors.message",
+            "sensors.matrix-mirror-image",
             quantity=quantity,
-            message="it is a mirror image (its determinant is -1), which turns no right-handed sensor into a right-handed body",
-            remedy_text=_unmirrored(m),
+            # Most likely two rows were exchanged, or one lost its sign.
+            down=np.cross(m[0], m[1]) + 0.0,
         )
     u, _, vt = np.linalg.svd(m)
     return np.asarray(u @ vt)
 
 
-def _not_square(product: Array, worst: tuple[int, int]) -> str:
+def _not_square(product: Array, worst: tuple[int, int], quantity: str) -> ConfigError:
     rows = ("forward", "right", "down")
-    i, j = worst
-    if i == j:
-        return f"row {i + 1} ({rows[i]}) is {np.sqrt(product[i, i]):.4g} long, and must be 1"
     i, j = sorted(worst)
+    if i == j:
+        return ConfigError(
+            "sensors.matrix-row-not-unit",
+            quantity=quantity,
+            row_number=i + 1,
+            row_name=rows[i],
+            length=np.sqrt(product[i, i]),
+        )
     size = float(np.sqrt(product[i, i] * product[j, j]))
     angle = float(np.degrees(np.arccos(np.clip(product[i, j] / size, -1.0, 1.0))))
-    return (
-        f"rows {i + 1} and {j + 1} ({rows[i]} and {rows[j]}) stand at {angle:.4g}°, and must at 90°"
-    )
-
-
-def _unmirrored(m: Array) -> str:
-    """What is most likely meant: two rows were exchanged, or one lost its sign."""
-    third = np.cross(m[0], m[1])
-    text = ", ".join(f"{x:.6g}" for x in third + 0.0)
-    return (
-        f"with forward and right as they stand, down is [{text}]; or one of them has a wrong sign"
+    return ConfigError(
+        "sensors.matrix-rows-not-perpendicular",
+        quantity=quantity,
+        first=i + 1,
+        second=j + 1,
+        names=(rows[i], rows[j]),
+        angle=angle,
     )
 
 

@@ -37,9 +37,7 @@ def check_lenders(units: dict[str, CrashUnit]) -> None:
         having = [u.name for u in units.values() if u.gyro is not None]
         if unit.gyro_from not in units:
             raise ConfigError(
-                "sensors.unit-borrows-gyro-not-among"
-                if having
-                else "sensors.unit-borrows-gyro-not-among-2",
+                "sensors.lender-unknown" if having else "sensors.mounted-lender-unknown",
                 quantity="gyro_from",
                 name=unit.name,
                 gyro_from=unit.gyro_from,
@@ -48,9 +46,7 @@ def check_lenders(units: dict[str, CrashUnit]) -> None:
             )
         if units[unit.gyro_from].gyro is None:
             raise ConfigError(
-                "sensors.unit-borrows-gyro-none-either"
-                if having
-                else "sensors.unit-borrows-gyro-none-either-2",
+                "sensors.lender-without-gyro" if having else "sensors.mounted-lender-without-gyro",
                 quantity="gyro_from",
                 name=unit.name,
                 gyro_from=unit.gyro_from,

@@ -150,7 +150,7 @@ def _read(path: Path) -> Sensor:
         raise _bad(path, "class", "sensors.no-class", grade=grade, word=grade, known=GRADES)
     documents = table.get("sources", {})
     if not isinstance(documents, dict):
-        raise _bad(path, "sources", "sensors.no-table")
+        raise _bad(path, "sources", "sensors.sources-not-a-table")
     figures: list[Figure] = []
     triads: dict[str, TriadErrors] = {}
     spreads: dict[str, dict[str, Spread]] = {}
@@ -160,7 +160,7 @@ def _read(path: Path) -> Sensor:
             triads[triad], spreads[triad] = _triad(table[triad], triad, documents, path, figures)
             rates.update((triad, f.value[0]) for f in figures if f.key == f"{triad}.output_rate_hz")
     if not triads:
-        raise _bad(path, "gyro, accel", "sensors.neither")
+        raise _bad(path, "gyro, accel", "sensors.sensor-without-triads")
     return Sensor(
         path.stem,
         title,
@@ -177,7 +177,7 @@ def _triad(
     table: Any, triad: str, documents: Mapping[str, Any], path: Path, figures: list[Figure]
 ) -> tuple[TriadErrors, dict[str, Spread]]:
     if not isinstance(table, dict):
-        raise _bad(path, triad, "sensors.no-table-2", triad=triad)
+        raise _bad(path, triad, "sensors.triad-not-a-table", triad=triad)
     _known(table, KEYS[triad], path, f"{triad}.")
     errors: dict[str, Any] = {}
     spreads: dict[str, Spread] = {}
@@ -203,15 +203,14 @@ def _triad(
         # The worst unit must be one that can exist, or a draw would fail for some seeds.
         _worst(nominal, spreads)
     except ConfigError as error:
-        f = error.finding
-        raise _bad(path, f"{triad}: {f.quantity}", f.what, f.remedy or "") from None
+        place = f"{triad}: {error.finding.quantity}"
+        raise error.replaced(file=path.name, quantity=place) from None
     return nominal, spreads
 
 
 def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) -> Figure:
-    form = 'write { value = 1.0, source = "…", place = "Table 1" } or { …, assumed = "why" }'
     if not isinstance(entry, dict):
-        raise _bad(path, place, f"{entry!r} says not where it is from", form)
+        raise _bad(path, place, "sensors.figure-without-source", entry=repr(entry))
     _known(entry, FIGURE, path, f"{place}.")
     given = entry.get("value")
     numbers: list[Any] = given if isinstance(given, list) else [given] * 3
@@ -219,10 +218,10 @@ def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) ->
         isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) and x >= 0.0
         for x in numbers
     ):
-        raise _bad(path, place, "sensors.value", given=given)
+        raise _bad(path, place, "sensors.figure-not-a-number", given=given)
     source, assumed = entry.get("source", ""), entry.get("assumed", "")
     if bool(source) == bool(assumed):
-        raise _bad(path, place, "it must have either a source or a reason to assume it", form)
+        raise _bad(path, place, "sensors.figure-source-or-reason")
     if source:
         if source not in documents:
             raise _bad(
@@ -301,11 +300,9 @@ def _known(table: Mapping[str, Any], known: Any, path: Path, prefix: str) -> Non
 def _text(table: Mapping[str, Any], key: str, path: Path) -> str:
     value = table.get(key)
     if not isinstance(value, str) or not value:
-        raise _bad(path, key, "sensors.missing-or-no-text", key=key)
+        raise _bad(path, key, "sensors.missing-or-no-text", name=key)
     return value
 
 
-def _bad(path: Path, key: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError(
-        "sensors.message", file=path.name, quantity=key, message=what, remedy_text=remedy
-    )
+def _bad(path: Path, key: str, code: str, **values: Any) -> ConfigError:
+    return ConfigError(code, file=path.name, quantity=key, data=values)

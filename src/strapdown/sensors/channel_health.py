@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,52 +181,21 @@ def check_peers(channels: Sequence[ChannelHealth]) -> tuple[ChannelHealth, ...]:
     for channel in channels:
         found = list(channel.faults)
         if channel.noise > NOISE_FACTOR * usual:
-            what = (
-                f"noise of {channel.noise:.3g} before the impact, "
-                f"{channel.noise / usual:.1f} times that of its like"
-            )
-            remedy = "look at its cable and mounting; do not use it alone"
-            found.append(
-                _fault(
-                    "noise",
-                    channel.begin,
-                    channel.noise,
-                    NOISE_FACTOR * usual,
-                    channel,
-                    what,
-                    remedy,
-                )
-            )
+            code, limit = "sensors.channel-noise", NOISE_FACTOR * usual
+            at, ratio = channel.begin, channel.noise / usual
+            found.append(_fault("noise", at, channel.noise, limit, channel.name, code, ratio=ratio))
         if last - channel.end > SHORT_SHARE * (last - begin):
-            what = (
-                f"it ends at {channel.end:.4f} s, and others go on to {last:.4f} s: what was "
-                "recorded then was taken out, or is lost"
-            )
-            remedy = (
-                "use it up to there at most; a channel that failed was seldom sound just before"
-            )
-            found.append(_fault("cut", channel.end, channel.end, last, channel, what, remedy))
+            code, end = "sensors.channel-cut", channel.end
+            found.append(_fault("cut", end, end, last, channel.name, code))
         out.append(replace(channel, faults=tuple(found)))
     return tuple(out)
 
 
 def _fault(
-    kind: str,
-    at: float,
-    size: float,
-    limit: float,
-    channel: ChannelHealth | str,
-    what: str,
-    remedy: str,
+    kind: str, at: float, size: float, limit: float, channel: str, code: str, **values: Any
 ) -> Fault:
-    name = channel if isinstance(channel, str) else channel.name
-    return Fault(
-        kind,
-        at,
-        size,
-        limit,
-        Finding("sensors.message", quantity=name, message=what, remedy_text=remedy),
-    )
+    data = {"at": at, "size": size, "limit": limit, **values}
+    return Fault(kind, at, size, limit, Finding(code, quantity=channel, data=data))
 
 
 def _arrays(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array]:
@@ -259,8 +229,8 @@ def _stuck(t: Array, v: Array, usual: int, name: str) -> list[Fault]:
     if lengths[k] < limit:
         return []
     at, long = float(t[starts[k]]), float(lengths[k] * step)
-    what = f"it repeats {v[starts[k]]:.6g} for {lengths[k]} samples from {at:.4f} s on"
-    return [_fault("stuck", at, long, limit * step, name, what, "do not use it from there on")]
+    said = {"value": v[starts[k]], "count": int(lengths[k])}
+    return [_fault("stuck", at, long, limit * step, name, "sensors.channel-stuck", **said)]
 
 
 def _saturation(
@@ -272,21 +242,18 @@ def _saturation(
         over = np.flatnonzero(np.abs(v) >= limit)
         if over.size:
             at, size = float(t[over[0]]), float(np.abs(v).max())
-            what = f"it reaches {size:.5g} of a range of {full_scale:.5g}, first at {at:.4f} s"
-            remedy = "what it misses is not in its integral: take a higher range there"
-            return [_fault("saturation", at, size, limit, name, what, remedy)]
+            code = "sensors.channel-at-full-scale"
+            return [_fault("saturation", at, size, limit, name, code, full_scale=full_scale)]
     starts, lengths = equal_runs(v)
     for extreme in (float(v.max()), float(v.min())):
         top = (v[starts] == extreme) & (lengths >= max(FLAT_TOP, 2 * usual))
         if top.any() and abs(extreme - float(np.median(v))) > JUMP_FACTOR * noise:
             k = int(np.flatnonzero(top)[0])
-            at = float(t[starts[k]])
-            what = (
-                f"its extreme, {extreme:.5g}, is flat over {lengths[k]} samples at {at:.4f} s: the "
-                "end of a range, or a clipped amplifier"
+            at, size = float(t[starts[k]]), abs(extreme)
+            code, count = "sensors.channel-flat-top", int(lengths[k])
+            faults.append(
+                _fault("saturation", at, size, size, name, code, extreme=extreme, count=count)
             )
-            remedy = "what it misses is not in its integral: take a higher range there"
-            faults.append(_fault("saturation", at, abs(extreme), abs(extreme), name, what, remedy))
     return faults
 
 
@@ -309,28 +276,19 @@ def _jump(t: Array, v: Array, noise: float, name: str) -> list[Fault]:
     if size[k] <= limit:
         return []
     at = float(t[k + width])
-    what = f"its level steps by {size[k]:.4g} at {at:.4f} s, and is quiet before and after"
-    remedy = "take its zero anew after the step, or leave it out"
-    return [_fault("jump", at, float(size[k]), limit, name, what, remedy)]
+    return [_fault("jump", at, float(size[k]), limit, name, "sensors.channel-level-steps")]
 
 
 def _end(t: Array, velocity: float, offset: float, entry: float, name: str) -> list[Fault]:
     faults = []
     end = float(t[-1])
     if abs(offset) > SETTLED:
-        what = (
-            f"mean of {offset:.3g} m/s² over the last {1e3 * SETTLED_WINDOW:.0f} ms: its zero "
-            "moved, or its part is not at rest"
-        )
-        remedy = "its integral drifts by as much each second; compare it with its like"
-        faults.append(
-            _fault("offset", end - SETTLED_WINDOW, abs(offset), SETTLED, name, what, remedy)
-        )
+        said = {"offset": offset, "window_ms": 1e3 * SETTLED_WINDOW}
+        at, code = end - SETTLED_WINDOW, "sensors.channel-offset-at-end"
+        faults.append(_fault("offset", at, abs(offset), SETTLED, name, code, **said))
     limit = RESTITUTION * abs(entry) + SPEED_LEFT
     if abs(velocity) > limit:
-        what = (
-            f"{velocity:.3g} m/s at the end, after {entry:.3g} m/s before: it does not come to rest"
-        )
-        remedy = "its zero or scale is off, its part turned, or the record is too short"
-        faults.append(_fault("velocity", end, abs(velocity), limit, name, what, remedy))
+        said = {"velocity": velocity, "entry": entry}
+        code = "sensors.channel-not-at-rest-at-end"
+        faults.append(_fault("velocity", end, abs(velocity), limit, name, code, **said))
     return faults

@@ -31,7 +31,7 @@ def crash_priors(rate: float = 200.0) -> dict[str, TriadUncertainty]:
         The rate is not positive.
     """
     if not (math.isfinite(rate) and rate > 0.0):
-        raise ConfigError("sensors.hz-no-rate", quantity="rate", rate=rate)
+        raise ConfigError("sensors.rate-not-positive", quantity="rate", rate=rate)
     return {
         "accel": TriadUncertainty(
             bias=0.2,

@@ -49,11 +49,11 @@ class Mounting:
     angles_sd_deg: float = 0.0
 
     def __post_init__(self) -> None:
-        for name, how in (
-            ("position", "give forward, right, down in m"),
-            ("angles_deg", "give roll, pitch, heading in deg"),
+        for name, code in (
+            ("position", "sensors.position-not-three-numbers"),
+            ("angles_deg", "sensors.angles-not-three-numbers"),
         ):
-            object.__setattr__(self, name, triple(getattr(self, name), name, how))
+            object.__setattr__(self, name, triple(getattr(self, name), name, code))
         if math.hypot(*self.position) > FARTHEST:
             raise ConfigError(
                 "sensors.vehicle-origin",
@@ -104,15 +104,9 @@ class RecordedTriad:
 
     def __post_init__(self) -> None:
         if not isinstance(self.table, pd.DataFrame):
-            raise _kind(
-                self.table,
-                self.name,
-                "table",
-                "give a DataFrame, indexed by time in s, with the columns accel_x accel_y accel_z "
-                "in m/s², or gyro_x gyro_y gyro_z in rad/s",
-            )
+            raise _wrong_type("table", self.table, self.name)
         if not isinstance(self.uncertainty, TriadUncertainty):
-            raise _kind(self.uncertainty, self.name, "uncertainty", "give a TriadUncertainty")
+            raise _wrong_type("uncertainty", self.uncertainty, self.name)
         if self.held is not None and np.shape(self.held) != (len(self.table), 3):
             raise ConfigError(
                 "sensors.shape-table-rows",
@@ -168,35 +162,22 @@ class CrashUnit:
         if not isinstance(given, tuple | list) or not all(
             isinstance(t, RecordedTriad) for t in given
         ):
-            raise _kind(
-                given,
-                self.name,
-                "accelerometers",
-                "give a tuple of RecordedTriad, the lowest range first, as (low,)",
-            )
+            raise _wrong_type("accelerometers", given, self.name)
         object.__setattr__(self, "accelerometers", tuple(given))
         if not (self.gyro is None or isinstance(self.gyro, RecordedTriad)):
-            raise _kind(self.gyro, self.name, "gyro", "give a RecordedTriad, or None")
+            raise _wrong_type("gyro", self.gyro, self.name)
         if not (self.assumed is None or isinstance(self.assumed, Assumed)):
-            raise _kind(
-                self.assumed,
-                self.name,
-                "assumed",
-                "give Assumed(turn_sd_deg=..., delta_v_sd=...), or None",
-            )
+            raise _wrong_type("assumed", self.assumed, self.name)
         if not isinstance(self.mounting, Mounting):
-            raise _kind(self.mounting, self.name, "mounting", "give a Mounting")
+            raise _wrong_type("mounting", self.mounting, self.name)
         if not (self.trigger is None or is_number(self.trigger)):
-            raise _kind(
-                self.trigger, self.name, "trigger", "give its instant on this unit's clock, in s"
-            )
+            raise _wrong_type("trigger", self.trigger, self.name)
 
 
-def _kind(given: object, name: object, quantity: str, remedy: str) -> ConfigError:
+def _wrong_type(quantity: str, given: object, unit: object) -> ConfigError:
     return ConfigError(
-        "sensors.message",
-        file=str(name),
+        f"sensors.{quantity}-of-wrong-type",
+        file=str(unit),
         quantity=quantity,
-        message=f"this is of kind {type(given).__name__}",
-        remedy_text=remedy,
+        type=type(given).__name__,
     )

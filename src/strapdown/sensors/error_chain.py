@@ -190,7 +190,7 @@ def _rows(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array]:
     if t.ndim != 1 or t.size < 2 or v.shape != (t.size, 3):
         raise DataError("sensors.time-shape-values", quantity=name, shape=t.shape, shape_2=v.shape)
     if not (np.isfinite(t).all() and (np.diff(t) > 0.0).all()):
-        raise DataError("sensors.time-does-not-advance-2", quantity="time")
+        raise DataError("sensors.times-do-not-advance", quantity="time")
     return t, v
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.sensors.channel_health import ABRUPT
-from strapdown.sensors.health_log import ChannelFault, HealthLog, Mask, intervals_of, name_in_words
+from strapdown.sensors.health_log import ChannelFault, HealthLog, Mask, intervals_of
 from strapdown.sensors.tail_limit import tail_limit
 from strapdown.tables import ACCEL, GYRO
 
@@ -184,17 +184,8 @@ def _where(log: HealthLog, k: int, block: int, step: float) -> int | None:
 
 def _fault(log: HealthLog, k: int, at: int, step: float, limit: float) -> ChannelFault:
     name = log.names[k]
-    unit = "rad/s" if name in GYRO else "m/s²"
-    what = (
-        f"the zero of {name_in_words([name])} jumps by {step:.3g} {unit} at {log.time[at]:.6g} s, "
-        f"while the other channels are at rest; {limit:.2g} would be usual"
-    )
-    remedy = "estimate its bias anew from there on; " + (
-        "a steady slow turn about the vertical that begins at once looks the same"
-        if name in GYRO
-        else "if it comes again, replace it"
-    )
-    return log.fault(k, "jump", (at, log.time.size - 1), abs(step), limit, what, remedy)
+    code = "sensors.gyro-zero-jumps" if name in GYRO else "sensors.accelerometer-zero-jumps"
+    return log.fault(k, "jump", (at, log.time.size - 1), abs(step), limit, code, step=step)
 
 
 def _until_next(log: HealthLog, faults: list[ChannelFault]) -> list[ChannelFault]:

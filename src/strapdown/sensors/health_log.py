@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -180,21 +180,26 @@ class HealthLog:
         span: tuple[int, int],
         size: float,
         limit: float,
-        what: str,
-        remedy: str,
+        code: str,
+        **values: Any,
     ) -> ChannelFault:
-        """Make a fault of samples ``span[0]`` to ``span[1]``, both included."""
+        """Make a fault of samples ``span[0]`` to ``span[1]``, both included.
+
+        The data of its finding are `values`, and the ``channel`` in words, ``begin`` and ``end``
+        in s, ``size`` and ``limit``, and the ``unit`` of the channel.
+        """
         name = channel if isinstance(channel, str) else self.names[channel]
         a, b = span
-        finding = Finding(
-            "sensors.message",
-            file=self.source,
-            row=a + 1,
-            quantity=name,
-            message=what,
-            remedy_text=remedy,
-        )
         begin, end = float(self.time[a]), float(self.time[b])
+        data = {
+            "channel": WORDS.get(name, name),
+            "begin": begin,
+            "end": end,
+            "size": size,
+            "limit": limit,
+            "unit": "rad/s" if name.startswith("gyro") else "m/s²",
+        }
+        finding = Finding(code, file=self.source, row=a + 1, quantity=name, data={**data, **values})
         return ChannelFault(name, kind, begin, end, a, b, size, limit, finding)
 
     def span_of(self, first: int, last: int) -> tuple[int, int]:
@@ -272,11 +277,6 @@ def _blocks(log: HealthLog) -> Blocks:
     for array in (sd, noise, white):
         array[~valid] = 0.0
     return Blocks(size, mean, sd, noise, white, valid)
-
-
-def name_in_words(names: Sequence[str]) -> str:
-    """Channels, as a person calls them."""
-    return " and ".join(WORDS.get(n, n) for n in names)
 
 
 def usual(values: Array) -> float:

@@ -14,7 +14,6 @@ from strapdown.sensors.health_log import (
     HealthLog,
     Mask,
     intervals_of,
-    name_in_words,
     usual,
 )
 from strapdown.sensors.known_median import known_median
@@ -203,19 +202,8 @@ def _fault(
     at = np.flatnonzero(flags[first : last + 1]) + first
     worst = int(at[np.argmax(sizes[at] / limits[at])])
     size, limit = float(sizes[worst]), float(limits[worst])
-    than = ("its data sheet", "the middle one of its triad", "its own past beside the others'")
-    words = name_in_words([log.names[k]])
-    unit = "rad/s" if log.names[k].startswith("gyro") else "m/s²"
-    span = log.span_of(first, last)
-    when = f"from {log.time[span[0]]:.6g} to {log.time[span[1]]:.6g} s"
-    times = f"{NOISE_FACTOR * size / limit:.1f} times {than[int(reasons[worst])]}"
-    if kind == "burst":
-        what = f"{words} has outliers {when}: {size:.3g} {unit} from sample to sample, {times}"
-        remedy = "filter it robustly before anything integrates it; look at its cable"
-    else:
-        what = f"{words} is noisy {when}: {size:.3g} {unit} from sample to sample, {times}"
-        remedy = (
-            "if the body rocked or shook along or about this axis then, it is motion and no fault; "
-            "if not, look at the sensor's mounting and cable, and give it the weight of this noise"
-        )
-    return log.fault(k, kind, span, size, limit, what, remedy)
+    than = ("data-sheet", "triad", "past")[int(reasons[worst])]
+    # Of a burst, that is `sensors.burst-beyond-triad` and so on.
+    code = f"sensors.{kind}-beyond-{than}"
+    ratio = NOISE_FACTOR * size / limit
+    return log.fault(k, kind, log.span_of(first, last), size, limit, code, ratio=ratio)

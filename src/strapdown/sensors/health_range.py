@@ -10,7 +10,6 @@ from strapdown.sensors.health_log import (
     ChannelFault,
     HealthLog,
     intervals_of,
-    name_in_words,
 )
 from strapdown.sensors.saturation import find_limits
 
@@ -23,7 +22,7 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
     """Samples at the stated full scale, or on a flat top (`saturation.find_limits`)."""
     faults = []
     join = max(round(SAME_FAULT * log.rate), 1)
-    for k, name in enumerate(log.names):
+    for k in range(len(log.names)):
         known = ~log.wrong[k]
         # Two readings make no top that is flat, nor does a channel that never moves.
         if known.sum() < 3:
@@ -43,17 +42,9 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
         )
         clipped = np.zeros(log.time.size, dtype=bool)
         clipped[known] = limits.clipped[:, 0]
-        end = "its stated range" if not limits.found[0] else "a flat top: the end of a range"
+        code = "sensors.saturated-flat-top" if limits.found[0] else "sensors.saturated-at-range"
         for a, b in intervals_of(clipped, join):
             count = int(clipped[a : b + 1].sum())
             size = float(np.abs(log.values[k, a : b + 1][clipped[a : b + 1]]).max())
-            what = (
-                f"{name_in_words([name])} is saturated: {count} samples from {log.time[a]:.6g} s "
-                f"on stand at {size:.6g}, {end}"
-            )
-            remedy = (
-                "what it misses is in no integral after it: take a higher range, or begin anew "
-                "from a known attitude and velocity"
-            )
-            faults.append(log.fault(k, "saturated", (a, b), size, size, what, remedy))
+            faults.append(log.fault(k, "saturated", (a, b), size, size, code, count=count))
     return faults

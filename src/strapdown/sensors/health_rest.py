@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84
-from strapdown.sensors.health_log import ChannelFault, HealthLog, intervals_of, name_in_words
+from strapdown.sensors.health_log import ChannelFault, HealthLog, intervals_of
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]
@@ -54,18 +54,14 @@ def _triad(
     at = [log.names.index(c) for c in columns]
     mean = means[at]
     sd = _sd(log, columns, mean, size[1], float(log.time[span[1]] - log.time[span[0]]))
-    what_is = ("the Earth's rate", "rad/s") if columns is GYRO else ("gravity", "m/s²")
+    kind = "gyro" if columns is GYRO else "accel"
     faults = []
     for axis, channel in enumerate(at):
         limit = size[1] + k_sd * float(sd[axis])
         if abs(mean[axis]) > limit:
-            what = (
-                f"{name_in_words([log.names[channel]])} reads {mean[axis]:.5g} {what_is[1]} at "
-                f"rest, and {what_is[0]} with its stated errors explains {limit:.5g} at most"
-            )
-            remedy = "its zero or scale factor is not what is stated: calibrate, or replace it"
+            read, code = float(mean[axis]), f"sensors.{kind}-implausible-at-rest"
             faults.append(
-                log.fault(channel, "implausible", span, abs(float(mean[axis])), limit, what, remedy)
+                log.fault(channel, "implausible", span, abs(read), limit, code, read=read)
             )
     if faults:
         return faults
@@ -80,16 +76,10 @@ def _triad(
         return []
     if low <= length <= high:
         return []
-    what = (
-        f"at rest the three together read {length:.6g} {what_is[1]}, and {what_is[0]} with the "
-        f"stated errors is {low:.6g} to {high:.6g}"
-    )
-    remedy = (
-        "check unit and scale factors, and that the axes are at right angles; or the body moves"
-    )
     limit = high if length > high else low
-    kind = "gyro" if columns is GYRO else "accel"
-    return [log.fault(kind, "implausible", span, length, limit, what, remedy)]
+    said = {"low": low, "high": high}
+    code = f"sensors.{kind}-triad-implausible-at-rest"
+    return [log.fault(kind, "implausible", span, length, limit, code, **said)]
 
 
 def _sd(log: HealthLog, columns: list[str], mean: Array, size: float, duration: float) -> Array:

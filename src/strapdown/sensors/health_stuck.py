@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.sensors.equal_runs import equal_runs, longest_by_chance
-from strapdown.sensors.health_log import ChannelFault, HealthLog, name_in_words
+from strapdown.sensors.health_log import ChannelFault, HealthLog
 from strapdown.sensors.tail_limit import tail_limit
 
 Array = NDArray[np.float64]
@@ -31,19 +31,15 @@ def find_missing(log: HealthLog) -> list[ChannelFault]:
     """Samples that are no finite number; bursts of them within a second are one."""
     faults = []
     join = max(round(SAME_BURST * log.rate), 1)
-    for k, name in enumerate(log.names):
+    for k in range(len(log.names)):
         gone = ~np.isfinite(log.values[k])
         if not gone.any():
             continue
         at = np.flatnonzero(gone)
         for part in np.split(at, np.flatnonzero(np.diff(at) > join) + 1):
             a, b = int(part[0]), int(part[-1])
-            what = (
-                f"{name_in_words([name])} gives no number in {part.size} of {b - a + 1} samples "
-                f"from {log.time[a]:.6g} s on"
-            )
-            remedy = "bridge what is shorter than the motion; leave the channel out for the rest"
-            faults.append(log.fault(k, "missing", (a, b), float(part.size), 0.0, what, remedy))
+            code, said = "sensors.samples-missing", {"count": part.size, "of": b - a + 1}
+            faults.append(log.fault(k, "missing", (a, b), float(part.size), 0.0, code, **said))
     return faults
 
 
@@ -126,26 +122,13 @@ def _others_live(sums: Array, k: int, a: int, b: int) -> bool:
 
 
 def _fault(log: HealthLog, k: int, a: int, b: int, limit: float) -> ChannelFault:
-    n, value, words = log.time.size, float(log.values[k, a]), name_in_words([log.names[k]])
-    count = b - a + 1
-    allowed = "" if not math.isfinite(limit) else f"; its noise repeats {limit:.0f} at most"
+    n, value, count = log.time.size, float(log.values[k, a]), b - a + 1
     if value == 0.0 and (a == 0 or b == n - 1):
-        when = (
-            "from the first sample to the last"
-            if a == 0 and b == n - 1
-            else f"from the first sample up to {log.time[b]:.6g} s"
-            if a == 0
-            else f"from {log.time[a]:.6g} s to the end"
-        )
-        what = f"{words} is dead: it reads exactly zero {when} ({count} samples)"
-        remedy = (
-            "check its power, its cable and the column that was taken for it; without it "
-            "neither attitude nor alignment can be had"
-        )
-        return log.fault(k, "dead", (a, b), float(count), limit, what, remedy)
-    what = (
-        f"{words} is stuck: it repeats {value:.9g} for {count} samples, "
-        f"{log.time[b] - log.time[a]:.4g} s from {log.time[a]:.6g} s on{allowed}"
-    )
-    remedy = "do not use it there; take what a second unit reads, or end the run before"
-    return log.fault(k, "stuck", (a, b), float(count), limit, what, remedy)
+        if a > 0:
+            code = "sensors.dead-to-end"
+        else:
+            code = "sensors.dead-throughout" if b == n - 1 else "sensors.dead-at-start"
+        return log.fault(k, "dead", (a, b), float(count), limit, code, count=count)
+    code = "sensors.stuck-beyond-noise" if math.isfinite(limit) else "sensors.stuck"
+    said = {"value": value, "count": count, "duration": log.time[b] - log.time[a]}
+    return log.fault(k, "stuck", (a, b), float(count), limit, code, **said)

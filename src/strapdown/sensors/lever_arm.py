@@ -188,7 +188,7 @@ def move_unit(
         In vehicle axes.
     """
     noise = prepared.gyro_noise_covariance
-    place = triple(point, "point", "give forward, right, down in m from the vehicle's origin")
+    place = triple(point, "point", "sensors.point-not-three-numbers")
     arm = np.asarray(place) - np.asarray(prepared.unit.mounting.position)
     return move_imu(prepared.imu, arm, gyro_noise=noise, window=window, gyro_delay=gyro_delay)
 

@@ -221,7 +221,7 @@ def _resample(
         try:
             step = even_step(g.time)
         except DataError as error:
-            raise _named(error, channels.source) from None
+            raise error.replaced(file=channels.source) from None
         try:
             if sampling == "mean":
                 return mean_samples(
@@ -238,7 +238,7 @@ def _resample(
                 g.values, g.time[0] - 0.5 * own, step, at, design, marked=held
             ), "decimated"
         except DataError as error:
-            raise _named(error, channels.source) from None
+            raise error.replaced(file=channels.source) from None
     if _same_kind_and_rate(g, channels.sampling, rate, sampling):
         first = int(np.argmin(np.abs(g.time - at[0])))
         near = g.time[first : first + len(at)]
@@ -270,15 +270,3 @@ def _said(source: str, names: list[str], g: AxisGroup, method: str, rate: float)
             own_2=own / 8.0,
         )
     ]
-
-
-def _named(error: DataError, source: str) -> DataError:
-    f = error.finding
-    return DataError(
-        "sensors.message",
-        file=source,
-        row=f.row,
-        quantity=f.quantity,
-        message=f.what,
-        remedy_text=f.remedy,
-    )

@@ -123,24 +123,22 @@ def agreement_findings(
             column = int(np.argmax(np.where(told, np.abs(matrix[row]), 0.0)))
             sign = "-" if matrix[row, column] < 0.0 else "+"
             felt = abs(matrix[row, column]) > OTHER_AXIS
-            what = (
-                f"it follows {sign}{'xyz'[column]} of {low.name} ({matrix[row, column]:+.2f} ± "
-                f"{sd[row, column]:.2f})"
-                if felt
-                else f"it does not follow {axis} of {low.name} ({matrix[row, row]:+.2f} ± "
-                f"{sd[row, row]:.2f})"
-            )
-            remedy = "swap or invert the axes of the one that was wired or named otherwise"
             if _in_g(abs(float(matrix[row, row]))):
-                what = f"it reads {matrix[row, row]:+.3f} times {axis} of {low.name}"
-                remedy = "one of the two is in g: multiply it by 9.80665"
+                code, column = "sensors.range-in-g", row
+            elif felt:
+                code = "sensors.range-follows-other-axis"
+            else:
+                code, column = "sensors.range-does-not-follow", row
             found.append(
                 Finding(
-                    "sensors.message",
+                    code,
                     file=source,
                     quantity=f"accel_{axis}",
-                    message=what + ", where both are within their range",
-                    remedy_text=remedy,
+                    name=low.name,
+                    axis="xyz"[column],
+                    sign=sign,
+                    ratio=matrix[row, column],
+                    sd=sd[row, column],
                 )
             )
     return found

@@ -115,7 +115,7 @@ def compare_redundant(
     both = np.column_stack([first, second])
     bad = np.flatnonzero(~np.isfinite(both).all(axis=1))
     if bad.size:
-        raise DataError("sensors.not-finite-number-2", row=int(bad[0]) + 1, quantity=label)
+        raise DataError("sensors.compared-not-finite", row=int(bad[0]) + 1, quantity=label)
     if not bandwidth > 0.0:
         raise ConfigError("sensors.bandwidth-hz-none", quantity="bandwidth", bandwidth=bandwidth)
     if rest_until is not None:
@@ -149,14 +149,13 @@ def compare_redundant(
     if abs(gain - 1.0) > gain_error:
         findings.append(Finding("sensors.gain-other", quantity=label, gain=gain))
     if share > integral_share:
-        since = "" if apart_at is None else f", for good from {apart_at:.4f} s on"
         findings.append(
             Finding(
-                "sensors.their-integrals-differ-up-greatest",
+                "sensors.integrals-differ" if apart_at is None else "sensors.integrals-part",
                 quantity=label,
                 apart=apart.max(),
                 share=100 * share,
-                since=since,
+                since=apart_at,
             )
         )
     return RedundantComparison(

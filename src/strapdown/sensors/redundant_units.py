@@ -223,7 +223,7 @@ class UnitVoting:
                     )
             if own.size != time.size or np.abs(own - time).max() > SAME_STAMP / self.rate:
                 raise DataError(
-                    "sensors.stamps-not",
+                    "sensors.unit-stamps-differ",
                     file=source,
                     quantity="time",
                     size=own.size,

@@ -58,11 +58,9 @@ def stated_imu(
         try:
             triads[triad] = stated_uncertainty(triad, fixed, sensor)
         except ConfigError as error:
-            f = error.finding
-            what = (f.quantity or "").replace("uncertainty", triad)
-            raise ConfigError(
-                "sensors.message", quantity=what, message=f.what, remedy_text=f.remedy
-            ) from None
+            # A sensor's triad is stated under its own name.
+            place = (error.finding.quantity or "").replace("uncertainty", triad)
+            raise error.replaced(quantity=place) from None
         drifts[triad] = _drift(
             triad, slow, None if base is None else getattr(base, f"{triad}_drift")
         )
@@ -96,11 +94,9 @@ def _require(triad: str, known: TriadUncertainty) -> None:
         if max(sizes) > 0.0:
             continue
         keys = [k for k in STATED_KEYS[triad] if k.startswith(said)]
-        noun = "bias" if attribute == "bias" else "noise"
         raise ConfigError(
-            "sensors.nothing-states-every-bound-would",
+            "sensors.bias-not-stated" if attribute == "bias" else "sensors.noise-not-stated",
             quantity=f"{triad}, {said}",
-            noun=noun,
             triad=triad,
             keys=keys[:2],
         )

@@ -106,7 +106,7 @@ class SynchronisedUnits:
             if u.unit.name == name:
                 return u
         raise ConfigError(
-            "sensors.no-unit",
+            "sensors.reference-unit-unknown",
             quantity="name",
             name=name,
             word=name,

@@ -27,17 +27,13 @@ def end_findings(
             if t.whole.all():
                 continue
             inner, time = np.flatnonzero(t.whole), t.triad.table.index.to_numpy()
-            kept = (
-                f"whole from {time[inner[0]]:.4g} to {time[inner[-1]]:.4g} s"
-                if inner.size
-                else "nowhere whole"
-            )
             found.append(
                 Finding(
-                    "sensors.low-pass-outside-record-ends",
+                    "sensors.low-pass-at-ends" if inner.size else "sensors.low-pass-nowhere-whole",
                     file=f"{name}, {t.triad.name}",
                     quantity="time",
-                    kept=kept,
+                    begin=time[inner[0]] if inner.size else None,
+                    end=time[inner[-1]] if inner.size else None,
                     noise_factor=float(t.noise_factor.max() / np.median(t.noise_factor)),
                 )
             )
@@ -60,9 +56,9 @@ def clipped_findings(
                 if rows.size:
                     found.append(
                         Finding(
-                            "sensors.samples-record-end-range-count"
+                            "sensors.gyro-clipped-before-resampling"
                             if gyro
-                            else "sensors.samples-record-end-range-count-2",
+                            else "sensors.accel-clipped-before-resampling",
                             file=f"{name}, {t.triad.name}",
                             quantity=column,
                             size=rows.size,

@@ -111,10 +111,10 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     missing = [c for c in columns if c not in table.columns]
     if missing:
         raise DataError(
-            "sensors.no" if len(missing) == 3 else "sensors.no-2",
+            "sensors.triad-without-axes" if len(missing) == 3 else "sensors.axes-missing",
             file=source,
             quantity=missing[0],
-            missing=" and no ".join(missing),
+            missing=missing,
             columns=table.columns,
             assumed=_ASSUMED[columns[0]],
         )
@@ -153,13 +153,19 @@ def _groups(
     )
     if len(groups) == 1:
         return groups, []
-    said = "; ".join(
-        f"{', '.join(columns[a] for a in g.axes)} {1.0 / g.step:.5g} Hz from {g.time[0]:.6g} to "
-        f"{g.time[-1]:.6g} s"
+    parts = [
+        Finding(
+            "sensors.axes-sampled",
+            severity="note",
+            columns=[columns[a] for a in g.axes],
+            rate=1.0 / g.step,
+            begin=g.time[0],
+            end=g.time[-1],
+        )
         for g in groups
-    )
+    ]
     return groups, [
-        Finding("sensors.axes-not-sampled-together", file=source, quantity="time", said=said)
+        Finding("sensors.axes-not-sampled-together", file=source, quantity="time", parts=parts)
     ]
 
 
@@ -204,12 +210,11 @@ def _group(
     if gaps:
         worst = max(gaps, key=lambda g: g.length)
         raise DataError(
-            "sensors.gap-longest-ms-ms-usual",
+            "sensors.gap" if len(gaps) == 1 else "sensors.gaps",
             file=source,
             row=worst.sample + 1,
             quantity="time",
             count=len(gaps),
-            value="s" * (len(gaps) > 1),
             length=1000.0 * worst.length,
             start=worst.start,
             usual=1000.0 * worst.usual,
@@ -235,7 +240,11 @@ def _numbers(column: pd.Series, name: str, source: str) -> Array:
         bad = pd.to_numeric(column, errors="coerce").isna().to_numpy() & column.notna().to_numpy()
         row = int(np.argmax(bad))
         raise DataError(
-            "sensors.no-number", file=source, row=row + 1, quantity=name, iloc=column.iloc[row]
+            "sensors.sample-not-a-number",
+            file=source,
+            row=row + 1,
+            quantity=name,
+            iloc=column.iloc[row],
         ) from None
 
 
@@ -253,20 +262,23 @@ def _quiet_mean(unit: CrashUnit, groups: tuple[AxisGroup, ...]) -> Array:
 def _judge_force(
     source: str, unit: CrashUnit, triad: RecordedTriad, groups: tuple[AxisGroup, ...]
 ) -> list[Finding]:
-    found = _over_range(source, triad, groups, "m/s²", "g instead of m/s²? 1 g is 9.80665 m/s²")
+    found = _over_range(source, triad, groups, "sensors.acceleration-beyond-range")
     if triad.absent:
         # Gravity may be along the axis that is not there.
         return found
     length = float(np.linalg.norm(_quiet_mean(unit, groups)))
     if IN_G[0] <= length <= IN_G[1]:
-        what = f"its specific force before the crash is {length:.3f} in length: gravity in g"
-        remedy = "state the unit g in the record's header or in the case, or multiply by 9.80665"
         if max(triad.uncertainty.axis("bias")) < BIAS_SPEAKS:
             raise DataError(
-                "sensors.message", file=source, quantity="accel", message=what, remedy_text=remedy
+                "sensors.specific-force-in-g", file=source, quantity="accel", length=length
             )
         found.append(
-            Finding("sensors.or-bias", file=source, quantity="accel", what=what, remedy=remedy)
+            Finding(
+                "sensors.specific-force-in-g-or-bias",
+                file=source,
+                quantity="accel",
+                length=length,
+            )
         )
     elif length < NO_GRAVITY:
         found.append(
@@ -287,20 +299,19 @@ def _judge_rate(
     limit = max(triad.uncertainty.axis("full_scale"))
     stated = math.isfinite(limit)
     if largest > (5.0 * limit if stated else FASTEST_TURN):
-        bound = f"its range of {limit:.4g} rad/s" if stated else "what a vehicle does"
         raise DataError(
-            "sensors.rates-up-far-beyond-they",
+            "sensors.rates-beyond-range" if stated else "sensors.rates-beyond-vehicle",
             file=source,
             quantity="gyro",
             largest=largest,
-            bound=bound,
-            largest_2=largest / DEGREES,
+            limit=limit,
+            as_deg=largest / DEGREES,
         )
-    return _over_range(source, triad, groups, "rad/s", "deg/s instead of rad/s?")
+    return _over_range(source, triad, groups, "sensors.rate-beyond-range")
 
 
 def _over_range(
-    source: str, triad: RecordedTriad, groups: tuple[AxisGroup, ...], unit: str, hint: str
+    source: str, triad: RecordedTriad, groups: tuple[AxisGroup, ...], code: str
 ) -> list[Finding]:
     limits = np.array(triad.uncertainty.axis("full_scale"))
     peak = np.zeros(3)
@@ -312,13 +323,11 @@ def _over_range(
     axis = int(np.argmax(peak / limits))
     return [
         Finding(
-            "sensors.reaches-stated-range",
+            code,
             file=source,
             quantity="full_scale",
-            value="xyz"[axis],
+            axis="xyz"[axis],
             peak=peak[axis],
-            unit=unit,
-            limits=limits[axis],
-            hint=hint,
+            limit=limits[axis],
         )
     ]

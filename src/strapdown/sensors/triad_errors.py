@@ -121,9 +121,7 @@ class TriadErrors:
             try:
                 value = _plain(f.name, given)
             except (TypeError, ValueError):
-                raise _refused(
-                    f.name, f"{given!r} has not the right shape", _shape(f.name)
-                ) from None
+                raise _refused(f.name, _shape(f.name), given=repr(given)) from None
             object.__setattr__(self, f.name, value)
             _check_range(f.name, value)
         _check_matrix(self.misalignment)
@@ -173,11 +171,12 @@ def triad_of(values: Any) -> Triad:
 
 
 def _shape(name: str) -> str:
+    """Return the code that says which shape it should have."""
     if name in TRIADS:
-        return "give one number, or three: x, y, z"
+        return "sensors.not-one-or-three-numbers"
     if name in ("misalignment", "g_sensitivity"):
-        return "give three rows of three numbers"
-    return "give one number"
+        return "sensors.not-three-rows-of-three"
+    return "sensors.not-one-number"
 
 
 def _numbers(value: Any) -> list[float]:
@@ -201,7 +200,9 @@ def _check_range(name: str, value: Any) -> None:
 def _check_matrix(misalignment: Sequence[Sequence[float]]) -> None:
     for i, row in enumerate(misalignment):
         if row[i] != 0.0:
-            raise _refused("misalignment", "sensors.element", i=i + 1, at_row=row[i])
+            raise _refused(
+                "misalignment", "sensors.misalignment-diagonal-not-zero", i=i + 1, at_row=row[i]
+            )
         if sum(abs(x) for x in row) >= 1.0:
             raise _refused(
                 "misalignment", "sensors.row-sums-rad", i=i + 1, sum=sum(abs(x) for x in row)
@@ -230,5 +231,5 @@ def _check_curve(errors: TriadErrors) -> None:
             raise _refused("nonlinearity", "sensors.slope-falls-nominal-within-range", least=least)
 
 
-def _refused(name: str, what: str, remedy: str) -> ConfigError:
-    return ConfigError("sensors.message", quantity=name, message=what, remedy_text=remedy)
+def _refused(name: str, code: str, **values: Any) -> ConfigError:
+    return ConfigError(code, quantity=name, data=values)

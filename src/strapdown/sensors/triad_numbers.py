@@ -13,8 +13,18 @@ from strapdown.tables.checks import is_number
 FARTHEST = 30.0  # m
 
 
-def triple(given: Any, quantity: str, remedy: str, file: str | None = None) -> Triad:
+def triple(given: Any, quantity: str, code: str, file: str | None = None, **values: Any) -> Triad:
     """Three finite numbers.
+
+    Parameters
+    ----------
+    given : object
+    quantity : str
+    code : str
+        Of the error, whose data hold `given` and `values`.
+    file : str, optional
+    **values
+        Further data of the error.
 
     Raises
     ------
@@ -26,13 +36,7 @@ def triple(given: Any, quantity: str, remedy: str, file: str | None = None) -> T
     except (TypeError, ValueError):
         x = y = z = math.nan
     if isinstance(given, str) or not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
-        raise ConfigError(
-            "sensors.message",
-            file=file,
-            quantity=quantity,
-            message=f"{given!r} are not three finite numbers",
-            remedy_text=remedy,
-        )
+        raise ConfigError(code, file=file, quantity=quantity, data={**values, "given": repr(given)})
     return x, y, z
 
 
@@ -51,5 +55,9 @@ def check_sd(given: Any, quantity: str, unit: str, file: str | None = None) -> N
     """
     if not finite(given) or given < 0.0:
         raise ConfigError(
-            "sensors.no-standard-deviation-2", file=file, quantity=quantity, given=given, unit=unit
+            "sensors.standard-deviation-invalid",
+            file=file,
+            quantity=quantity,
+            given=given,
+            unit=unit,
         )

@@ -121,4 +121,4 @@ def _numbers(given: Any, name: str) -> tuple[float, ...]:
             raise TypeError
         return tuple(float(x) for x in numbers)
     except TypeError:
-        raise ConfigError("sensors.no-number-2", quantity=name, given=given) from None
+        raise ConfigError("sensors.uncertainty-not-a-number", quantity=name, given=given) from None

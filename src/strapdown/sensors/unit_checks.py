@@ -81,12 +81,12 @@ def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
     missing = [c for c in columns if c not in triad.table.columns]
     if missing:
         raise DataError(
-            "sensors.no-motion-space-needs-three"
+            "sensors.accelerometer-axes-missing"
             if columns == ACCEL
-            else "sensors.no-motion-space-needs-three-2",
+            else "sensors.gyro-axes-missing",
             file=source,
             quantity=missing[0],
-            missing=" and no ".join(missing),
+            missing=missing,
         )
     if triad.table.attrs.get("sampling") not in SAMPLINGS:
         raise DataError(
@@ -97,7 +97,9 @@ def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
             samplings=SAMPLINGS,
         )
     if len(triad.table) < 2:
-        raise DataError("sensors.samples", file=source, quantity="time", count=len(triad.table))
+        raise DataError(
+            "sensors.too-few-samples-of-unit", file=source, quantity="time", count=len(triad.table)
+        )
     check_time(_stamps(triad), source)
     values = np.ascontiguousarray(triad.table[columns].to_numpy(dtype=np.float64))
     check_rows(values, columns, source)
@@ -114,7 +116,7 @@ def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
     if own.size == time.size and float(np.abs(own - time).max()) <= slack:
         return
     raise DataError(
-        "sensors.stamps-not-2",
+        "sensors.triad-stamps-differ",
         file=f"{unit.name}, {triad.name}",
         quantity="time",
         size=own.size,
@@ -130,9 +132,7 @@ def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
 def _gaps(unit: CrashUnit, time: Array) -> tuple[Finding, ...]:
     return tuple(
         Finding(
-            "sensors.ms-without-sample-ms-usual"
-            if gap.end > 0.0
-            else "sensors.ms-without-sample-ms-usual-2",
+            "sensors.gap-after-trigger" if gap.end > 0.0 else "sensors.gap-before-trigger",
             file=unit.name,
             row=gap.sample + 1,
             quantity="time",

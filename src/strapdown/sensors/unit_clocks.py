@@ -123,7 +123,7 @@ def clocks_by_correlation(
 def _trigger(unit: CrashUnit) -> float:
     if unit.trigger is None or not math.isfinite(unit.trigger):
         raise DataError(
-            "sensors.no-trigger" if unit.trigger is None else "sensors.trigger",
+            "sensors.no-trigger" if unit.trigger is None else "sensors.trigger-not-finite",
             file=unit.name,
             quantity="trigger",
             trigger=unit.trigger,
@@ -172,14 +172,14 @@ def _delay(reference: UnitChannels, u: UnitChannels) -> tuple[Delay, str]:
         try:
             found.append((find_delay(_length(first[-1]), _length(second[-1])), what))
         except DataError as error:
-            errors.append(f"{what}: {error.finding.what}")
+            errors.append(error.finding.replace(shown=what))
     if not found:
         raise DataError(
-            "sensors.cannot-laid-over",
+            "sensors.cannot-laid-over" if errors else "sensors.no-triads-to-lay-over",
             file=u.unit.name,
             quantity="time",
             name=reference.unit.name,
-            errors="; ".join(errors) or "no triads",
+            errors=errors,
         )
     return min(found, key=lambda f: f[0].sd)
 

@@ -33,7 +33,7 @@ def check_options(
         There is no unit, two have one name, or an option is not understood.
     """
     if not units:
-        raise ConfigError("sensors.no-unit-2", quantity="units")
+        raise ConfigError("sensors.no-units-given", quantity="units")
     names = [u.name for u in units]
     twice = sorted({n for n in names if names.count(n) > 1})
     if twice:
@@ -48,17 +48,17 @@ def check_options(
         )
     if sampling not in SAMPLINGS:
         raise ConfigError(
-            "sensors.no-kind-sampling-2",
+            "sensors.common-sampling-unknown",
             quantity="sampling",
             sampling=sampling,
             word=str(sampling),
             known=SAMPLINGS,
         )
     if not (finite(rate) and rate > 0.0):
-        raise ConfigError("sensors.hz-no-rate-2", quantity="rate", rate=rate)
+        raise ConfigError("sensors.common-rate-not-positive", quantity="rate", rate=rate)
     if reference is not None and reference not in names:
         raise ConfigError(
-            "sensors.no-unit-3",
+            "sensors.reference-unit-not-among",
             quantity="reference",
             reference=reference,
             word=reference,

@@ -116,28 +116,28 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
     assumed = unit.assumed
     if assumed is None:
         return []
-    begin, end = assumed.over
-    over = f"between {begin:g} and {end:g} s"
-    why = f", because {assumed.because}" if assumed.because else ""
+    because = (
+        [Finding("sensors.assumed-because", severity="note", because=assumed.because)]
+        if assumed.because
+        else []
+    )
     absent = () if unit.gyro is None or unit.lender is not None else unit.gyro.absent
     if absent:
-        names = [GYRO[k] for k in absent]
-        what = "gyro" if len(absent) == 3 else f"{' and no '.join(names)}"
         kept = [
             n for n, p in zip(TURNS, np.diagonal(unmeasured_turns(unit)), strict=True) if p > PART
         ]
-        rollover = "; whether it rolled over cannot be told" if "roll" in kept else ""
         found.append(
             Finding(
-                "sensors.no-taken-vehicle-turned-sd",
+                "sensors.roll-assumed" if "roll" in kept else "sensors.turning-assumed",
+                severity="note",
                 file=unit.name,
                 quantity="gyro",
-                what=what,
-                said=_said(assumed.sd_of("turn_sd_deg"), kept, TURNS),
-                listed=_listed(kept),
-                over=over,
-                why=why,
-                rollover=rollover,
+                missing=["gyro"] if len(absent) == 3 else [GYRO[k] for k in absent],
+                sd=_said(assumed.sd_of("turn_sd_deg"), kept, TURNS),
+                axes=kept,
+                begin=assumed.over[0],
+                end=assumed.over[1],
+                because=because,
             )
         )
     absent = unit.accelerometers[0].absent
@@ -148,14 +148,16 @@ def assumed_findings(unit: CrashUnit) -> list[Finding]:
         ]
         found.append(
             Finding(
-                "sensors.no-taken-vehicle-changed-velocity",
+                "sensors.velocity-change-assumed",
+                severity="note",
                 file=unit.name,
                 quantity=names[0],
-                names=" and no ".join(names),
-                said=_said(assumed.sd_of("delta_v_sd"), kept, AXES),
-                listed=_listed(kept),
-                over=over,
-                why=why,
+                missing=names,
+                sd=_said(assumed.sd_of("delta_v_sd"), kept, AXES),
+                axes=kept,
+                begin=assumed.over[0],
+                end=assumed.over[1],
+                because=because,
             )
         )
     return found
@@ -205,10 +207,7 @@ def _projection(C: Array, absent: Sequence[int]) -> Array:
     return np.asarray(columns @ columns.T)
 
 
-def _said(sds: Triad, kept: Sequence[str], names: Sequence[str]) -> str:
-    numbers = [f"{sds[names.index(n)]:g}" for n in kept]
-    return numbers[0] if len(set(numbers)) == 1 else ", ".join(numbers)
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+def _said(sds: Triad, kept: Sequence[str], names: Sequence[str]) -> list[float]:
+    """Return one standard deviation for each axis that is kept, or one for all."""
+    numbers = [sds[names.index(n)] for n in kept]
+    return numbers[:1] if len(set(numbers)) == 1 else numbers

@@ -58,32 +58,25 @@ def _event(
     when = float(time[event.row])
     step = float(time[1] - time[0]) if time.size > 1 else 0.0
     since = float(time[event.since]) if event.since >= 0 else float(time[0] + event.since * step)
-    words = " and ".join(_words(c) for c in channels)
-    if event.kind == "readmitted":
-        what = f"{words} agrees with the others again, and is used from {when:.6g} s on"
-        remedy = "look into why it failed before"
-    else:
-        off = (
-            f"{abs(event.size):.3g} {unit} apart since {since:.6g} s (chi-square "
-            f"{event.chi_square:.3g}, limit {event.limit:.3g})"
-        )
-        if event.kind == "excluded" and len(channels) > 1:
-            what = f"unit {channels[0].split('.')[0]} disagrees with the others, {off}: excluded"
-        elif event.kind == "excluded":
-            what = f"{words} is off what the others tell, {off}: excluded"
-        else:
-            what = f"{words} disagree, {off}, and nothing tells which is wrong: both go on"
-        remedy = (
-            "a third unit would tell which; until then end the run there, or state larger errors"
-            if event.kind == "disagree"
-            else "look at its cable, its power and its mounting; the others go on without it"
-        )
+    code = {
+        "readmitted": "sensors.channel-readmitted",
+        "excluded": "sensors.channel-excluded",
+        "disagree": "sensors.channels-disagree",
+    }[event.kind]
+    if event.kind == "excluded" and len(channels) > 1:
+        code = "sensors.unit-excluded"
     finding = Finding(
-        "sensors.message",
+        code,
         row=before + event.row + 1,
         quantity=channels[0],
-        message=what,
-        remedy_text=remedy,
+        channels=[_words(c) for c in channels],
+        name=channels[0].split(".")[0],
+        time=when,
+        since=since,
+        size=abs(event.size),
+        unit=unit,
+        chi_square=event.chi_square,
+        limit=event.limit,
     )
     return VoteEvent(
         event.kind, channels, when, since, event.size, event.chi_square, event.limit, finding

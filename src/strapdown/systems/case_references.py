@@ -109,7 +109,7 @@ def compare_reference(
         change = delta_v(unit.acceleration, start, end, across_gaps=True)
     except DataError as error:
         raise DataError(
-            "crash.reference",
+            "crash.reference-span-outside-record",
             file=unit.name,
             quantity="over_s",
             name=spec.name,

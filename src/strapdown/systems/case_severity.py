@@ -8,7 +8,7 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.severity import SEVERITY_MODELS, find_severity_model
 from strapdown.crash.severity_model import InjuryRisk, SeverityModel, injury_risk
 from strapdown.crash.unit_reconstruction import UnitReconstruction
-from strapdown.errors import DataError
+from strapdown.errors import DataError, Finding
 
 __all__ = ["SeverityAnswer", "case_severity", "main_event"]
 
@@ -21,13 +21,13 @@ class SeverityAnswer:
     ----------
     model : SeverityModel
     risk : InjuryRisk or None
-    because : str
+    because : Finding or None
         Why there is none.
     """
 
     model: SeverityModel
     risk: InjuryRisk | None
-    because: str = ""
+    because: Finding | None = None
 
 
 def main_event(unit: UnitReconstruction) -> int | None:
@@ -76,7 +76,7 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
         try:
             answers.append(SeverityAnswer(model, injury_risk(model, inputs, sd)))
         except DataError as error:
-            answers.append(SeverityAnswer(model, None, error.finding.what))
+            answers.append(SeverityAnswer(model, None, error.finding))
     return tuple(answers)
 
 

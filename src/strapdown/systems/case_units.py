@@ -88,12 +88,5 @@ def _triad(
     try:
         uncertainty = stated_uncertainty(TRIADS[quantity], spec.uncertainty, sensor)
     except ConfigError as error:
-        found = error.finding
-        raise ConfigError(
-            "crash.message",
-            file=f"{unit.name}, {name}",
-            quantity=found.quantity,
-            message=found.what,
-            remedy_text=found.remedy,
-        ) from None
+        raise error.replaced(file=f"{unit.name}, {name}") from None
     return RecordedTriad(table, uncertainty, name)

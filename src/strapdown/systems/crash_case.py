@@ -23,7 +23,6 @@ from strapdown.systems.attitude_source import input_files, sensor_file
 from strapdown.systems.case_references import ReferenceAnswer, compare_reference
 from strapdown.systems.case_severity import SeverityAnswer, case_severity
 from strapdown.systems.case_units import case_unit
-from strapdown.systems.case_words import in_case_words, saying_case_words
 from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
@@ -106,21 +105,20 @@ def run_case(
     inputs = _inputs(spec, case_file, records)
     progress("reconstructing", 0.15)
     options = spec.options
-    with saying_case_words():
-        made = reconstruct_crash(
-            units,
-            entry,
-            point=spec.point.position_m,
-            window=options.window_s,
-            rate=options.rate_hz,
-            sampling=options.sampling,
-            clock=options.clock,
-            combine=options.combine,
-            preparation=_preparation(spec),
-            peak_window=options.peak_window_s,
-            rule=EventRule(zero_at=options.zero_at),
-            gravity=options.gravity_m_per_s2,
-        )
+    made = reconstruct_crash(
+        units,
+        entry,
+        point=spec.point.position_m,
+        window=options.window_s,
+        rate=options.rate_hz,
+        sampling=options.sampling,
+        clock=options.clock,
+        combine=options.combine,
+        preparation=_preparation(spec),
+        peak_window=options.peak_window_s,
+        rule=EventRule(zero_at=options.zero_at),
+        gravity=options.gravity_m_per_s2,
+    )
     findings += made.findings
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed)
@@ -139,7 +137,7 @@ def run_case(
         samples,
         case_severity(spec, made.main),
         references,
-        tuple(dict.fromkeys(map(in_case_words, findings))),
+        tuple(dict.fromkeys(findings)),
     )
 
 

@@ -39,13 +39,8 @@ def check_crash_options(
     """
     _check_units(units)
     if not (entry is None or isinstance(entry, Entry | GnssEntry)):
-        raise _kind(
-            entry,
-            "entry",
-            "give Entry.from_speed(speed in m/s, its standard deviation), a GnssEntry, or None "
-            "for a vehicle that stood still when the record began",
-        )
-    place = triple(point, "point", "give forward, right, down in m from the vehicle's origin")
+        raise _wrong_type("entry", entry)
+    place = triple(point, "point", "sensors.point-not-three-numbers")
     if math.hypot(*place) > FARTHEST:
         raise ConfigError(
             "crash.vehicle-origin", quantity="point", place=place, hypot=math.hypot(*place)
@@ -53,44 +48,39 @@ def check_crash_options(
     if window is not None:
         _check_window(window)
     if not (preparation is None or isinstance(preparation, Mapping)):
-        raise _kind(
-            preparation, "preparation", "give options of prepare_unit, as {'levelling': (0, 0, 1)}"
-        )
+        raise _wrong_type("preparation", preparation)
     names = {unit.name for unit in units}  # type: ignore[attr-defined]
     for name, given in (preparation or {}).items():
-        remedy = (
-            "give options for all units as {'gravity': 9.81}, and those of one under its name, as "
-            "{'IMU1': {'levelling': (0, 0, 1)}}"
-        )
         if name in names and not isinstance(given, Mapping):
-            raise _kind(given, f"preparation, {name}", remedy)
+            raise ConfigError(
+                "crash.preparation-of-unit-of-wrong-type",
+                quantity=f"preparation, {name}",
+                type=type(given).__name__,
+            )
         if name not in names and isinstance(given, Mapping):
             raise ConfigError(
-                "crash.message",
-                quantity="preparation",
-                message=f"there is no unit {name!r}",
-                remedy_text=remedy,
+                "crash.preparation-of-unknown-unit", quantity="preparation", name=name
             )
     if not (finite(peak_window) and peak_window > 0.0):  # type: ignore[operator]
         raise ConfigError("crash.no-length", quantity="peak_window", peak_window=peak_window)
     if not isinstance(rule, EventRule):
-        raise _kind(rule, "rule", "give an EventRule, or leave it out for 49 CFR 563")
+        raise _wrong_type("rule", rule)
     if not isinstance(gravity, int | float):
-        raise _kind(gravity, "gravity", "give m/s², or leave it out")
+        raise _wrong_type("gravity", gravity)
     if not (mechanization is None or isinstance(mechanization, NorthEastDown)):
-        raise _kind(mechanization, "mechanization", "give NorthEastDown(), or leave it out")
+        raise _wrong_type("mechanization", mechanization)
 
 
 def _check_units(units: object) -> None:
     if isinstance(units, CrashUnit):
         raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
     if units is None or (isinstance(units, Sequence) and not units):
-        raise DataError("crash.none-4", quantity="units")
+        raise DataError("crash.no-units-given", quantity="units")
     if not isinstance(units, Sequence) or isinstance(units, str):
-        raise _kind(units, "units", "give a list of CrashUnit")
+        raise _wrong_type("units", units)
     for unit in units:
         if not isinstance(unit, CrashUnit):
-            raise _kind(unit, "units", "give a list of CrashUnit")
+            raise _wrong_type("units", unit)
 
 
 def _check_window(window: Any) -> None:
@@ -99,13 +89,10 @@ def _check_window(window: Any) -> None:
     except (TypeError, ValueError):
         begin = end = math.nan
     if not (math.isfinite(begin) and math.isfinite(end) and begin < end):
-        raise ConfigError("crash.no-window-2", quantity="window", window=window)
+        raise ConfigError("crash.window-not-a-pair", quantity="window", window=window)
 
 
-def _kind(given: object, quantity: str, remedy: str) -> ConfigError:
+def _wrong_type(quantity: str, given: object) -> ConfigError:
     return ConfigError(
-        "crash.message",
-        quantity=quantity,
-        message=f"this is of kind {type(given).__name__}",
-        remedy_text=remedy,
+        f"crash.{quantity}-of-wrong-type", quantity=quantity, type=type(given).__name__
     )

@@ -96,7 +96,7 @@ class CrashReconstruction:
             if unit.name == name:
                 return unit
         raise ConfigError(
-            "crash.no-unit", quantity="unit", name=name, units=[u.name for u in self.units]
+            "crash.unit-unknown", quantity="unit", name=name, units=[u.name for u in self.units]
         )
 
 

@@ -296,7 +296,7 @@ def test_models_of_the_type_are_asked_or_those_that_are_named(result, main):
     assert {a.model.name for a in result.severity} == {
         f"wang_2022_front_{k}" for k in ("mais1", "mais2", "mais3", "mais4", "mais5", "fatal")
     }
-    assert all(a.risk is not None and a.because == "" for a in result.severity)
+    assert all(a.risk is not None and a.because is None for a in result.severity)
 
     def asked(**options):
         own = result.spec.options.model_copy(update=options)
@@ -310,7 +310,8 @@ def test_models_of_the_type_are_asked_or_those_that_are_named(result, main):
     own = result.spec.options.model_copy(update=front)
     (other,) = case_severity(result.spec.model_copy(update={"options": own}), rear)
     assert other.risk is None
-    assert "rear" in other.because
+    assert other.because.code == "crash.model-for-others-refused"
+    assert other.because.data["category"] == "rear"
     with pytest.raises(ConfigError, match="mais9"):
         asked(severity=("wang_2022_front_mais9",))
 

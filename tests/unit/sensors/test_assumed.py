@@ -184,16 +184,17 @@ class TestWords:
     def test_what_is_assumed_is_told(self):
         stated = Assumed(turn_sd_deg=(2.0, 2.0, 5.0), delta_v_sd=1.5, because="both marks agree")
         turn, axis = assumed_findings(with_gyro(with_filled_axes(unit(assumed=stated))))
-        assert turn.what == (
-            "it has no gyro: it is taken that the vehicle turned by 0 ± 2, 2, 5 deg (1 sd) in "
-            "roll, pitch and heading between 0 and 0.15 s, because both marks agree"
-        )
-        assert "rolled over cannot be told" in turn.remedy
-        assert axis.what == (
-            "it has no accel_y: it is taken that the vehicle changed its velocity by 0 ± 1.5 m/s "
-            "(1 sd) along right between 0 and 0.15 s, and that gravity's part stayed that at rest, "
-            "because both marks agree"
-        )
+        # It may have rolled over, and nothing shows it.
+        assert turn.code == "sensors.roll-assumed"
+        assert turn.data["missing"] == ("gyro",) and turn.data["sd"] == (2.0, 2.0, 5.0)
+        assert turn.data["axes"] == ("roll", "pitch", "heading")
+        assert axis.code == "sensors.velocity-change-assumed"
+        assert axis.data["missing"] == ("accel_y",) and axis.data["sd"] == (1.5,)
+        assert axis.data["axes"] == ("right",)
+        for found in (turn, axis):
+            assert (found.data["begin"], found.data["end"]) == (0.0, 0.15)
+            assert "because both marks agree" in found.sentence()
+            assert found.advice()
         assert (turn.file, turn.quantity, axis.quantity) == ("EDR", "gyro", "accel_y")
 
     def test_a_whole_unit_has_nothing_to_tell(self):

@@ -146,7 +146,7 @@ def test_a_file_of_ones_own_is_read_in_the_same_form(tmp_path):
         ('source = "ds", place', 'source = "d", place', None, "did you mean 'ds'"),
         (', source = "ds" }\nfull', " }\nfull", "gyro.bias_bound_deg_per_s", "either a source or"),
         ('assumed = "a guess"', 'assumed = "a", source = "ds"', None, "either a source or"),
-        ('{ value = 500.0, assumed = "a guess" }', "500.0", None, "says not where it is from"),
+        ('{ value = 500.0, assumed = "a guess" }', "500.0", None, "does not state its source"),
         ("place =", "page =", None, "did you mean 'place'"),
         (
             "output_rate_hz",

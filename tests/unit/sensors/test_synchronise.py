@@ -396,7 +396,7 @@ def test_what_a_shorter_record_takes_from_the_others_is_told():
         ),
         (
             lambda: [with_table(imu(), lambda t: t.drop(t.index[100:110]), gyro=True)],
-            ["IMU1, gyro, row 101", "1 gap", "55 ms"],
+            ["IMU1, gyro, row 101", "a gap of 55 ms"],
         ),
         (
             lambda: [with_table(imu(), lambda t: t / 9.80665)],

@@ -116,6 +116,6 @@ def flail_space(
         rest, values = from_start(t, a, at, "ORA")
         ora = [largest_mean(rest, values[:, k], WINDOW)[0] / STANDARD_GRAVITY for k in (0, 1)]
     except DataError:
-        found = Finding("crash.record-ends-less-than-ms", quantity="ORA", at=at)
+        found = Finding("crash.record-ends-before-ora", quantity="ORA", at=at)
         return FlailSpace(x, y, at, None, None, (found,))
     return FlailSpace(x, y, at, ora[0], ora[1])

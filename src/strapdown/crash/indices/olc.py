@@ -78,12 +78,14 @@ def olc(
     0.300 - 0.065 = 0.235 m). Exact for acceleration that is linear between samples.
     """
     if not (math.isfinite(whole) and 0.0 <= free < whole):
-        raise ConfigError("crash.ways", quantity="free, whole", free=free, whole=whole)
+        raise ConfigError(
+            "crash.olc-ways-out-of-order", quantity="free, whole", free=free, whole=whole
+        )
     t, a = from_start(*checked(time, accel_x, None, "accel_x"), start, "start")
     lost, ahead = integrals(t, -a)
     begin = first_reach(t, ahead, lost, free)
     if begin is None:
-        return Olc(None, None, None, (_weak(f"{float(ahead.max()):.3g} m", free),))
+        return Olc(None, None, None, (_weak(float(ahead.max()), free),))
     rest = t - begin
     way = ahead - 0.5 * lost * rest
     slope = 0.5 * (lost + a * rest)
@@ -96,13 +98,13 @@ def olc(
     slopes = np.concatenate([[0.5 * at_begin[1]], slope[later]])
     end = first_reach(knots, ways, slopes, whole)
     if end is None:
-        return Olc(None, begin - start, None, (_weak(f"{float(ways.max()):.3g} m", whole),))
+        return Olc(None, begin - start, None, (_weak(float(ways.max()), whole),))
     velocity = cubic(t, ahead, lost, end)[1]
     value = velocity / (end - begin) / STANDARD_GRAVITY
     return Olc(value, begin - start, end - start)
 
 
-def _weak(reached: str, needed: float) -> Finding:
+def _weak(reached: float, needed: float) -> Finding:
     return Finding(
         "crash.occupant-moves-relative-vehicle-not", quantity="OLC", reached=reached, needed=needed
     )

@@ -210,6 +210,6 @@ def _after_impact(
         rest, values = from_start(time, np.hypot(accel[:, 0], accel[:, 1]), at, "PHD")
         phd, begins = largest_mean(rest, values, WINDOW)
     except DataError:
-        found = Finding("crash.record-ends-less-than-ms-2", quantity="PHD", at=at)
+        found = Finding("crash.record-ends-before-phd", quantity="PHD", at=at)
         return None, None, (found,)
     return phd / STANDARD_GRAVITY, begins, ()

@@ -47,7 +47,9 @@ def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
             real = file.resolve()
             if real in seen:
                 raise ConfigError(
-                    "crash.named-twice" if seen[real] != str(given) else "crash.named-twice-2",
+                    "crash.record-named-twice-differently"
+                    if seen[real] != str(given)
+                    else "crash.record-named-twice",
                     file=file.name,
                     quantity="RECORD",
                     seen=seen[real],
@@ -110,9 +112,8 @@ def _nothing(
 ) -> DataError:
     told = [f"{', '.join(p.channels.values())}: {p.kind}" for p in parts]
     told += [f"{s.what}: {s.why}" for s in skipped]
-    shown = "; ".join(told[:8]) + ("; …" if len(told) > 8 else "")
     return DataError(
-        "crash.no-accelerometer-made-out",
+        "crash.no-accelerometer-found" if told else "crash.nothing-in-record",
         file=", ".join(r.path.name for r in records[:3]),
-        value_shown=shown or "there is nothing in it",
+        parts=told[:8] + ["…"] * (len(told) > 8),
     )

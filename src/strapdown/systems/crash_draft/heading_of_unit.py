@@ -134,5 +134,5 @@ def _meanings(unit: Unit) -> str:
             continue
         told.append(f"{turn:g}{_pointing(unit, turn)} makes it a blow from {side_of(came)}")
     if not told:
-        return "only you know which way it faces: the record does not tell it"
-    return "only you know which way it faces: " + ", ".join(told)
+        return "the record does not tell it"
+    return ", ".join(told)

@@ -99,8 +99,7 @@ def _part(
         try:
             curves[axis] = channel.load()
         except DataError as error:
-            what = error.finding.what
-            skipped.append(Skipped(path, f"channel {channel.name}", what, (channel.name,)))
+            skipped.append(Skipped(path, f"channel {channel.name}", error.finding, (channel.name,)))
             continue
         chosen[axis] = channel
     if spare:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.errors import Finding
+
 Array = NDArray[np.float64]
 
 __all__ = ["Clock", "Part", "Skipped"]
@@ -32,7 +34,9 @@ class Clock:
     candidates : str
         Units that it may be, in words, where `unit` is empty.
     stated : bool
-        There is no column, and a line above the table states the rate.
+        There is no column, and a line above the table states the rate; or its stamps are rounded.
+    rate_why : str
+        What the rate of rounded stamps was concluded from.
     """
 
     column: str
@@ -42,6 +46,7 @@ class Clock:
     rate: float
     candidates: str = ""
     stated: bool = False
+    rate_why: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +65,7 @@ class Part:
     unit : str
         Empty where it is not known.
     why : str
-        How kind, axes and unit are known.
+        How kind and axes are known.
     candidates : str
         Units that it may be, in words, where `unit` is empty.
     time : ndarray, (n,), s
@@ -69,6 +74,8 @@ class Part:
         In SI, by the likeliest unit where it is not known; NaN for axes that are missing.
     label : str
         What tells it from the others of its record.
+    unit_why : tuple of str
+        How the unit is known, where it is not with the axes.
     zeroed : bool
         Gravity at rest has been taken off.
     sampling : str
@@ -101,6 +108,7 @@ class Part:
     values: Array
     candidates: str = ""
     label: str = ""
+    unit_why: tuple[str, ...] = ()
     zeroed: bool = False
     sampling: str = ""
     full_scale: float | None = None
@@ -137,5 +145,13 @@ class Skipped:
 
     path: str
     what: str
-    why: str
+    reason: str | Finding
     names: tuple[str, ...] = field(default=())
+
+    @property
+    def why(self) -> str:
+        """The reason in words, with its row."""
+        if isinstance(self.reason, str):
+            return self.reason
+        row = "" if self.reason.row is None else f" in row {self.reason.row}"
+        return f"{self.reason.sentence('file')}{row}"

@@ -147,9 +147,15 @@ def _by_elimination(part: Part, known: Sequence[Part]) -> Part | None:
     beside = any(q.path == part.path or _together(q, part) for q in known)
     if part.kind == "rate" or (not part.kind and beside and len(part.axes) == 3):
         said = gyro_unit(part.time, values, quiet)
-        why = "" if part.kind else "it does not follow the accelerations, and rests near zero; "
+        why = "" if part.kind else "it does not follow the accelerations, and rests near zero"
         if said.settled:
-            return _scaled(part, "rate", said.unit, GYRO_UNITS[said.unit], why + said.why)
+            return _scaled(
+                part,
+                "rate",
+                said.unit,
+                GYRO_UNITS[said.unit],
+                "; ".join(filter(None, (why, said.why))),
+            )
         return _asked(part, "rate", said.unit, GYRO_UNITS, _rates, why)
     said = accel_unit(part.values, part.step, quiet) if len(part.axes) == 3 else _likeliest(part)
     zeroed = bool(np.abs(quiet.mean).max() < ZEROED * np.abs(values).max())
@@ -172,7 +178,7 @@ def _scaled(part: Part, kind: str, unit: str, factor: float, why: str) -> Part:
         float(np.linalg.norm(quiet.mean)) < 0.3 * STANDARD_GRAVITY and len(part.axes) == 3
     )
     return replace(
-        part, kind=kind, unit=unit, values=values, zeroed=zeroed, why=f"{part.why}; {why}"
+        part, kind=kind, unit=unit, values=values, zeroed=zeroed, unit_why=(*part.unit_why, why)
     )
 
 
@@ -192,7 +198,7 @@ def _asked(
         unit="",
         candidates=told,
         values=part.values * table[unit],
-        why=f"{part.why}{'; ' + why.rstrip('; ') if why else ''}",
+        unit_why=(*part.unit_why, *((why,) if why else ())),
     )
 
 

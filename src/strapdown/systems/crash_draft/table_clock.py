@@ -145,7 +145,7 @@ def evenly(clock: Clock, time: Array) -> tuple[Clock, Array]:
     if float(np.ptp(off)) > ROUNDED * spread or spread > STEP * mean:
         return clock, time
     told = f"its stamps are rounded: evenly spaced within {1e3 * float(np.ptp(off)):.2g} ms"
-    even = replace(clock, rate=1.0 / mean, stated=True, why=f"{clock.why}; {told}")
+    even = replace(clock, rate=1.0 / mean, stated=True, why=f"{clock.why}; {told}", rate_why=told)
     return even, time[0] + count * mean
 
 

@@ -65,10 +65,9 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
     rows = max((len(v) for v in table.columns.values()), default=0)
     if rows < LEAST_SAMPLES:
         raise DataError(
-            "crash.sample-too-few-crash",
+            "crash.one-sample" if rows == 1 else "crash.too-few-samples",
             file=record.path.name,
             rows=rows,
-            value="" if rows == 1 else "s",
             least_samples=LEAST_SAMPLES,
         )
     clock, time = find_clock(table.columns, table.headings)
@@ -144,17 +143,13 @@ def _check_advances(channel: CrashChannel, stamps: Array) -> None:
     k = int(back[0]) + 1
     stays = stamps[k] == stamps[k - 1]
     raise DataError(
-        "crash.message",
+        f"crash.time-{'stays' if stays else 'goes-back'}{'' if back.size == 1 else '-often'}",
         file=channel.file or None,
         row=channel.row(k),
         quantity=f"time ({channel.name})",
-        message=(
-            f"time stays at {stamps[k]:.15g}"
-            if stays
-            else f"time goes from {stamps[k - 1]:.15g} to {stamps[k]:.15g}"
-        )
-        + (f" ({back.size} times such)" if back.size > 1 else ""),
-        remedy_text="sort or correct the rows; if two records were joined, split them",
+        before=stamps[k - 1],
+        time=stamps[k],
+        count=back.size,
     )
 
 
@@ -176,9 +171,9 @@ def _columns(path: str, record: CrashRecord) -> tuple[_Table, list[Skipped]]:
         except DataError as error:
             if _heading(channel).quantity in _KINDS:
                 raise
-            what = str(error.finding.what)
-            row = f" in row {error.finding.row}" if error.finding.row is not None else ""
-            skipped.append(Skipped(path, f"column '{channel.name}'", what + row, (channel.name,)))
+            skipped.append(
+                Skipped(path, f"column '{channel.name}'", error.finding, (channel.name,))
+            )
             continue
         headings[channel.name] = _heading(channel)
         if raw.dtype.kind in "iu" and raw.size and abs(int(raw[0])) > FAR:

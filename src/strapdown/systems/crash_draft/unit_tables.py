@@ -95,8 +95,9 @@ def unit_tables(page: Page, unit: Unit, facing: Facing, units: Sequence[Unit]) -
 def _angles(page: Page, unit: Unit, facing: Facing) -> None:
     sitting = unit.impact.sitting
     turns = "roll, pitch, heading that turn the vehicle's axes into the sensor's, deg"
+    why = facing.why if facing.heading_deg is not None else f"{ONLY}{facing.why}"
     if sitting is None:
-        page.say(turns, facing.why)
+        page.say(turns, why)
         value = [0.0, 0.0, facing.heading_deg] if facing.heading_deg is not None else [None] * 3
         page.key("angles_deg", array(value), what=f"how '{plain(unit.name)}' is turned: {turns}")
         return
@@ -106,7 +107,7 @@ def _angles(page: Page, unit: Unit, facing: Facing) -> None:
         if sitting.along
         else f"found: roll and pitch by gravity at rest, {sitting.length:.2f} m/s² along no axis"
     )
-    page.say(turns, told, facing.why)
+    page.say(turns, told, why)
     came = None if facing.heading_deg is None else direction(unit, facing.heading_deg)
     if facing.heading_deg is None:
         page.say(
@@ -116,7 +117,7 @@ def _angles(page: Page, unit: Unit, facing: Facing) -> None:
     page.key(
         "angles_deg",
         array([sitting.roll_deg, sitting.pitch_deg, facing.heading_deg]),
-        what=f"heading of '{plain(unit.name)}', deg: {facing.why.removeprefix(ONLY)}",
+        what=f"heading of '{plain(unit.name)}', deg: {facing.why}",
         check=""
         if came is None
         else f"'{plain(unit.name)}' faces so that the blow came from {side_of(came)}",
@@ -228,7 +229,7 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
                 f"found: {part.clock.rate:.5g} samples a second",
             )
             if part.clock.stated:
-                why = part.clock.why.split("; ")[-1]
+                why = part.clock.rate_why or part.clock.why
                 page.key("rate_hz", number(part.clock.rate, 9), f"found: {why}")
         else:
             page.key(
@@ -247,7 +248,7 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
         )
     elif part.clock.stated:
         page.key("rate_hz", number(part.clock.rate), f"found: {plain(part.clock.why)}")
-    how = "; ".join(part.why.split("; ")[1:])
+    how = "; ".join(part.unit_why)
     if part.unit:
         page.key("unit", string(part.unit), f"found: {how}" if how else "found")
     else:
@@ -276,7 +277,7 @@ def _triad(page: Page, unit: Unit, part: Part, header: str, k: int, words: str) 
 
 
 def _channels(page: Page, unit: Unit, part: Part) -> None:
-    why = f"found: {part.why.split('; ')[0]}"
+    why = f"found: {part.why}"
     turn = turn_after(unit) if part is unit.gyro else None
     if turn is None or abs(turn) < LEAST_TURN:
         page.key("channels", inline(part.channels), why)
