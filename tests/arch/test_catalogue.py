@@ -1,0 +1,158 @@
+"""The catalogue of sentences and the code that names its entries fit each other."""
+
+from __future__ import annotations
+
+import ast
+import re
+import string
+import tomllib
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from strapdown.errors import Finding
+
+SOURCE = Path(__file__).parents[2] / "src" / "strapdown"
+CATALOGUE = {
+    f"{file.stem}.{code}": entry
+    for file in sorted((SOURCE / "messages").glob("*.toml"))
+    for code, entry in tomllib.loads(file.read_text(encoding="utf-8")).items()
+}
+ROOMS = {file.stem for file in (SOURCE / "messages").glob("*.toml")}
+CODE = re.compile(r"[a-z_]+\.[a-z0-9]+(?:-[a-z0-9]+)*")
+PARTS = {"what", "remedy", *(f"{p}_{w}" for p in ("what", "remedy") for w in ("cli", "file"))}
+LOCATION = {"severity", "file", "row", "quantity", "line", "data"}
+RAISED = {"Finding", "DataError", "ConfigError", "DivergenceError"}
+TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(SOURCE.rglob("*.py"))}
+
+
+def _is_code(text: object) -> bool:
+    return isinstance(text, str) and bool(CODE.fullmatch(text)) and text.split(".")[0] in ROOMS
+
+
+def _codes(node: ast.AST) -> list[str]:
+    return [n.value for n in ast.walk(node) if isinstance(n, ast.Constant) and _is_code(n.value)]
+
+
+def _placeholders(template: str) -> set[str]:
+    names = set()
+    for _, name, spec, _ in string.Formatter().parse(template):
+        if name is not None:
+            names.add(name.split(".")[0])
+            names |= _placeholders(spec or "")
+    return names
+
+
+def test_every_entry_says_something_in_known_words():
+    for code, entry in CATALOGUE.items():
+        assert CODE.fullmatch(code), code
+        assert entry["what"].strip(), code
+        assert set(entry) <= PARTS, code
+
+
+def test_every_code_that_is_raised_has_its_entry():
+    missing = []
+    for path, tree in TREES.items():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            if getattr(node.func, "id", getattr(node.func, "attr", "")) not in RAISED:
+                continue
+            missing += [
+                f"{path.name}:{node.lineno} {code}"
+                for code in _codes(node.args[0])
+                if code not in CATALOGUE
+            ]
+    assert missing == []
+
+
+def test_no_entry_is_left_behind():
+    """An entry is named in full, or by the constant parts of a text that is put together."""
+    whole: set[str] = set()
+    parts: list[re.Pattern[str]] = []
+    for tree in TREES.values():
+        for node in ast.walk(tree):
+            if isinstance(node, ast.JoinedStr):
+                shape = "".join(
+                    re.escape(str(v.value)) if isinstance(v, ast.Constant) else "[a-z0-9-]*"
+                    for v in node.values
+                )
+                if re.match(r"[a-z_]+\\\.", shape):
+                    parts.append(re.compile(shape))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                whole.add(node.value)
+    left = [c for c in CATALOGUE if c not in whole and not any(p.fullmatch(c) for p in parts)]
+    assert left == []
+
+
+def test_what_a_sentence_shows_is_given_where_it_is_raised():
+    """Direct calls with literal codes; what a helper adds is covered by the tests of bad input."""
+    lacking = []
+    for path, tree in TREES.items():
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.Call) or not node.args:
+                continue
+            if getattr(node.func, "id", getattr(node.func, "attr", "")) not in RAISED:
+                continue
+            names = {k.arg for k in node.keywords}
+            if None in names or "data" in names:
+                continue
+            for code in _codes(node.args[0]) if not isinstance(node.args[0], ast.Call) else ():
+                wanted: set[str] = set()
+                for template in CATALOGUE.get(code, {}).values():
+                    wanted |= _placeholders(template)
+                if "nearest" in wanted - names:
+                    wanted = (wanted - {"nearest"}) | {"word", "known"}
+                if wanted - names:
+                    lacking.append(f"{path.name}:{node.lineno} {code} {sorted(wanted - names)}")
+    assert lacking == []
+
+
+#: Where findings are shown to people, and where their sentences go into a file beside the code.
+SHOWN = ("cli", "report", "api")
+
+
+def test_sentences_are_read_only_where_they_are_shown():
+    """A sentence may be shown, never searched: other floors know codes and data."""
+    read = defaultdict(list)
+    for path, tree in TREES.items():
+        room = path.relative_to(SOURCE).parts[0]
+        if room in SHOWN or path.name == "errors.py":
+            continue
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Attribute) and node.attr in {"sentence", "advice", "remedy"}:
+                read[str(path.relative_to(SOURCE))].append(node.lineno)
+    assert dict(read) == {}
+
+
+@pytest.mark.parametrize("words", ["python", "cli", "file"])
+def test_templates_are_sound(words):
+    """Every template can be filled by data of any kind that has its names."""
+
+    class Anything(dict):
+        def __missing__(self, name):
+            return 1.0
+
+    for code, entry in CATALOGUE.items():
+        for template in entry.values():
+            for _, name, spec, conversion in string.Formatter().parse(template):
+                assert name is None or name, f"{code}: a placeholder without a name"
+                assert conversion in (None, "r", "s", "a"), code
+                assert spec is None or "{" not in spec or _placeholders(spec), code
+
+
+def test_a_finding_is_data_and_does_not_change():
+    """Arrays become tuples, and what was given can change without changing the finding."""
+    import numpy as np
+
+    given = [1.0, 2.0]
+    one = Finding("io.x", row=3, values=given, size=np.float64(2.5), table=np.eye(2))
+    given.append(3.0)
+    assert one.data == {"values": (1.0, 2.0), "size": 2.5, "table": ((1.0, 0.0), (0.0, 1.0))}
+    assert type(one.data["size"]) is float
+    with pytest.raises(AttributeError):
+        one.row = 4  # type: ignore[misc]
+    moved = one.replace(row=7, severity="note")
+    assert (moved.row, moved.severity, moved.data, one.row) == (7, "note", one.data, 3)
+    assert moved != one and hash(moved.replace(row=3, severity="warning")) == hash(one)
