@@ -124,12 +124,15 @@ class Gnss(TableAid):
             value = getattr(self, name)
             if not (is_number(value) and math.isfinite(value) and least <= value <= most):
                 raise ConfigError(
-                    "navigation.message",
+                    "navigation.option-not-between"
+                    if math.isfinite(most)
+                    else "navigation.option-below"
+                    if math.isfinite(least)
+                    else "navigation.option-not-finite",
                     quantity=name,
-                    message=f"{value!r} is out of range",
-                    remedy_text="give a finite number"
-                    + (f" from {least:g}" if math.isfinite(least) else "")
-                    + (f" to {most:g}" if math.isfinite(most) else ""),
+                    value=value,
+                    least=least,
+                    most=most,
                 )
         if not (self.use_position or self.use_velocity):
             raise ConfigError(

@@ -87,9 +87,9 @@ def turn_findings(
     )
     return (
         Finding(
-            "alignment.body-turns-about-vertical-h"
+            "alignment.turns-about-vertical-latitude-mirrored"
             if mirrored
-            else "alignment.body-turns-about-vertical-h-2",
+            else "alignment.turns-about-vertical",
             file=source,
             quantity="gyro",
             rate=rate * DEG_PER_HOUR,

@@ -44,7 +44,7 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
     row = int(np.argmax(steps[:, channel])) + 1
     return (
         Finding(
-            "alignment.more-than-times-large-largest",
+            "alignment.outliers-or-shocks",
             file=source,
             row=row + 1,
             quantity=columns[channel],

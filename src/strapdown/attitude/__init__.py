@@ -18,7 +18,7 @@ from strapdown.attitude.quaternion import Quaternion
 from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
-from strapdown.errors import ConfigError, DivergenceError, nearest
+from strapdown.errors import ConfigError, DivergenceError
 from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 

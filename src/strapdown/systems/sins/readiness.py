@@ -103,15 +103,18 @@ def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, ai
     swapped = abs(fix[0]) <= 180.0 and abs(fix[1]) <= 90.0
     swapped = swapped and _apart(fix[[1, 0, 2]], here) <= allowed
     raise DataError(
-        "navigation.message",
+        "navigation.fixes-swap-latitude-and-longitude"
+        if swapped
+        else "navigation.first-fix-far-from-stated-position",
         file=source_of(table),
         row=k + 1,
         quantity="lat, lon",
-        message=f"the first fix, {fix[0]:.6f}°, {fix[1]:.6f}°, is {off / 1000.0:.4g} km from the place in [{name}], {here[0]:.6f}°, {here[1]:.6f}°"
-        + (": latitude and longitude of the fixes seem to be swapped" if swapped else ""),
-        remedy_text="name its columns: columns = {lat = …, lon = …} of this aid"
-        if swapped
-        else f"look at lat_deg and lon_deg in [{name}], or state a position_sd_m that is so large",
+        table=name,
+        lat_deg=fix[0],
+        lon_deg=fix[1],
+        stated_lat_deg=here[0],
+        stated_lon_deg=here[1],
+        apart_km=off / 1000.0,
     )
 
 
