@@ -12,6 +12,8 @@ Templates are those of `str.format`, and besides:
 * a sequence is joined by ", "; ``{names:or}``, ``{names:and}``, ``{names:;}`` join by that word or
   sign, ``{names:list}`` shows it as Python does;
 * a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
+* ``{faults:lines}`` lists findings of one file, each on a line of its own with its location, its
+  sentence and, below it, its remedy;
 * ``{nearest}`` suggests the known word (data `known`, `also`) that is nearest to the data `word`.
 """
 
@@ -24,7 +26,7 @@ from copy import copy
 from functools import cache
 from importlib import resources
 from os import PathLike, fspath
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 __all__ = [
     "ConfigError",
@@ -137,16 +139,21 @@ class Finding:
 
     def text(self, words: Words = "python") -> str:
         """Return where it is, the sentence, and the remedy on a line of its own."""
-        where = [self.file] if self.file else []
-        if self.row is not None:
-            where.append(f"row {self.row}")
-        if self.line is not None:
-            where.append(f"line {self.line}")
-        if self.quantity:
-            where.append(self.quantity)
-        what, remedy = self.sentence(words), self.advice(words)
-        text = f"{', '.join(where)}: {what}" if where else what
+        where = ", ".join([*([self.file] if self.file else []), *self._in_file()])
+        remedy = self.advice(words)
+        text = ": ".join(part for part in (where, self.sentence(words)) if part)
         return f"{text}\n  Remedy: {remedy}" if remedy else text
+
+    def listed(self, words: Words = "python") -> str:
+        """Return it as one of several of a file: indented, and without the name of the file."""
+        remedy = self.advice(words)
+        text = ": ".join(p for p in (", ".join(self._in_file()), self.sentence(words)) if p)
+        return f"  {text}\n    {remedy}" if remedy else f"  {text}"
+
+    def _in_file(self) -> list[str]:
+        where = [f"row {self.row}"] if self.row is not None else []
+        where += [f"line {self.line}"] if self.line is not None else []
+        return [*where, self.quantity] if self.quantity else where
 
     def plain(self) -> dict[str, Any]:
         """Return it as data for JSON: code, severity, location, data, without a sentence."""
@@ -204,7 +211,7 @@ class StrapdownError(Exception):
     def __str__(self) -> str:
         return str(self.finding)
 
-    def replaced(self, **changes: Any) -> StrapdownError:
+    def replaced(self, **changes: Any) -> Self:
         """Return the error with another location or more data, as `Finding.replace`."""
         other = copy(self)
         other.finding = self.finding.replace(**changes)
@@ -297,6 +304,8 @@ class _Sentence(string.Formatter):
         if isinstance(value, tuple):
             if spec == "list":
                 return str(list(value))
+            if spec == "lines":
+                return "\n".join(one.listed(self._words) for one in value)
             if spec in self._JOINTS:
                 return self._JOINTS[spec].join(self.format_field(one, "") for one in value)
             return ", ".join(self.format_field(one, spec) for one in value)

@@ -93,10 +93,10 @@ class AxesTable(TableSpec):
         apart = [n for n in ("gyro_matrix", "accel_matrix") if getattr(self, n) is not None]
         if len(written) > 1 or (written and apart):
             two = [*written, *apart][:2]
-            raise refuse(two[1], "config.says-already", two=two[0])
+            raise refuse(two[1], "config.axes-stated-twice", two=two[0])
         if len(apart) == 1:
             other = "accel_matrix" if apart[0] == "gyro_matrix" else "gyro_matrix"
-            raise refuse(apart[0], "config.missing", other=other)
+            raise refuse(apart[0], "config.matrix-missing", other=other)
         return self
 
 
@@ -180,7 +180,7 @@ class AlignmentSpec(TableSpec):
         if isinstance(data, dict):
             there = [n for n in ("log", "simulation") if data.get(n) is not None]
             if len(there) == 2:
-                raise refuse("simulation", "config.log-given-too")
+                raise refuse("simulation", "config.log-and-simulation")
             if not there:
-                raise refuse("log", "config.missing-2")
+                raise refuse("log", "config.log-missing-in-alignment")
         return data

@@ -41,7 +41,7 @@ def check_alignment(spec: AlignmentSpec, written: Written | None = None) -> None
     check.told(("site", "ellipsoid"), lambda: find_ellipsoid(site.ellipsoid))
     check.axes(spec.axes)
     check.log(spec.log)
-    check.sensors(spec.sensors, spec.simulation, WITHOUT)
+    check.sensors(spec.sensors, spec.simulation, "config.no-sensor-for-alignment")
     check.times(spec)
     check.stages(spec)
     check.chain(spec)
@@ -56,8 +56,8 @@ class _Checks(SourceChecks):
                 raise self.refuse(
                     ("simulation", "duration_s"),
                     "config.samples-too-many",
-                    rate_hz=spec.simulation.rate_hz * longest,
-                    most_samples=MOST_SAMPLES,
+                    count=spec.simulation.rate_hz * longest,
+                    most=MOST_SAMPLES,
                 )
         if (
             longest is not None
@@ -77,20 +77,16 @@ class _Checks(SourceChecks):
         """What one stage leaves, and another needs."""
         kind = spec.coarse.kind
         if kind in NEEDS_GNSS and spec.gnss is None:
-            raise self.refuse(("coarse", "kind"), "config.takes-course-satellite-fixes-none")
+            raise self.refuse(("coarse", "kind"), "config.course-without-fixes")
         if spec.gnss is not None and kind not in NEEDS_GNSS:
             raise self.refuse(
                 ("gnss", "path"),
-                "config.coarse-alignment-takes-no-fixes",
+                "config.coarse-takes-no-fixes",
                 kind=kind,
-                needs_gnss=NEEDS_GNSS[0],
+                other=NEEDS_GNSS[0],
             )
         if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
-            raise self.refuse(
-                ("coarse", "kind"),
-                "config.fine-alignment-follows",
-                not_before_fine=NOT_BEFORE_FINE[kind],
-            )
+            raise self.refuse(("coarse", "kind"), NOT_BEFORE_FINE[kind])
         if spec.fine.kind != "none":
             self.told(("fine",), partial(_begun, spec))
 
@@ -110,10 +106,8 @@ def _begun(spec: AlignmentSpec) -> None:
 
 #: Coarse alignments that need satellite fixes.
 NEEDS_GNSS = ("gnss_course",)
-#: Coarse alignments that a filter over a rest cannot begin from, and why.
+#: Coarse alignments that a filter over a rest cannot begin from, and the code that says why.
 NOT_BEFORE_FINE = {
-    "gnss_course": "it is for a vehicle that moves",
-    "levelling": "it finds no heading",
+    "gnss_course": "config.course-before-fine",
+    "levelling": "config.levelling-before-fine",
 }
-#: What is missing where nothing is said of the sensors.
-WITHOUT = "without that no attitude has a bound: a gyro bias of 0.01 deg/h is 0.05° of heading"

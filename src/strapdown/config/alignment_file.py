@@ -100,9 +100,7 @@ def read_alignment_spec(path: str | Path, *, files: bool = True) -> AlignmentSpe
         There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
         does not fit, or the parts do not go together; the message names the line.
     """
-    file = read_named_toml(
-        Path(path), "an alignment", "an alignment has three levels", ALIGNMENT_WANTED
-    )
+    file = read_named_toml(Path(path), "alignment", ALIGNMENT_WANTED)
     file = replace(file, table=_with_kinds(file.table))
     form = alignment_form(file.table, file)
     spec, written = filled_form(file, form, ALIGNMENT_WANTED, files=files)

@@ -11,7 +11,7 @@ from strapdown.config.shown import shown, shown_key
 from strapdown.config.spec import TableSpec
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError, nearest
+from strapdown.errors import ConfigError
 
 __all__ = ["canonical"]
 
@@ -40,6 +40,10 @@ def canonical(
         A key is not known or lacks its unit, or two give one quantity.
     """
     return _Keys(file, form).read()
+
+
+#: In place of a header: keys before the first one.
+TOP = "the top of the file"
 
 
 class _Keys:
@@ -88,12 +92,12 @@ class _Keys:
     def _twice(self, first: str, second: str, table: dict[str, Any], path: KeyPath) -> ConfigError:
         return self.file.refuse(
             (*path, second),
-            "config.line-quantity-two-units",
-            second=second,
-            table=shown(table[second]),
-            at_line=self.file.line((*path, first)),
-            first=first,
-            table_2=shown(table[first]),
+            "config.quantity-in-two-units",
+            key=second,
+            given=shown(table[second]),
+            other_line=self.file.line((*path, first)),
+            other_key=first,
+            other_given=shown(table[first]),
         )
 
     def _unknown(self, key: str, value: Any, form: type[TableSpec], path: KeyPath) -> ConfigError:
@@ -102,25 +106,21 @@ class _Keys:
         same = [n for n in bases if key == base_of(n)]
         begun = [n for n in bases if key.startswith(f"{base_of(n)}_")]
         elsewhere = [header for header, other in self._forms() if key in _known(other)]
-        what = "there is no such key"
+        at = (*path, key)
         if same:
-            what = f"{shown(value)} has no unit"
-            remedy = f"write {_either(keys_of(same[0]))}"
-        elif begun:
+            keys = keys_of(same[0])
+            return self.file.refuse(at, "config.key-without-unit", given=shown(value), keys=keys)
+        if begun:
             name = max(begun, key=lambda n: len(base_of(n)))
-            remedy = f"write {_either(keys_of(name))}"
-        elif elsewhere:
-            remedy = (
-                f"it belongs to {_either(elsewhere)}: a key belongs to the last header above it, "
-                "so move it there, above any further header"
-            )
-        else:
-            fields = [n for n in form.model_fields if n not in form.unwritten]
-            remedy = nearest(key[:100], fields, also=known)
-        return self.file.refuse((*path, key), what, remedy)
+            return self.file.refuse(at, "config.unknown-unit", keys=keys_of(name))
+        if elsewhere:
+            headers = [shown_key(header) for header in elsewhere]
+            return self.file.refuse(at, "config.key-in-other-table", headers=headers)
+        fields = [n for n in form.model_fields if n not in form.unwritten]
+        return self.file.refuse(at, "config.unknown-key", word=key[:100], known=fields, also=known)
 
     def _forms(self) -> Iterator[tuple[str, type[TableSpec]]]:
-        yield "the top of the file", self.form
+        yield TOP, self.form
         yield from _below(self.form, "")
 
 
@@ -167,10 +167,3 @@ def _known(form: type[TableSpec]) -> dict[str, str]:
     """By every key that is understood, its field."""
     fields = [name for name in form.model_fields if name not in form.unwritten]
     return {key: name for name in fields for key in keys_of(name)}
-
-
-def _either(words: tuple[str, ...] | list[str]) -> str:
-    shown_words = [shown_key(word) for word in words]
-    if len(shown_words) == 1:
-        return shown_words[0]
-    return f"{', '.join(shown_words[:-1])} or {shown_words[-1]}"

@@ -18,9 +18,7 @@ __all__ = ["with_absolute_paths"]
 MOST_NAMES = 10_000
 
 
-def with_absolute_paths(
-    file: TomlFile, table: dict[str, Any], called: str = "the case file"
-) -> dict[str, Any]:
+def with_absolute_paths(file: TomlFile, table: dict[str, Any]) -> dict[str, Any]:
     """Find the files that a case names.
 
     Parameters
@@ -28,8 +26,6 @@ def with_absolute_paths(
     file : TomlFile
     table : dict
         Of the case, already found to be of its form.
-    called : str
-        What the file is, for messages.
 
     Returns
     -------
@@ -42,24 +38,24 @@ def with_absolute_paths(
     ConfigError
         One is not there; the message names the line.
     """
-    found: dict[str, Any] = _resolved(file, table, (), called)
+    found: dict[str, Any] = _resolved(file, table, ())
     return found
 
 
-def _resolved(file: TomlFile, node: Any, path: KeyPath, called: str) -> Any:
+def _resolved(file: TomlFile, node: Any, path: KeyPath) -> Any:
     if isinstance(node, dict):
         return {
-            key: _found(file, value, (*path, key), called)
+            key: _found(file, value, (*path, key))
             if key == "path" or (key == "sensor" and str(value).lower().endswith(".toml"))
-            else _resolved(file, value, (*path, key), called)
+            else _resolved(file, value, (*path, key))
             for key, value in node.items()
         }
     if isinstance(node, list | tuple):
-        return [_resolved(file, value, (*path, k), called) for k, value in enumerate(node)]
+        return [_resolved(file, value, (*path, k)) for k, value in enumerate(node)]
     return node
 
 
-def _found(file: TomlFile, given: Any, path: KeyPath, called: str) -> Any:
+def _found(file: TomlFile, given: Any, path: KeyPath) -> Any:
     if not isinstance(given, str):
         return given
     wanted = file.path.parent.absolute() / given
@@ -69,14 +65,15 @@ def _found(file: TomlFile, given: Any, path: KeyPath, called: str) -> Any:
         kept = beside_sealed_case(file.path, path, given)
         if kept is not None:
             return str(kept)
-        why = f"there is no {shown(given)}"
     except (OSError, ValueError) as error:
-        why = f"{shown(given)} cannot be read: {getattr(error, 'strerror', None) or error}"
-    remedy = f"paths begin at the folder of {called}; check the path"
+        reason = getattr(error, "strerror", None) or error
+        raise file.refuse(
+            path, "config.named-file-unreadable", given=shown(given), reason=reason
+        ) from None
     near = _near(wanted)
     if near:
-        remedy = f"did you mean '{near}'? Else {remedy}"
-    raise file.refuse(path, why, remedy)
+        raise file.refuse(path, "config.named-file-missing-near", given=shown(given), near=near)
+    raise file.refuse(path, "config.named-file-missing", given=shown(given))
 
 
 def _near(wanted: Path) -> str:

@@ -15,7 +15,7 @@ from strapdown.config.slots import Option, Slot, options_of
 from strapdown.config.spec import TableSpec
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError, nearest
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["ChoiceSpec", "choice_form", "make_choice"]
 
@@ -79,13 +79,14 @@ def _unknown(
     slot: Slot, kind: Any, empty: bool, file: TomlFile | None, path: KeyPath
 ) -> ConfigError:
     kinds = [*slot.entries, *([NONE] if empty else [])]
-    what = f"there is no {shown(kind)}" if kind else "it is missing"
-    remedy = nearest(str(kind), kinds) if kind else f"write kind = …; known: {', '.join(kinds)}"
+    finding = (
+        Finding("config.unknown-choice", given=shown(kind), word=str(kind), known=kinds)
+        if kind
+        else Finding("config.choice-missing", key="kind", known=kinds)
+    )
     if file is None:
-        return ConfigError(
-            "config.message", quantity=f"{slot.name}, kind", message=what, remedy_text=remedy
-        )
-    return file.refuse((*path, "kind"), what, remedy)
+        return ConfigError(finding, quantity=f"{slot.name}, kind")
+    return file.refuse((*path, "kind"), finding)
 
 
 def _field(
@@ -211,14 +212,7 @@ def _group(option: Option, spec: TableSpec) -> Any:
 def _inside(error: ConfigError, key: str) -> ConfigError:
     f = error.finding
     quantity = f"{key}, {f.quantity}" if f.quantity else key
-    return ConfigError(
-        "config.message",
-        file=f.file,
-        row=f.row,
-        quantity=quantity,
-        message=f.what,
-        remedy_text=f.remedy,
-    )
+    return error.replaced(quantity=quantity)
 
 
 def _keyed(error: ConfigError, entry: type) -> ConfigError:
@@ -226,11 +220,4 @@ def _keyed(error: ConfigError, entry: type) -> ConfigError:
     f = error.finding
     keys = {o.field: o.key for o in options_of(entry)}
     quantity = keys.get(f.quantity or "", f.quantity)
-    return ConfigError(
-        "config.message",
-        file=f.file,
-        row=f.row,
-        quantity=quantity,
-        message=f.what,
-        remedy_text=f.remedy,
-    )
+    return error.replaced(quantity=quantity)

@@ -9,9 +9,8 @@ from pydantic import Field, StrictInt, ValidationError, create_model
 
 from strapdown.config.choice import ChoiceSpec, choice_form
 from strapdown.config.crash_case import FileName, NotNegative, Number, Positive
-from strapdown.config.shown import shown
 from strapdown.config.slots import SLOTS
-from strapdown.config.spec import TableSpec
+from strapdown.config.spec import TableSpec, misfit
 from strapdown.errors import ConfigError
 
 __all__ = ["CoastMotionTable", "CoastSpec", "CoastStartTable", "coast_spec"]
@@ -94,9 +93,7 @@ def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
     forms: dict[str, Any] = {}
     for kind, given in aiding.items():
         if kind not in KEPT:
-            raise ConfigError(
-                "config.no-aid-can-stay-while", quantity="aiding", kind=kind, kept=KEPT
-            )
+            raise ConfigError("config.aid-not-kept", quantity="aiding", kind=kind, kept=KEPT)
         form = choice_form(SLOTS["aiding"], {"kind": kind, **given}, ChoiceSpec, path=(kind,))
         forms[kind] = (form, ...)
     kept = create_model("Kept", __base__=TableSpec, **forms)
@@ -107,28 +104,9 @@ def coast_spec(table: Mapping[str, Any]) -> CoastSpec:
         raise _refused(error.errors()[0]) from None
 
 
-#: What is said of a number, by the word of pydantic for its limit.
-_LIMITS = {
-    "gt": "give a number above {:g}",
-    "ge": "give {:g} or more",
-    "le": "give at most {:g}",
-}
-
-
 def _refused(error: Any) -> ConfigError:
-    """What pydantic finds, in our words."""
+    """Return what pydantic finds, at the table and key."""
     place = [str(part) for part in error["loc"]]
-    context = error.get("ctx", {})
-    limit = next((key for key in _LIMITS if key in context), None)
-    if limit is not None:
-        what = f"{error['input']:g} is out of range"
-        remedy = _LIMITS[limit].format(float(context[limit]))
-    elif "what" in context:
-        what, remedy = context["what"], context["remedy"]
-        place += [context["key"]]
-    else:
-        what = f"{shown(error['input'])} does not fit: {error['msg'].lower()}"
-        remedy = "give a finite number"
-    return ConfigError(
-        "config.message", quantity=", ".join(place), message=what, remedy_text=remedy
-    )
+    if error["type"] == "refused":
+        place += [error["ctx"]["key"]]
+    return ConfigError(misfit(error), quantity=", ".join(place))

@@ -35,14 +35,13 @@ def _text(value: Any) -> Any:
 def _one_or_three(value: Any) -> Any:
     several = value if isinstance(value, list | tuple) and len(value) == 3 else [value]
     if not all(_is_number(part) for part in several):
-        what = f"{shown(value)} is neither one finite number nor three"
-        raise refuse("", what, "write one number, or one for each axis: [x, y, z]")
+        raise refuse("", "config.not-one-or-three-numbers", given=shown(value))
     return tuple(float(v) for v in several) if len(several) == 3 else float(several[0])
 
 
 def _sizes(value: float | Triple) -> float | Triple:
     if min(value if isinstance(value, tuple) else (value,)) < 0.0:
-        raise refuse("", "config.negative", value=shown(value))
+        raise refuse("", "config.negative-size", given=shown(value))
     return value
 
 
@@ -50,7 +49,7 @@ def _number_or_words(value: Any) -> Any:
     if isinstance(value, str):
         return words(value)
     if not _is_number(value):
-        raise refuse("", "config.neither-finite-number-nor-text", value=shown(value))
+        raise refuse("", "config.not-number-or-text", given=shown(value))
     return float(value)
 
 

@@ -41,10 +41,9 @@ def read_case_spec(path: str | Path, *, files: bool = True) -> CaseSpec:
         does not fit, or two contradict each other; the message names the line, or both.
     """
     path = Path(path)
-    file = read_toml(path, "a case has three levels")
+    file = read_toml(path)
     if "name" in file.table:
-        remedy = "a case is named after its file; write title = …"
-        raise file.refuse(("name",), "there is no such key", remedy)
+        raise file.refuse(("name",), "config.named-after-file", kind="case")
     refuse_placeholders(file)
     table, written = canonical(file, CaseSpec)
     try:

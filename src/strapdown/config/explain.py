@@ -7,20 +7,12 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from strapdown.config.shown import shown, shown_key
+from strapdown.config.spec import misfit
 from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError, nearest
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["explained"]
-
-_REMEDIES = {
-    "string_type": 'write text, in quotation marks: "…"',
-    "float_type": "write a number, without quotation marks and without a unit",
-    "int_type": "write a whole number, without quotation marks",
-    "bool_type": "write true or false, without quotation marks",
-    "finite_number": "give a finite number",
-}
-_OTHER = "give another value; the name of the key tells its unit"
 
 
 def explained(
@@ -52,60 +44,64 @@ def explained(
     # What was converted is told as the file has it.
     converted = _renamed(path, written or {}) != path
     given = _given(file, path, written or {}) if converted else error["input"]
-    if error["type"] == "refused":
-        what, remedy = context["what"], context["remedy"]
-        path = (*path, context["key"]) if context["key"] else path
-    elif error["type"] == "missing":
-        what, remedy = "it is missing", _for_missing(path, wanted)
-    elif error["type"] == "union_tag_not_found":
-        key = context["discriminator"].strip("'")
-        path = (*path, key)
-        what = "it is missing"
-        remedy = f"write {key} = …; known: {', '.join((tags or {})[key])}"
-    elif error["type"] == "union_tag_invalid":
+    if error["type"] == "refused" and error["ctx"]["key"]:
+        path = (*path, error["ctx"]["key"])
+    elif error["type"] in ("union_tag_not_found", "union_tag_invalid"):
         path = (*path, context["discriminator"].strip("'"))
-        known = re.findall(r"'(\w+)'", context["expected_tags"])
-        tag = str(context["tag"])
-        what, remedy = f"there is no '{shown_key(tag)}'", nearest(tag, known)
-    elif error["type"] == "literal_error":
-        path = path[:-1] if path[-1] == "[key]" else path
-        known = re.findall(r"'([^']+)'", context["expected"])
-        what, remedy = f"there is no {shown(given)}", nearest(str(given), known)
-    elif error["type"] in ("model_type", "dict_type"):
-        what = f"{shown(given)} is no table"
-        remedy = f"write [{_header(path)}], and its keys in the lines below"
-    elif error["type"] in ("tuple_type", "list_type"):
-        what, remedy = _no_list(path, given)
-    else:
-        what = f"{shown(given)} does not fit: {error['msg'].lower()}"
-        remedy = _REMEDIES.get(error["type"], _OTHER)
-        if error["type"] == "string_type" and isinstance(given, int | float):
-            remedy = f'write it in quotation marks: {path[-1]} = "{shown(given)}"'
-    where = _in_file(file, path, written or {})
-    quantity = place(_renamed(path, written or {}))
+    elif error["type"] == "literal_error" and path[-1] == "[key]":
+        path = path[:-1]
+    finding = _found(error, path, given, tags or {}, wanted)
     return ConfigError(
-        "config.message",
+        finding,
         file=file.path.name,
-        line=file.line(where),
-        quantity=quantity,
-        message=what,
-        remedy_text=remedy,
+        line=file.line(_in_file(file, path, written or {})),
+        quantity=place(_renamed(path, written or {})),
     )
 
 
-def _for_missing(path: KeyPath, wanted: Callable[[KeyPath], str] | None) -> str:
+def _found(
+    error: Any,
+    path: KeyPath,
+    given: Any,
+    tags: Mapping[str, Sequence[str]],
+    wanted: Callable[[KeyPath], str] | None,
+) -> Finding:
+    """Return what is wrong, without a location."""
+    context, name = error.get("ctx", {}), str(path[-1]) if path else ""
+    match error["type"]:
+        case "missing":
+            return _missing(path, wanted)
+        case "union_tag_not_found":
+            return Finding("config.choice-missing", key=name, known=tags[name])
+        case "union_tag_invalid":
+            known, tag = re.findall(r"'(\w+)'", context["expected_tags"]), str(context["tag"])
+            return Finding(
+                "config.unknown-choice", given=f"'{shown_key(tag)}'", word=tag, known=known
+            )
+        case "literal_error":
+            known = re.findall(r"'([^']+)'", context["expected"])
+            return Finding(
+                "config.unknown-choice", given=shown(given), word=str(given), known=known
+            )
+        case "model_type" | "dict_type":
+            return Finding("config.not-a-table", given=shown(given), header=_header(path))
+        case "tuple_type" | "list_type" if isinstance(given, dict):
+            return Finding("config.one-table-for-list", header=_header(path))
+        case "tuple_type" | "list_type":
+            key = shown_key(name) if isinstance(path[-1], str) else "key"
+            return Finding("config.not-a-list", given=shown(given), key=key)
+        case "string_type" if isinstance(given, int | float):
+            return Finding("config.number-for-text", key=name, given=shown(given))
+    return misfit(error, given)
+
+
+def _missing(path: KeyPath, wanted: Callable[[KeyPath], str] | None) -> Finding:
     if isinstance(path[-1], int):
-        return "give a number for each component"
+        return Finding("config.component-missing")
     known = wanted(path) if wanted else ""
-    return known or f"write {path[-1]} = …; its name tells its unit"
-
-
-def _no_list(path: KeyPath, given: Any) -> tuple[str, str]:
-    name = path[-1] if isinstance(path[-1], str) else "key"
-    if isinstance(given, dict):
-        header = _header(path)
-        return "there may be several, and this is one", f"write [[{header}]], in double brackets"
-    return f"{shown(given)} is no list", f"write {shown_key(name)} = [ … , … ]"
+    if known:
+        return Finding("config.key-missing", wanted=known)
+    return Finding("config.key-missing-with-unit", key=path[-1])
 
 
 def _header(path: KeyPath) -> str:

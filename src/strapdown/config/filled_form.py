@@ -24,16 +24,14 @@ __all__ = ["filled_form", "read_named_toml"]
 Form = TypeVar("Form", bound=TableSpec)
 
 
-def read_named_toml(path: Path, thing: str, levels: str, wanted: Wanted) -> TomlFile:
+def read_named_toml(path: Path, kind: str, wanted: Wanted) -> TomlFile:
     """Read a file that has nothing open, and leaves its name to be that of the file.
 
     Parameters
     ----------
     path : Path
-    thing : str
-        What is named after it, for messages.
-    levels : str
-        How many levels its tables have, for messages.
+    kind : str
+        Kind of the file, for messages: ``run``.
     wanted : Wanted
 
     Raises
@@ -41,10 +39,9 @@ def read_named_toml(path: Path, thing: str, levels: str, wanted: Wanted) -> Toml
     ConfigError
         There is no such file, it is no TOML, has a name, or a value is still ``"?"``.
     """
-    file = read_toml(path, levels)
+    file = read_toml(path)
     if "name" in file.table:
-        remedy = f"{thing} is named after its file; write title = …"
-        raise file.refuse(("name",), "there is no such key", remedy)
+        raise file.refuse(("name",), "config.named-after-file", kind=kind)
     refuse_placeholders(file, wanted.at)
     return file
 
@@ -89,7 +86,7 @@ def filled_form(
         spec = form(**{**table, "name": file.path.stem})
         if files:
             whole = spec.model_dump(serialize_as_any=True)
-            spec = form(**with_absolute_paths(file, whole, "this file"))
+            spec = form(**with_absolute_paths(file, whole))
     except ValidationError as error:
         raise together(
             [

@@ -123,7 +123,7 @@ class StraightSpec(TableSpec):
     @model_validator(mode="after")
     def _one(self) -> StraightSpec:
         if (self.duration_s is None) == (self.distance_m is None):
-            raise refuse("duration_s, distance_m", "config.two-wanted")
+            raise refuse("duration_s, distance_m", "config.duration-or-distance")
         return self
 
 
@@ -255,11 +255,11 @@ class WaypointsSpec(TableSpec):
         timed = [w.time_s is not None for w in self.waypoints]
         paced = [w.speed_m_per_s is not None for w in self.waypoints]
         if any(timed) and (self.speed_m_per_s is not None or any(paced) or not all(timed)):
-            raise refuse("waypoints", "config.some-time-others-none-or")
+            raise refuse("waypoints", "config.waypoints-partly-timed")
         if not any(timed) and self.speed_m_per_s is None and not all(paced[1:]):
             raise refuse(
                 "waypoints",
-                "config.waypoint-neither-time-nor-speed",
+                "config.waypoint-without-time",
                 index=paced.index(False, 1) + 1,
             )
         return self

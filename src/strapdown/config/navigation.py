@@ -304,9 +304,9 @@ class NavigationSpec(TableSpec):
         if isinstance(data, dict):
             there = [n for n in ("log", "simulation") if data.get(n) is not None]
             if len(there) == 2:
-                raise refuse("simulation", "config.log-given-too")
+                raise refuse("simulation", "config.log-and-simulation")
             if not there and data.get("live") is None:
-                raise refuse("log", "config.missing-3")
+                raise refuse("log", "config.log-missing-in-run")
         return data
 
 

@@ -34,7 +34,6 @@ from strapdown.navigation.navigator import with_states
 
 __all__ = ["TRAJECTORY_FILES", "check_navigation"]
 
-WITHOUT = "without that no position has a bound, and no aid a weight"
 #: Forms of a trajectory that a run can write.
 TRAJECTORY_FILES = tuple(TRAJECTORY_WRITERS)
 #: Stages that are modules.
@@ -85,7 +84,8 @@ class _Checks(SourceChecks):
         yield partial(self.earth, spec)
         yield partial(self.axes, spec.axes)
         yield partial(self.log, spec.log)
-        yield partial(self.sensors, spec.sensors, spec.simulation, WITHOUT)
+        missing = "config.no-sensor-for-navigation"
+        yield partial(self.sensors, spec.sensors, spec.simulation, missing)
         yield partial(self.times, spec)
         yield partial(self.begins, spec)
         for name in STAGES:
@@ -124,19 +124,17 @@ class _Checks(SourceChecks):
                 self.place(name, table.lat_deg, table.lon_deg, table.alt_m)
                 for key in ("position_sd_m", "velocity_sd_m_per_s"):
                     if np.min(getattr(table, key)) < 0.0:
-                        raise self.refuse((name, key), "config.no-standard-deviation-below-zero")
+                        raise self.refuse((name, key), "config.negative-start-sd")
         if spec.start is not None:
             if abs(spec.start.heading_deg) > 360.0:
-                raise self.refuse(("start", "heading_deg"), "config.more-than-turn")
+                raise self.refuse(("start", "heading_deg"), "config.heading-beyond-turn")
             for stage in ("coarse", "fine"):
                 if getattr(spec, stage).kind != "none":
-                    raise self.refuse(
-                        (stage, "kind"), "config.start-says-attitude-place-already", stage=stage
-                    )
+                    raise self.refuse((stage, "kind"), "config.start-and-alignment", stage=stage)
             if spec.site is not None:
-                raise self.refuse(("site", "lat_deg"), "config.start-says-place-already")
+                raise self.refuse(("site", "lat_deg"), "config.start-and-site")
         elif spec.coarse.kind == "none":
-            raise self.refuse(("start", "lat_deg"), "config.nothing-says-navigation-begins-no")
+            raise self.refuse(("start", "lat_deg"), "config.no-start")
 
     def stage(self, spec: NavigationSpec, name: str) -> None:
         self.told((name,), partial(make_choice, getattr(spec, name), SLOTS[name], given_of(spec)))
@@ -144,7 +142,7 @@ class _Checks(SourceChecks):
     def height(self, spec: NavigationSpec) -> None:
         """A height that is damped has a loop of its own."""
         if getattr(spec.mechanization, "height", "") == "damped":
-            raise self.refuse(("mechanization", "height"), "config.filter-no-states-loop-damps")
+            raise self.refuse(("mechanization", "height"), "config.damped-height-without-states")
 
     def modes(self, spec: NavigationSpec) -> None:
         """What ends each alignment, and what is said of one that is not there."""
@@ -154,28 +152,22 @@ class _Checks(SourceChecks):
             given = getattr(spec, stage)
             ends = [n for n in ENDS if getattr(given, n, None) is not None]
             if given.kind == "none" and ends:
-                raise self.refuse((stage, ends[0]), "config.no-such-alignment-end")
+                raise self.refuse((stage, ends[0]), "config.alignment-end-without-alignment")
             commanded = any(one.mode != "navigation" or stage == "fine" for one in spec.commands)
             if given.kind != "none" and not [n for n in ends if n != "window_s"]:
                 if commanded or spec.live is not None:
                     continue
-                raise self.refuse(
-                    (stage, "duration_s"), "config.nothing-ends-alignment-navigation-never"
-                )
+                raise self.refuse((stage, "duration_s"), "config.alignment-never-ends")
 
     def alignment(self, spec: NavigationSpec) -> None:
         """What coarse and fine alignment need of one another, and of the aids."""
         kind = spec.coarse.kind
         if kind in NEEDS_GNSS and not _fixes(spec):
-            raise self.refuse(("coarse", "kind"), "config.takes-course-satellite-fixes-no")
+            raise self.refuse(("coarse", "kind"), "config.course-without-fixes-in-run")
         if kind in NOT_BEFORE_FINE and spec.fine.kind != "none":
-            raise self.refuse(
-                ("coarse", "kind"),
-                "config.fine-alignment-follows",
-                not_before_fine=NOT_BEFORE_FINE[kind],
-            )
+            raise self.refuse(("coarse", "kind"), NOT_BEFORE_FINE[kind])
         if spec.start is None and spec.site is None and not _fixes(spec):
-            raise self.refuse(("site", "lat_deg"), "config.nothing-says-body-neither-start")
+            raise self.refuse(("site", "lat_deg"), "config.no-initial-position")
 
     def aid(self, spec: NavigationSpec, name: str) -> None:
         """One aid: its options, and whether it has what it observes by."""
@@ -186,39 +178,35 @@ class _Checks(SourceChecks):
         if not takes and given.path is not None:
             raise self.refuse(
                 ("aiding", name, "path"),
-                "config.watches-inertial-sensors-takes-no",
+                "config.aid-takes-no-file",
                 kind=given.kind,
             )
         sent = name in receivers_of(spec) or spec.live is not None
         if takes and given.path is None and not sent:
-            raise self.refuse(
-                ("aiding", name, "path"), "config.missing-takes-measured-file", kind=given.kind
-            )
+            raise self.refuse(("aiding", name, "path"), "config.aid-file-missing", kind=given.kind)
         for key in ("position_sd_m", "velocity_sd_m_per_s"):
             if getattr(given, key) is not None and given.kind != "gnss":
-                raise self.refuse(("aiding", name, key), "config.takes-no-fixes", kind=given.kind)
+                raise self.refuse(
+                    ("aiding", name, key), "config.fix-sd-of-other-aid", kind=given.kind
+                )
         height = getattr(spec.mechanization, "height", None)
         if given.kind in HEIGHTS and height == "held":
-            raise self.refuse(
-                ("aiding", name, "kind"), "config.observes-height-mechanization-height-held"
-            )
+            raise self.refuse(("aiding", name, "kind"), "config.height-aid-with-held-height")
 
     def gaps(self, spec: NavigationSpec) -> None:
         if spec.gaps.beyond == "align" and spec.start is not None:
-            raise self.refuse(("gaps", "beyond"), "config.start-no-alignment-begin-anew")
+            raise self.refuse(("gaps", "beyond"), "config.no-alignment-to-repeat")
 
     def receiver(self, name: str, receiver: ReceiverTable) -> None:
         """A receiver that is simulated."""
         for key in ("position_noise_m", "position_drift_m", "velocity_noise_m_per_s"):
             if np.min(getattr(receiver, key)) < 0.0:
-                raise self.refuse(
-                    ("simulation", "gnss", name, key), "config.no-standard-deviation-below-zero-2"
-                )
+                raise self.refuse(("simulation", "gnss", name, key), "config.negative-receiver-sd")
         for begin, end in receiver.outages_s:
             if not begin < end:
                 raise self.refuse(
                     ("simulation", "gnss", name, "outages_s"),
-                    "config.span-no-length",
+                    "config.receiver-outage-empty",
                     begin=begin,
                     end=end,
                 )
@@ -229,35 +217,39 @@ class _Checks(SourceChecks):
         if given is None:
             return
         if given.aid is None and not _fixes(spec):
-            raise self.refuse(("withhold", "aid"), "config.no-aid-gives-fixes-keep")
+            raise self.refuse(("withhold", "aid"), "config.no-aid-to-withhold")
         if given.aid is not None and given.aid not in _fixes(spec):
             raise self.refuse(
                 ("withhold", "aid"),
-                "config.no-aid-name-gives-fixes",
+                "config.unknown-aid-to-withhold",
                 word=given.aid,
                 known=_fixes(spec),
             )
         if bool(given.spans_s) == bool(given.lengths_s):
             raise self.refuse(
                 ("withhold", "spans_s"),
-                "config.nothing-says-when" if not given.spans_s else "config.lengths-given-too",
+                "config.outage-without-span"
+                if not given.spans_s
+                else "config.outage-spans-and-lengths",
             )
         for begin, end in given.spans_s:
             if not begin < end:
-                raise self.refuse(("withhold", "spans_s"), "config.no-time", begin=begin, end=end)
+                raise self.refuse(
+                    ("withhold", "spans_s"), "config.outage-span-empty", begin=begin, end=end
+                )
 
     def output(self, spec: NavigationSpec) -> None:
         for form in spec.output.files:
             if form not in TRAJECTORY_FILES:
                 raise self.refuse(
                     ("output", "files"),
-                    "config.no-form",
+                    "config.unknown-trajectory-form",
                     form=form,
-                    trajectory_files=TRAJECTORY_FILES,
+                    known=TRAJECTORY_FILES,
                 )
         simulation = spec.simulation
         if simulation is not None and simulation.rate_hz > MOST_SAMPLES:
-            raise self.refuse(("simulation", "rate_hz"), "config.no-rate")
+            raise self.refuse(("simulation", "rate_hz"), "config.rate-too-high")
 
     def chain(self, spec: NavigationSpec) -> None:
         """Begin the filter, which refuses parts that do not go together."""

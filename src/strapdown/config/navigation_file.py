@@ -34,7 +34,7 @@ from strapdown.config.spec import TableSpec
 from strapdown.config.state_tables import StatesTable
 from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["NAVIGATION_STAGES", "navigation_spec", "read_navigation_spec", "stage_default"]
 
@@ -121,13 +121,10 @@ def _simulation_form(table: Mapping[str, Any], file: TomlFile | None) -> type[Ta
     for name in written if isinstance(written, Mapping) else ():
         if name not in names:
             path: KeyPath = ("simulation", "gnss", str(name))
-            what = "there is no aid of this name that takes its fixes"
-            remedy = f'write [aiding.{name}] with kind = "gnss" and without path, or leave it out'
+            finding = Finding("config.receiver-without-aid", name=name)
             if file is None:
-                raise ConfigError(
-                    "config.message", quantity=place_of(path), message=what, remedy_text=remedy
-                )
-            raise file.refuse(path, what, remedy)
+                raise ConfigError(finding, quantity=place_of(path))
+            raise file.refuse(path, finding)
     forms: dict[str, Any] = {name: (ReceiverTable, ReceiverTable()) for name in sorted(names)}
     receivers = create_model("Receivers", __base__=TableSpec, **forms)
     return create_model(
@@ -138,15 +135,11 @@ def _simulation_form(table: Mapping[str, Any], file: TomlFile | None) -> type[Ta
 def _refuse_name(name: Any, path: KeyPath, file: TomlFile | None) -> None:
     if isinstance(name, str) and _NAME.fullmatch(name) and not hasattr(BaseModel, name):
         return
-    what = "it is no name that an aid can have"
-    remedy = "begin with a letter, and go on with letters, digits and _: [aiding.rtk]"
-    if isinstance(name, str) and hasattr(BaseModel, name):
-        what, remedy = "this name is taken by the form of the file", "choose another"
+    reserved = isinstance(name, str) and hasattr(BaseModel, name)
+    finding = Finding("config.aid-name-reserved" if reserved else "config.bad-aid-name")
     if file is None:
-        raise ConfigError(
-            "config.message", quantity=place_of(path), message=what, remedy_text=remedy
-        )
-    raise file.refuse(path, what, remedy)
+        raise ConfigError(finding, quantity=place_of(path))
+    raise file.refuse(path, finding)
 
 
 def navigation_spec(table: Mapping[str, Any]) -> NavigationSpec:
@@ -194,8 +187,7 @@ def read_navigation_spec(path: str | Path, *, files: bool = True) -> NavigationS
         There is no such file, it is no TOML, a key is not known, missing or still ``"?"``, a value
         does not fit, or the parts do not go together; the message names the line.
     """
-    levels = "a configuration has three levels"
-    file = read_named_toml(Path(path), "a run", levels, NAVIGATION_WANTED)
+    file = read_named_toml(Path(path), "run", NAVIGATION_WANTED)
     file = replace(file, table=_with_kinds(file.table))
     spec, written = filled_form(
         file,

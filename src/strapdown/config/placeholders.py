@@ -8,7 +8,7 @@ from typing import Any
 from strapdown.config.case_wanted import wanted_at
 from strapdown.config.toml_file import TomlFile, place_of
 from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["PLACEHOLDER", "refuse_placeholders"]
 
@@ -30,21 +30,26 @@ def refuse_placeholders(file: TomlFile, wanted_of: Callable[[KeyPath], str] = wa
     open_keys = list(dict.fromkeys(_open(file.table, ())))
     if not open_keys:
         return
-    lines = []
-    for path in open_keys[:MOST]:
-        wanted = wanted_of(path)
-        lines.append(
-            f"  line {file.line(path)}, {place_of(path)}" + (f": {wanted}" if wanted else "")
+    values = [
+        Finding(
+            "config.open-value",
+            line=file.line(path),
+            quantity=place_of(path),
+            wanted=wanted_of(path),
         )
-    if len(open_keys) > MOST:
-        lines.append(f"  and {len(open_keys) - MOST} more")
+        for path in open_keys[:MOST]
+    ]
     count = len(open_keys)
-    what = "one value is still open" if count == 1 else f"{count} values are still open"
+    code = "config.open-values" if count > 1 else "config.one-open-value"
+    if count > MOST:
+        code = "config.many-open-values"
     raise ConfigError(
-        "config.message",
+        code,
         file=file.path.name,
-        message="\n".join([f"{what}:", *lines]),
-        remedy_text=f'put what you know in place of each "{PLACEHOLDER}", numbers without quotation marks; a key that may be left out may be deleted',
+        count=count,
+        more=count - len(values),
+        values=values,
+        placeholder=PLACEHOLDER,
     )
 
 

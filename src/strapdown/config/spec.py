@@ -7,9 +7,10 @@ from typing import Any, ClassVar, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
-from strapdown.errors import ConfigError
+from strapdown.config.shown import shown
+from strapdown.errors import ConfigError, Finding
 
-__all__ = ["Spec", "TableSpec", "refuse", "specify"]
+__all__ = ["Spec", "TableSpec", "misfit", "refuse", "specify"]
 
 
 class Spec(BaseModel):
@@ -35,17 +36,54 @@ class TableSpec(Spec):
         for key in data if isinstance(data, dict) else ():
             if key not in cls.model_fields:
                 known = [name for name in cls.model_fields if name not in cls.unwritten]
-                raise refuse(key, "config.no-such-key", word=key, known=known)
+                raise refuse(key, "config.unknown-key", word=key, known=known)
         return data
 
 
-def refuse(key: str, what: str, remedy: str) -> PydanticCustomError:
-    """What a validator raises about one of its keys, with a remedy of its own."""
+def refuse(key: str, code: str, /, **data: Any) -> PydanticCustomError:
+    """Return the error that a validator raises about one of its keys."""
     return PydanticCustomError(
-        "refused",
-        "{what}",
-        {"key": key, "what": what, "remedy": remedy},
+        "refused", "{finding}", {"key": key, "finding": Finding(code, **data)}
     )
+
+
+#: Codes of misfits, by the word of pydantic.
+_MISFITS = {
+    "string_type": "config.not-text",
+    "float_type": "config.not-a-number",
+    "int_type": "config.not-a-whole-number",
+    "bool_type": "config.not-true-or-false",
+    "finite_number": "config.not-finite",
+}
+#: Codes of numbers that are out of range, by the word of pydantic for the limit.
+_LIMITS = {
+    "gt": "config.not-above",
+    "ge": "config.below-least",
+    "lt": "config.not-below",
+    "le": "config.above-most",
+}
+
+
+def misfit(error: Any, given: Any = None) -> Finding:
+    """Return what pydantic finds wrong with a value, as a finding without a location.
+
+    Parameters
+    ----------
+    error : dict
+        One of `ValidationError.errors`.
+    given : object, optional
+        The value as the user wrote it, where it was converted.
+    """
+    context = error.get("ctx", {})
+    if error["type"] == "refused":
+        refused: Finding = context["finding"]
+        return refused
+    value = shown(error["input"] if given is None else given)
+    for key, code in _LIMITS.items():
+        if key in context and isinstance(context[key], int | float):
+            return Finding(code, given=value, limit=context[key])
+    code = _MISFITS.get(error["type"], "config.value-does-not-fit")
+    return Finding(code, given=value, reason=error["msg"].lower())
 
 
 S = TypeVar("S", bound=Spec)
@@ -75,6 +113,4 @@ def specify(form: type[S], **values: Any) -> S:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise ConfigError(
-            "config.does-not-fit", quantity=place, first=first["input"], lower=first["msg"].lower()
-        ) from None
+        raise ConfigError(misfit(first), quantity=place) from None

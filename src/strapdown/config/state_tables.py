@@ -74,7 +74,7 @@ def processes_of(table: TableSpec) -> dict[str, StateProcess]:
                 if value is None:
                     continue
                 if part in given:
-                    raise ConfigError("config.stated-two-units", quantity=f"states.{name}, {key}")
+                    raise ConfigError("config.state-in-two-units", quantity=f"states.{name}, {key}")
                 single = isinstance(value, int | float)
                 given[part] = scale * value if single else tuple(scale * x for x in value)
         out[name] = StateProcess(correlation_time=one.correlation_time_s, **given)

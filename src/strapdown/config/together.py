@@ -1,4 +1,4 @@
-"""Several things that are wrong in one file, told at once."""
+"""Several faults of one file as one error."""
 
 from __future__ import annotations
 
@@ -24,14 +24,5 @@ def together(found: Sequence[ConfigError]) -> ConfigError:
     """
     if len(found) == 1:
         return found[0]
-    lines = []
-    for error in sorted(found, key=lambda e: e.finding.line or 0):
-        f = error.finding
-        place = ", ".join(str(p) for p in (f.line and f"line {f.line}", f.quantity) if p)
-        lines += [f"  {place}: {f.what}" if place else f"  {f.what}", f"    {f.remedy}"]
-    return ConfigError(
-        "config.message",
-        file=found[0].finding.file,
-        message="\n".join([f"{len(found)} things do not fit:", *lines]),
-        remedy_text="mend each of them",
-    )
+    faults = sorted((error.finding for error in found), key=lambda f: f.line or 0)
+    return ConfigError("config.several", file=faults[0].file, count=len(faults), faults=faults)

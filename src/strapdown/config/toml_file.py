@@ -11,31 +11,24 @@ from typing import Any
 
 from strapdown.config.shown import shown, shown_key
 from strapdown.config.toml_lines import DEEPEST, KeyPath, key_lines, line_of
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["TomlFile", "read_toml"]
 
 _PLACE = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
-# What people write, by what a line that is no TOML looks like.
+# Codes of what people write, by what a line that is not TOML looks like.
 _SLIPS = (
-    (r"=\s*\?", "this value is still open: put what you know in place of the question mark"),
-    (r"=\s*-?[\d.]+\s*,\s*-?[\d.]+\s*,", "write several numbers in brackets: [0.6, -0.5, 0.2]"),
-    (r"=\s*[\[\s\d,.-]*\d,\d+\s*(?:#.*)?$", "write numbers with a point: 25.6, not 25,6"),
-    (r"[“”„‟‘’]", "use the plain quotation marks, \" or ', not those of a word processor"),
-    (
-        r"=\s*\"[^\"]*\\",
-        "a backslash in double quotation marks begins an escape: write the path in single ones, "
-        "'C:\\case\\record.csv', or with /",
-    ),
-    (r"=\s*(?i:true|false|yes|no)\b", "write true or false, in small letters"),
-    (r"=\s*[+-]?\.\d", "write a 0 before the point: 0.5, not .5"),
-    (r"=\s*[+-]?0\d", "write numbers without zeros before them"),
-    (r"=\s*\d+[-/_]", 'write what is no number in quotation marks: "2024-117"'),
-    (
-        r"=\s*-?[\d.]+\s*[A-Za-z%°]",
-        "write the number alone: the name of the key tells its unit",
-    ),
-    (r"=\s*[^\s\"'\d\[{+-]", 'write text in quotation marks: key = "text"'),
+    (r"=\s*\?", "config.toml-open-value"),
+    (r"=\s*-?[\d.]+\s*,\s*-?[\d.]+\s*,", "config.toml-list-without-brackets"),
+    (r"=\s*[\[\s\d,.-]*\d,\d+\s*(?:#.*)?$", "config.toml-decimal-comma"),
+    (r"[“”„‟‘’]", "config.toml-typographic-quotes"),
+    (r"=\s*\"[^\"]*\\", "config.toml-backslash"),
+    (r"=\s*(?i:true|false|yes|no)\b", "config.toml-capital-boolean"),
+    (r"=\s*[+-]?\.\d", "config.toml-no-digit-before-point"),
+    (r"=\s*[+-]?0\d", "config.toml-leading-zero"),
+    (r"=\s*\d+[-/_]", "config.toml-unquoted-date"),
+    (r"=\s*-?[\d.]+\s*[A-Za-z%°]", "config.toml-unit-after-number"),
+    (r"=\s*[^\s\"'\d\[{+-]", "config.toml-unquoted-text"),
 )
 
 
@@ -63,26 +56,18 @@ class TomlFile:
         """Line of a key, or of what is nearest around it."""
         return line_of(self.lines, path)
 
-    def refuse(self, path: KeyPath, what: str, remedy: str, quantity: str = "") -> ConfigError:
-        """An error at a key."""
-        return ConfigError(
-            "config.message",
-            file=self.path.name,
-            line=self.line(path),
-            quantity=quantity or place_of(path),
-            message=what,
-            remedy_text=remedy,
-        )
+    def refuse(self, path: KeyPath, code: str | Finding, /, **data: Any) -> ConfigError:
+        """Return an error at a key, of a code and its data, or of a finding."""
+        where = {"file": self.path.name, "line": self.line(path), "quantity": place_of(path)}
+        return ConfigError(code, row=None, **{**where, **data})
 
 
-def read_toml(path: Path, form: str) -> TomlFile:
+def read_toml(path: Path) -> TomlFile:
     """Read a file that a person wrote.
 
     Parameters
     ----------
     path : Path
-    form : str
-        What it is, for a remedy: ``a trajectory has three levels``.
 
     Raises
     ------
@@ -97,9 +82,7 @@ def read_toml(path: Path, form: str) -> TomlFile:
             raise RecursionError
         return TomlFile(path, tomllib.loads(text), lines)
     except RecursionError:
-        raise ConfigError(
-            "config.message", file=path.name, message="it is nested too deep", remedy_text=form
-        ) from None
+        raise ConfigError("config.nested-too-deep", file=path.name) from None
     except ValueError as error:
         raise _no_toml(path, text, str(error)) from None
 
@@ -107,24 +90,22 @@ def read_toml(path: Path, form: str) -> TomlFile:
 def _text(path: Path) -> str:
     try:
         if not path.is_file():
-            what = "it is no file" if path.exists() else "there is no such file"
-            raise ConfigError(
-                "config.message", file=str(path), message=what, remedy_text="check the path"
-            )
+            code = "config.not-a-file" if path.exists() else "config.no-such-file"
+            raise ConfigError(code, file=str(path))
         # With the mark that some editors on Windows begin a file with, or without.
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         before = error.object[: error.start]
         raise ConfigError(
-            "config.no-toml-byte-not-utf",
+            "config.not-utf-8",
             file=path.name,
             line=before.count(b"\n") + 1 if isinstance(before, bytes) else None,
-            object=error.object[error.start],
+            byte=error.object[error.start],
         ) from None
     except OSError as error:
-        raise ConfigError("config.cannot-read-2", file=str(path), strerror=error.strerror) from None
+        raise ConfigError("config.file-unreadable", file=str(path), reason=error.strerror) from None
     except ValueError as error:
-        raise ConfigError("config.no-name-file", file=shown(str(path)), error=error) from None
+        raise ConfigError("config.not-a-file-name", file=shown(str(path)), reason=error) from None
 
 
 #: Endings of tables, which are no configurations.
@@ -148,22 +129,16 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
         if what.startswith(("Cannot", "Duplicate")) and twice:
             key, first = twice
             return ConfigError(
-                "config.written-twice-line-too",
+                "config.key-repeated",
                 file=path.name,
                 line=number,
                 quantity=place_of(key),
                 first=first,
             )
-    remedy = next((r for pattern, r in _SLIPS if re.search(pattern, line)), "mend it where it says")
+    code = next((c for pattern, c in _SLIPS if re.search(pattern, line)), "config.not-toml")
     if path.suffix.lower() in RECORDS:
-        remedy = "it seems to be a record: strapdown init writes a file from it, and that is given"
-    return ConfigError(
-        "config.message",
-        file=path.name,
-        line=number,
-        message=f"it is no TOML: {what}",
-        remedy_text=remedy,
-    )
+        code = "config.toml-is-record"
+    return ConfigError(code, file=path.name, line=number, reason=what)
 
 
 def _twice(text: str, line: int) -> tuple[KeyPath, int] | None:

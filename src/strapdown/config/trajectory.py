@@ -57,10 +57,10 @@ def read_trajectory_spec(path: Path, **instead: Any) -> TrajectorySpec:
     ConfigError
         There is no such file, it is no TOML, or a value does not fit; the message names the key.
     """
-    file = read_toml(path, "a trajectory has three levels")
+    file = read_toml(path)
     table = dict(file.table)
     if "name" in table:
-        raise file.refuse(("name",), "config.no-such-key-2")
+        raise file.refuse(("name",), "config.named-after-file", kind="trajectory")
     table["name"] = path.stem
     sensor = table.get("sensor")
     if isinstance(sensor, str) and sensor.lower().endswith(".toml"):

@@ -19,7 +19,7 @@ _TURNING = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 def words(text: str) -> str:
     """Check text of one line, which may be empty."""
-    return _checked(text, LONGEST_NAME, "leave it out")
+    return _checked(text, LONGEST_NAME, "config.unprintable-character")
 
 
 def word(text: str) -> str:
@@ -29,25 +29,19 @@ def word(text: str) -> str:
 
 def file_name(text: str) -> str:
     """Check the path of a file."""
-    escape = (
-        "a backslash in double quotation marks begins an escape: write the path in single ones, "
-        "'C:\\case\\record.csv', or with /"
-    )
-    return _checked(_filled(text), LONGEST_PATH, escape)
+    return _checked(_filled(text), LONGEST_PATH, "config.unprintable-character-in-path")
 
 
 def _filled(text: str) -> str:
     if not text.strip():
-        raise refuse("", "config.empty")
+        raise refuse("", "config.text-empty")
     return text
 
 
-def _checked(text: str, longest: int, remedy: str) -> str:
+def _checked(text: str, longest: int, unprintable: str) -> str:
     if len(text) > longest:
-        what = f"it has {len(text)} characters"
-        raise refuse("", what, f"shorten it to {longest} characters")
+        raise refuse("", "config.text-too-long", length=len(text), longest=longest)
     for k, char in enumerate(text):
         if unicodedata.category(char) in _CONTROL or char in _TURNING:
-            what = f"character {k + 1} is {char!a}, which cannot be shown"
-            raise refuse("", what, remedy)
+            raise refuse("", unprintable, position=k + 1, character=ascii(char))
     return text

@@ -101,7 +101,7 @@ def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path |
     if path.is_dir():
         return _of_bundle(path)
     if path.suffix.lower() == ".toml" and path.is_file():
-        table = read_toml(path, "a sensor, or a run of navigation, is tables of keys").table
+        table = read_toml(path).table
         if {"log", "simulation", "live"} & set(table):
             return read_navigation_spec(path), path
     elif path.is_file():

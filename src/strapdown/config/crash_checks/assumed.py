@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec
 from strapdown.config.crash_checks.written import Written
-from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError
 
 __all__ = ["check_assumed"]
 
@@ -27,21 +25,17 @@ def check_assumed(k: int, spec: CaseSpec, written: Written) -> None:
     no_force, no_turn = _forces_missing(k, unit, written), _turns_missing(unit)
     assumed = unit.assumed or AssumedSpec()
     if no_force and assumed.delta_v_sd_m_per_s is None:
-        raise _not_assumed(
+        raise written.file.refuse(
             ("units", k, "accelerometers", 0, "channels"),
-            f"there is no channel for {_listed(no_force)}, and nothing says what it may have felt",
-            "delta_v_sd_m_per_s",
-            written,
+            "config.axis-not-measured",
+            axes=no_force,
         )
     if no_turn and assumed.turn_sd_deg is None:
         no_gyro = unit.gyro is None
-        raise _not_assumed(
+        raise written.file.refuse(
             ("units", k) if no_gyro else ("units", k, "gyro", "channels"),
-            ("there is no gyro" if no_gyro else f"there is no channel for {_listed(no_turn)}")
-            + ", and nothing says how far the vehicle may have turned",
-            "turn_sd_deg",
-            written,
-            "write [units.gyro], or gyro_from = the name of another unit" if no_gyro else "",
+            "config.no-gyro" if no_gyro else "config.turn-axis-not-measured",
+            axes=no_turn,
         )
     if unit.assumed is not None:
         _check_table(k, unit, assumed, written, bool(no_force), bool(no_turn))
@@ -61,18 +55,18 @@ def _check_table(
             continue
         if not missing:
             raise written.contradiction(
-                (*at, name), ("units", k, other), "config.nothing-missing-could-assumed"
+                (*at, name), ("units", k, other), "config.assumed-though-measured"
             )
         sizes = given if isinstance(given, tuple) else (given,)
         if max(sizes) > most:
-            raise written.refuse((*at, name), "config.more-than-nothing-would-known", most=most)
+            raise written.refuse((*at, name), "config.assumed-sd-too-large", most=most)
     if not force and not turn:
-        raise written.contradiction(at, ("units", k, measured), "config.nothing-missing-unit")
+        raise written.contradiction(at, ("units", k, measured), "config.nothing-to-assume")
     if not assumed.because.strip():
-        raise written.missing((*at, "because"), "config.missing-report-must-say-why")
+        raise written.missing((*at, "because"), "config.reason-of-assumption-missing")
     start, end = assumed.over_s
     if not 0.0 < end - start <= LONGEST:
-        raise written.refuse((*at, "over_s"), "config.lasts", end=end - start)
+        raise written.refuse((*at, "over_s"), "config.assumed-span-out-of-range", end=end - start)
 
 
 def _forces_missing(k: int, unit: UnitSpec, written: Written) -> list[str]:
@@ -82,7 +76,7 @@ def _forces_missing(k: int, unit: UnitSpec, written: Written) -> list[str]:
             raise written.contradiction(
                 ("units", k, "accelerometers", n, "channels"),
                 ("units", k, "accelerometers", 0, "channels"),
-                "config.range-axis-other-not",
+                "config.range-axes-differ",
             )
     return first
 
@@ -95,18 +89,3 @@ def _turns_missing(unit: UnitSpec) -> list[str]:
 
 def _missing(triad: TriadSpec) -> list[str]:
     return [axis for axis in AXES if axis not in triad.channels]
-
-
-def _listed(axes: list[str]) -> str:
-    return " and ".join(axes)
-
-
-def _not_assumed(
-    path: KeyPath, why: str, name: str, written: Written, instead: str = ""
-) -> ConfigError:
-    return written.file.refuse(
-        path,
-        why,
-        f"{instead or 'name its channel'}; or write [units.assumed] with {name} = …, a standard "
-        "deviation, and because = …",
-    )

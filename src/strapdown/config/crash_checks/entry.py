@@ -38,19 +38,19 @@ _NO_USE = {
         "climb_sd_m_per_s",
     ),
 }
-_WHY = {
-    "speed": "the speed is stated, and no fixes are read",
-    "standstill": "a vehicle that stood when the record began has none",
-    "gnss": "speed and heading are found from the fixes",
+_UNUSED = {
+    "speed": "config.entry-speed-no-use",
+    "standstill": "config.entry-standstill-no-use",
+    "gnss": "config.entry-gnss-no-use",
 }
 _NEEDED = {
     "speed": {
-        "speed_m_per_s": "kind is speed",
-        "speed_sd_m_per_s": "without it nothing tells how well the speed is known",
-        "source": "a report must say where the speed is from",
+        "speed_m_per_s": "config.entry-speed-missing",
+        "speed_sd_m_per_s": "config.entry-speed-sd-missing",
+        "source": "config.entry-source-missing",
     },
     "standstill": {},
-    "gnss": {"path": "kind is gnss, and the fixes must be read"},
+    "gnss": {"path": "config.entry-fixes-missing"},
 }
 
 
@@ -69,14 +69,15 @@ def check_entry(spec: CaseSpec, written: Written) -> None:
             raise written.contradiction(
                 ("entry", name),
                 ("entry", "kind"),
-                _WHY[entry.kind],
-                f'take away {written.key("entry", name)}, or write kind = "{_kind_for(name)}"',
+                _UNUSED[entry.kind],
                 default=entry.kind,
+                key=written.key("entry", name),
+                kind=_kind_for(name),
             )
-    for name, why in _NEEDED[entry.kind].items():
+    for name, code in _NEEDED[entry.kind].items():
         given = getattr(entry, name)
         if given is None or (isinstance(given, str) and not given.strip()):
-            raise written.missing(("entry", name), why)
+            raise written.missing(("entry", name), code)
     _sizes(entry, written)
     _instant(spec, written)
 
@@ -88,19 +89,21 @@ def _kind_for(name: str) -> str:
 def _sizes(entry: EntrySpec, written: Written) -> None:
     speed, sd = entry.speed_m_per_s, entry.speed_sd_m_per_s
     if speed is not None and abs(speed) > FASTEST:
-        raise written.refuse(("entry", "speed_m_per_s"), "config.km-h", speed=3.6 * speed)
+        raise written.refuse(
+            ("entry", "speed_m_per_s"), "config.entry-speed-too-large", speed=3.6 * speed
+        )
     if entry.kind == "speed" and sd == 0.0:
-        raise written.refuse(("entry", "speed_sd_m_per_s"), "config.no-speed-known-without-error")
+        raise written.refuse(("entry", "speed_sd_m_per_s"), "config.entry-speed-sd-zero")
     if sd is not None and sd > FASTEST / 3.0:
         raise written.refuse(
-            ("entry", "speed_sd_m_per_s"), "config.speed-would-known-km-h", sd=3.6 * sd
+            ("entry", "speed_sd_m_per_s"), "config.entry-speed-sd-too-large", sd=3.6 * sd
         )
     for name in ("heading_deg", "slip_deg"):
         if abs(getattr(entry, name)) > MOST_ANGLE:
-            raise written.refuse(("entry", name), "config.angle-between")
+            raise written.refuse(("entry", name), "config.angle-beyond-turn")
     for name in ("heading_sd_deg", "slip_sd_deg"):
         if getattr(entry, name) > MOST_ANGLE / 2.0:
-            raise written.refuse(("entry", name), "config.more-than-half-turn-not")
+            raise written.refuse(("entry", name), "config.angle-sd-too-large")
 
 
 def _instant(spec: CaseSpec, written: Written) -> None:
@@ -110,8 +113,6 @@ def _instant(spec: CaseSpec, written: Written) -> None:
         return
     if window is not None and window[0] < window[1] and not window[0] <= time <= window[1]:
         first, second = (at, over) if written.has(*at) else (over, at)
-        raise written.contradiction(
-            first, second, "config.path-runs-entry-not-window", default=time
-        )
+        raise written.contradiction(first, second, "config.entry-outside-window", default=time)
     if not math.isclose(time, 0.0) and abs(time) > 600.0:
-        raise written.refuse(at, "config.entry-minutes-away-trigger")
+        raise written.refuse(at, "config.entry-far-from-trigger")

@@ -29,7 +29,7 @@ def check_options(spec: CaseSpec, written: Written) -> None:
     if not GRAVITY[0] < options.gravity_m_per_s2 < GRAVITY[1]:
         raise written.refuse(
             ("options", "gravity_m_per_s2"),
-            "config.gravity-nowhere-ground",
+            "config.gravity-out-of-range",
             gravity_m_per_s2=options.gravity_m_per_s2,
         )
     for k, name in enumerate(options.severity or ()):
@@ -40,19 +40,19 @@ def _windows(spec: CaseSpec, written: Written) -> None:
     at, peak_at = ("options", "window_s"), ("options", "peak_window_s")
     window, peak = spec.options.window_s, spec.options.peak_window_s
     if peak > LONGEST_PEAK:
-        raise written.refuse(peak_at, "config.no-pulse-crash-lasts", peak=peak)
+        raise written.refuse(peak_at, "config.peak-window-too-long", peak=peak)
     if window is not None:
         start, end = window
         if not start < end:
-            raise written.refuse(at, "config.ends-before-begins")
+            raise written.refuse(at, "config.window-end-before-begin")
         if end - start > LONGEST_WINDOW:
-            raise written.refuse(at, "config.long", end=end - start)
+            raise written.refuse(at, "config.window-too-long", end=end - start)
         if end <= 0.0:
-            raise written.refuse(at, "config.ends-before-trigger")
+            raise written.refuse(at, "config.window-before-trigger")
         if peak > end - start:
             first, second = (peak_at, at) if written.has(*peak_at) else (at, peak_at)
             raise written.contradiction(
-                first, second, "config.peak-sought-over-longer-time", default=peak
+                first, second, "config.peak-window-longer-than-window", default=peak
             )
 
 
@@ -63,9 +63,9 @@ def _model(number: int, name: str, names: Sequence[str], written: Written) -> No
     if name not in SEVERITY_MODELS:
         raise written.refuse(
             ("options", "severity", number),
-            "config.no-such-severity-model",
+            "config.unknown-severity-model",
             word=name,
             known=SEVERITY_MODELS,
         )
     if name in names[:number]:
-        raise written.refuse(("options", "severity", number), "config.named-twice")
+        raise written.refuse(("options", "severity", number), "config.severity-model-repeated")

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from strapdown.config.crash_case import CaseSpec, VehicleSpec
 from strapdown.config.crash_checks.written import Written
 from strapdown.config.toml_lines import KeyPath
+from strapdown.errors import Finding
 
 __all__ = ["check_places"]
 
@@ -42,7 +43,7 @@ def check_places(spec: CaseSpec, written: Written) -> None:
     sds = [(("units", k, "position_sd_m"), u.position_sd_m) for k, u in enumerate(spec.units)]
     for at, sd in [*sds, (("entry", "antenna_sd_m"), spec.entry.antenna_sd_m)]:
         if sd > MOST_SD:
-            raise written.refuse(at, "config.place-known-no-vehicle-particular", sd=sd)
+            raise written.refuse(at, "config.position-sd-too-large", sd=sd)
 
 
 def _sizes(vehicle: VehicleSpec, written: Written) -> None:
@@ -51,32 +52,32 @@ def _sizes(vehicle: VehicleSpec, written: Written) -> None:
         for name in ("length_m", "width_m", "front_m"):
             if written.has(at, name):
                 raise written.contradiction(
-                    (at, name), (at, "outline_m"), "config.outline-tells-already", name=name
+                    (at, name), (at, "outline_m"), "config.outline-and-size", name=name
                 )
         _outline(vehicle.outline_m, written)
     for name in ("length_m", "width_m"):
         size = getattr(vehicle, name)
         if not 0.3 <= size <= LONGEST:
-            raise written.refuse((at, name), "config.no-vehicle-road-size", size=size)
+            raise written.refuse((at, name), "config.vehicle-size-out-of-range", size=size)
     if vehicle.front_m is not None and not 0.0 <= vehicle.front_m <= vehicle.length_m:
         raise written.contradiction(
             (at, "front_m"),
             (at, "length_m"),
-            "config.origin-positions-would-lie-outside",
+            "config.origin-outside-vehicle",
             default=vehicle.length_m,
         )
     if vehicle.mass_kg is not None and not LIGHTEST <= vehicle.mass_kg <= HEAVIEST:
-        raise written.refuse((at, "mass_kg"), "config.no-vehicle-kg", mass_kg=vehicle.mass_kg)
+        raise written.refuse((at, "mass_kg"), "config.mass-out-of-range", mass_kg=vehicle.mass_kg)
 
 
 def _outline(corners: Sequence[Corner], written: Written) -> None:
     at = ("vehicle", "outline_m")
     if len(corners) < 3:
-        raise written.refuse(at, "config.corners-enclose-nothing", count=len(corners))
+        raise written.refuse(at, "config.outline-too-few-corners", count=len(corners))
     if max(math.dist(a, b) for a in corners for b in corners[:1]) > LONGEST:
-        raise written.refuse(at, "config.larger-than-any-vehicle")
+        raise written.refuse(at, "config.outline-too-large")
     if abs(_area(corners)) < SMALLEST:
-        raise written.refuse(at, "config.encloses", area=abs(_area(corners)))
+        raise written.refuse(at, "config.outline-area-too-small", area=abs(_area(corners)))
 
 
 def _area(corners: Sequence[Corner]) -> float:
@@ -119,16 +120,7 @@ def _on_vehicle(
     beside = _outside((forward, right), corners)
     if beside <= BEYOND and abs(down) <= HIGHEST:
         return
-    if beside > BEYOND:
-        why = f"that is {beside:.3g} m outside of the vehicle"
-        why += _told(vehicle, written)
-    else:
-        why = f"that is {abs(down):.3g} m {'below' if down > 0 else 'above'} the origin"
     name = written.key(*path)
-    remedy = (
-        "positions are forward, right, down from one origin; check this one, and the size of the "
-        "vehicle in [vehicle]"
-    )
     units = [
         unit
         for part, unit in ((1000.0, "mm"), (100.0, "cm"))
@@ -137,21 +129,23 @@ def _on_vehicle(
         and abs(down) / part <= HIGHEST
         and _outside((forward / part, right / part), corners) <= BEYOND
     ]
+    hint = Finding("config.position-convention")
     if units:
         keys = [f"{name.removesuffix('_m')}_{unit}" for unit in units]
-        remedy = f"if it is in {' or '.join(units)}, write {' or '.join(keys)}"
-    raise written.refuse(path, why, remedy)
-
-
-def _told(vehicle: VehicleSpec, written: Written) -> str:
+        hint = Finding("config.position-in-other-unit", units=units, keys=keys)
+    if beside <= BEYOND:
+        code = "config.position-below-origin" if down > 0 else "config.position-above-origin"
+        raise written.refuse(path, code, distance=abs(down), hint=hint)
+    data = {"distance": beside, "hint": hint}
     if vehicle.outline_m:
-        return f", whose outline is in line {written.file.line(('vehicle', 'outline_m'))}"
-    size = f"{vehicle.length_m:g} m by {vehicle.width_m:g} m"
+        line = written.file.line(("vehicle", "outline_m"))
+        raise written.refuse(path, "config.position-outside-outline", outline_line=line, **data)
+    data |= {"length": vehicle.length_m, "width": vehicle.width_m}
     stated = [n for n in ("length_m", "width_m", "front_m") if written.has("vehicle", n)]
     if not stated:
-        return f", which is taken to be {size} as [vehicle] has no length_m and width_m"
-    where = ", ".join(written.said("vehicle", name) for name in stated)
-    return f" of {size}: {where}"
+        raise written.refuse(path, "config.position-outside-default-size", **data)
+    sizes = [written.said("vehicle", name) for name in stated]
+    raise written.refuse(path, "config.position-outside-size", sizes=sizes, **data)
 
 
 def _outside(place: Corner, corners: Sequence[Corner]) -> float:

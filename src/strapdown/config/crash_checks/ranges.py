@@ -33,7 +33,7 @@ def check_sensor(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> 
         uncertainty is not known, stands twice in two units, or has no number that it can have.
     """
     if triad.sensor is None and not triad.uncertainty:
-        raise written.missing((*at, "sensor"), "config.missing-nothing-says-how-good")
+        raise written.missing((*at, "sensor"), "config.uncertainty-missing")
     if triad.sensor is not None:
         _known_sensor(at, kind, triad.sensor, written)
     _known_keys(at, kind, triad.uncertainty, written)
@@ -56,9 +56,9 @@ def check_ranges(k: int, unit: UnitSpec, written: Written) -> None:
             raise written.contradiction(
                 ("units", k, "accelerometers", n, *_range_key(triads[n])),
                 ("units", k, "accelerometers", n - 1, *_range_key(triads[n - 1])),
-                "config.range-g-stands-before-g",
-                in_g=_in_g(before),
-                in_g_2=_in_g(after),
+                "config.ranges-not-ascending",
+                before=_in_g(before),
+                after=_in_g(after),
             )
 
 
@@ -68,22 +68,22 @@ def _known_sensor(at: KeyPath, kind: str, name: str, written: Written) -> None:
 
     path = (*at, "sensor")
     if name.lower() not in SENSORS and not name.lower().endswith(".toml"):
-        raise written.refuse(path, "config.no-such-sensor", word=name, known=SENSORS)
+        raise written.refuse(path, "config.unknown-sensor", word=name, known=SENSORS)
     try:
         sensor = load_sensor(name)
     except StrapdownError as error:
-        f = error.finding
+        part = error.finding.quantity
+        code = "config.sensor-key-refused" if part else "config.sensor-refused"
+        raise written.refuse(path, code, part=part, reason=error.finding) from None
+    except (RecursionError, OSError, ValueError) as error:
+        raise written.refuse(path, "config.sensor-unreadable", error=type(error).__name__) from None
+    if not any(figure.key.startswith(f"{kind}.") for figure in sensor.sources):
         raise written.refuse(
             path,
-            f"{f.quantity}: {f.what}" if f.quantity else f.what,
-            f.remedy or "mend that file",
-        ) from None
-    except (RecursionError, OSError, ValueError) as error:
-        raise written.refuse(path, "config.cannot-read", name=type(error).__name__) from None
-    if not any(figure.key.startswith(f"{kind}.") for figure in sensor.sources):
-        has = "accelerometers" if kind == "gyro" else "a gyro"
-        lacks = "gyro" if kind == "gyro" else "accelerometers"
-        raise written.refuse(path, "config.no", has=has, lacks=lacks)
+            "config.sensor-without-gyro"
+            if kind == "gyro"
+            else "config.sensor-without-accelerometers",
+        )
 
 
 def _known_keys(
@@ -97,14 +97,14 @@ def _known_keys(
     for name, given in stated.items():
         path = (*at, "uncertainty", name)
         if name not in known:
-            raise written.file.refuse(path, "config.no-such-key", word=name[:100], known=known)
+            raise written.file.refuse(path, "config.unknown-key", word=name[:100], known=known)
         quantity = known[name].quantity
         if quantity in by:
             raise written.contradiction(
                 path,
                 (*at, "uncertainty", by[quantity]),
-                "config.both-state",
-                replace=quantity.replace("_", " "),
+                "config.uncertainty-in-two-units",
+                property=quantity.replace("_", " "),
             )
         by[quantity] = name
         _fits(path, quantity, given, written)
@@ -114,11 +114,11 @@ def _fits(path: KeyPath, quantity: str, given: float | Triple, written: Written)
     numbers = given if isinstance(given, tuple) else (given,)
     error: ConfigError | None = None
     if min(numbers) < 0.0:
-        error = written.refuse(path, "config.negative-2")
+        error = written.refuse(path, "config.negative-uncertainty")
     elif quantity in ("full_scale", "bandwidth") and min(numbers) == 0.0:
-        error = written.refuse(path, "config.zero-leaves-nothing-measure")
+        error = written.refuse(path, "config.zero-uncertainty")
     elif quantity == "bandwidth" and len(numbers) != 1:
-        error = written.refuse(path, "config.all-axes-bandwidth")
+        error = written.refuse(path, "config.bandwidth-by-axis")
     if error is not None:
         raise error
 

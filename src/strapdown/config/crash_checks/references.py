@@ -13,9 +13,9 @@ _NO_USE = {
     "delta_v": ("path",),
 }
 _NEEDED = {"path": "path", "delta_v": "delta_v_m_per_s"}
-_WHY = {
-    "path": "a path has no such number",
-    "delta_v": "a change of velocity is one number, and no file",
+_UNUSED = {
+    "path": "config.reference-path-no-use",
+    "delta_v": "config.reference-delta-v-no-use",
 }
 # No crash on a road changes a velocity by more.
 MOST = 90.0  # m/s
@@ -34,26 +34,22 @@ def check_references(spec: CaseSpec, written: Written) -> None:
         at = ("references", k)
         for name in _NO_USE[reference.kind]:
             if written.has(*at, name):
-                other = "delta_v" if reference.kind == "path" else "path"
-                raise written.contradiction(
-                    (*at, name),
-                    (*at, "kind"),
-                    _WHY[reference.kind],
-                    f'take it away, or write kind = "{other}"; both are two [[references]]',
-                )
+                raise written.contradiction((*at, name), (*at, "kind"), _UNUSED[reference.kind])
         needed = _NEEDED[reference.kind]
         if getattr(reference, needed) is None:
-            raise written.missing((*at, needed), "config.missing-kind", kind=reference.kind)
+            raise written.missing(
+                (*at, needed), "config.reference-value-missing", kind=reference.kind
+            )
         change = reference.delta_v_m_per_s
         if change is None:
             continue
         if abs(change) > MOST:
             raise written.refuse(
-                (*at, "delta_v_m_per_s"), "config.change-km-h", change=3.6 * change
+                (*at, "delta_v_m_per_s"), "config.delta-v-too-large", change=3.6 * change
             )
         if reference.axis == "resultant" and change < 0.0:
             raise written.contradiction(
-                (*at, "delta_v_m_per_s"), (*at, "axis"), "config.resultant-no-sign"
+                (*at, "delta_v_m_per_s"), (*at, "axis"), "config.resultant-with-sign"
             )
         if reference.over_s is not None and not reference.over_s[0] < reference.over_s[1]:
-            raise written.refuse((*at, "over_s"), "config.ends-before-begins-2")
+            raise written.refuse((*at, "over_s"), "config.reference-end-before-begin")

@@ -14,7 +14,6 @@ __all__ = ["check_triads"]
 
 _UNITS = {"accel": ACCEL_UNITS, "gyro": GYRO_UNITS}
 _OTHER = {"accel": "gyro", "gyro": "accel"}
-_NAMES = {"accel": "an accelerometer", "gyro": "a gyro"}
 
 
 def check_triads(spec: CaseSpec, written: Written) -> None:
@@ -47,23 +46,21 @@ def _channels(
     at: KeyPath, triad: TriadSpec, used: dict[tuple[str, str], KeyPath], written: Written
 ) -> None:
     if not triad.channels:
-        raise written.missing((*at, "channels"), "config.missing-nothing-says-axes-recorded")
+        raise written.missing((*at, "channels"), "config.channels-missing")
     for axis, channel in triad.channels.items():
         path = (*at, "channels", axis)
         name = channel.removeprefix("-").strip()
         if not name:
-            raise written.refuse(path, "config.sign-no-channel")
+            raise written.refuse(path, "config.sign-without-channel")
         if name == triad.time:
-            raise written.contradiction(path, (*at, "time"), "config.time-no-axis")
+            raise written.contradiction(path, (*at, "time"), "config.time-as-axis")
         before = used.setdefault((triad.path, name), path)
         if before != path:
             gyro = "gyro" in at and "gyro" in before
             raise written.contradiction(
                 path,
                 before,
-                "config.channel-lies-along-axis-triad"
-                if gyro
-                else "config.channel-lies-along-axis-triad-2",
+                "config.gyro-channel-used-twice" if gyro else "config.channel-used-twice",
             )
 
 
@@ -76,14 +73,17 @@ def _unit(at: KeyPath, kind: str, triad: TriadSpec, written: Written) -> None:
         if unit in _UNITS[_OTHER[kind]]:
             raise written.refuse(
                 (*at, "unit"),
-                "config.unit",
-                names=_NAMES[_OTHER[kind]],
-                names_2=_NAMES[kind],
+                "config.gyro-unit-of-accelerometers"
+                if kind == "accel"
+                else "config.accelerometer-unit-of-gyro",
                 units=_UNITS[kind],
             )
     if triad.time_unit is not None:
         unit = unit_of(triad.time_unit) or triad.time_unit
         if unit not in TIME_UNITS:
             raise written.refuse(
-                (*at, "time_unit"), "config.no-unit-time", word=triad.time_unit, known=TIME_UNITS
+                (*at, "time_unit"),
+                "config.unknown-time-unit",
+                word=triad.time_unit,
+                known=TIME_UNITS,
             )

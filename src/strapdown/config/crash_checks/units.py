@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from strapdown.config.crash_case import CaseSpec, UnitSpec
 from strapdown.config.crash_checks.assumed import check_assumed
 from strapdown.config.crash_checks.written import Written
-from strapdown.errors import nearest
 
 __all__ = ["check_names", "check_units"]
 
@@ -35,7 +34,7 @@ def check_units(spec: CaseSpec, written: Written) -> None:
         if spec.options.clock == "trigger" and unit.trigger_sd_s > MOST_TRIGGER_SD:
             raise written.refuse(
                 ("units", k, "trigger_sd_s"),
-                "config.trigger-known-ties-no-clocks",
+                "config.trigger-sd-too-large",
                 trigger_sd_s=unit.trigger_sd_s,
             )
         check_assumed(k, spec, written)
@@ -58,7 +57,7 @@ def check_names(several: str, names: Sequence[str], written: Written) -> None:
             raise written.contradiction(
                 (several, k, "name"),
                 (several, seen[same], "name"),
-                "config.two-name-cannot-told-apart",
+                "config.name-repeated",
             )
         seen[same] = k
 
@@ -66,24 +65,22 @@ def check_names(several: str, names: Sequence[str], written: Written) -> None:
 def _triggered(spec: CaseSpec, written: Written) -> None:
     without = [k for k, unit in enumerate(spec.units) if unit.trigger_s is None]
     if without and spec.options.clock == "trigger":
-        raise written.missing(
-            ("units", without[0], "trigger_s"), "config.missing-clocks-tied-common-trigger"
-        )
+        raise written.missing(("units", without[0], "trigger_s"), "config.trigger-missing")
     if len(without) == len(spec.units):
-        raise written.missing(("units", 0, "trigger_s"), "config.missing-no-unit-time")
+        raise written.missing(("units", 0, "trigger_s"), "config.no-unit-with-trigger")
 
 
 def _placed(k: int, unit: UnitSpec, written: Written) -> None:
-    for name, why in (
-        ("position_m", "delta-V and the direction of force move with the lever arm"),
-        ("position_sd_m", "the bound of delta-V widens with the error of the lever arm"),
+    for name, code in (
+        ("position_m", "config.unit-position-missing"),
+        ("position_sd_m", "config.unit-position-sd-missing"),
     ):
         if not written.has("units", k, name):
-            raise written.missing(("units", k, name), why)
+            raise written.missing(("units", k, name), code)
     if any(abs(angle) > MOST_ANGLE for angle in unit.angles_deg):
-        raise written.refuse(("units", k, "angles_deg"), "config.angles-between")
+        raise written.refuse(("units", k, "angles_deg"), "config.angles-beyond-turn")
     if unit.angles_sd_deg > STEEPEST:
-        raise written.refuse(("units", k, "angles_sd_deg"), "config.more-than-nothing-known-how")
+        raise written.refuse(("units", k, "angles_sd_deg"), "config.mounting-sd-too-large")
 
 
 def _gyro(k: int, spec: CaseSpec, written: Written) -> None:
@@ -92,30 +89,31 @@ def _gyro(k: int, spec: CaseSpec, written: Written) -> None:
     if lender is None:
         return
     if unit.gyro is not None:
-        raise written.contradiction(at, ("units", k, "gyro"), "config.unit-gyro-borrows-none")
+        raise written.contradiction(at, ("units", k, "gyro"), "config.gyro-and-lender")
     if lender == unit.name:
-        raise written.contradiction(at, ("units", k, "name"), "config.unit-lends-itself-nothing")
+        raise written.contradiction(at, ("units", k, "name"), "config.lender-is-borrower")
     lenders = [n for n, other in enumerate(spec.units) if other.name == lender]
     with_gyro = [other.name for other in spec.units if other.gyro is not None]
-    known = nearest(lender, with_gyro) if with_gyro else "no unit of this case has a gyro"
     if not lenders:
-        raise written.refuse(at, "there is no such unit", known)
+        code = "config.unknown-unit-with-gyro" if with_gyro else "config.unknown-unit-no-gyro"
+        raise written.refuse(at, code, word=lender, known=with_gyro)
     if spec.units[lenders[0]].gyro is None:
+        code = "config.lender-without-gyro" if with_gyro else "config.no-unit-with-gyro"
         raise written.contradiction(
-            at, ("units", lenders[0], "name"), "that unit has no gyro itself", known
+            at, ("units", lenders[0], "name"), code, word=lender, known=with_gyro
         )
 
 
 def _levelled(k: int, unit: UnitSpec, written: Written) -> None:
     level, sd = ("units", k, "levelling_deg"), ("units", k, "levelling_sd_deg")
     if unit.levelling_deg is not None and unit.levelling_sd_deg is None:
-        raise written.missing(sd, "config.missing-says-not-how-well", said=written.said(*level))
+        raise written.missing(sd, "config.levelling-sd-missing", said=written.said(*level))
     if unit.levelling_deg is None and unit.levelling_sd_deg is not None:
-        raise written.missing(level, "config.missing-nothing", said=written.said(*sd))
+        raise written.missing(level, "config.levelling-missing", said=written.said(*sd))
     if unit.levelling_deg is not None and max(abs(a) for a in unit.levelling_deg) > STEEPEST:
-        raise written.refuse(level, "config.roll-pitch-before-crash-within")
+        raise written.refuse(level, "config.levelling-too-steep")
     if unit.levelling_sd_deg is not None and unit.levelling_sd_deg > STEEPEST:
-        raise written.refuse(sd, "config.more-than-nothing-known")
+        raise written.refuse(sd, "config.levelling-sd-too-large")
 
 
 def _rest(k: int, spec: CaseSpec, written: Written) -> None:
@@ -124,15 +122,15 @@ def _rest(k: int, spec: CaseSpec, written: Written) -> None:
         return
     start, end = unit.rest_s
     if not start < end:
-        raise written.refuse(at, "config.ends-before-begins-3")
+        raise written.refuse(at, "config.rest-end-before-begin")
     if end > 0.0:
-        raise written.refuse(at, "config.ends-after-trigger-vehicle-struck", end=end)
+        raise written.refuse(at, "config.rest-after-trigger", end=end)
     entry, speed = spec.entry, ("entry", "speed_m_per_s")
     if entry.kind == "speed" and entry.speed_m_per_s and end > entry.time_s:
         raise written.contradiction(
             at,
             ("entry", "time_s"),
-            "config.vehicle-said-stand-when-drives",
+            "config.rest-after-entry",
             default=entry.time_s,
             said=written.said(*speed),
         )

@@ -10,7 +10,7 @@ from strapdown.config.case_wanted import what_to_write
 from strapdown.config.shown import shown, shown_key
 from strapdown.config.toml_file import TomlFile
 from strapdown.config.toml_lines import KeyPath
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, Finding
 
 __all__ = ["Written"]
 
@@ -43,27 +43,28 @@ class Written:
             return f"{path[-1]} = {shown(default)} (as nothing else is written)"
         return f"{self._equation(path, value)} (line {self.file.line(self._at(path))})"
 
-    def refuse(self, path: KeyPath, why: str, remedy: str) -> ConfigError:
-        """An error about one value."""
+    def refuse(self, path: KeyPath, code: str, /, **data: Any) -> ConfigError:
+        """Return an error about one value, which the sentence shows first."""
         value = self._value(path)
-        what = f"{shown(value)}: {why}" if value is not None and not _big(value) else why
-        return self.file.refuse(self._at(path), what, remedy)
+        if value is not None and not _big(value):
+            data["shown"] = shown(value)
+        return self.file.refuse(self._at(path), code, **data)
 
-    def refuse_as_told(self, path: KeyPath, what: str, remedy: str) -> ConfigError:
-        """An error about one value that names it in its own words."""
-        return self.file.refuse(self._at(path), what, remedy)
+    def located(self, path: KeyPath, finding: Finding) -> ConfigError:
+        """Return an error of a finding that names the value itself, at its key."""
+        return self.file.refuse(self._at(path), finding)
 
-    def missing(self, path: KeyPath, why: str) -> ConfigError:
-        """An error about a field that is not written, though it is needed."""
-        return self.file.refuse(path, f"it is missing: {why}", what_to_write(path))
+    def missing(self, path: KeyPath, code: str, /, **data: Any) -> ConfigError:
+        """Return an error about a field that is not written, though it is needed."""
+        return self.file.refuse(path, code, wanted=what_to_write(path), **data)
 
     def contradiction(
-        self, path: KeyPath, other: KeyPath, why: str, remedy: str, default: Any = None
+        self, path: KeyPath, other: KeyPath, code: str, /, default: Any = None, **data: Any
     ) -> ConfigError:
-        """An error about two values that cannot both be meant."""
+        """Return an error about two values that exclude each other."""
         mine = self._equation(path, self._value(path))
-        what = f"{mine} contradicts {self.said(*other, default=default)}: {why}"
-        return self.file.refuse(self._at(path), what, remedy)
+        other_words = self.said(*other, default=default)
+        return self.file.refuse(self._at(path), code, mine=mine, other=other_words, **data)
 
     def key(self, *path: str | int) -> str:
         """The name of the key as the file has it."""
