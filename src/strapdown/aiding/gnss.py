@@ -110,7 +110,9 @@ class Gnss(TableAid):
     def __post_init__(self) -> None:
         arm = self.lever_arm
         if len(arm) != 3 or not all(is_number(x) and math.isfinite(x) for x in arm):
-            raise ConfigError("navigation.no-lever-arm", quantity="lever_arm", arm=arm)
+            raise ConfigError(
+                "navigation.lever-arm-not-three-numbers", quantity="lever_arm", arm=arm
+            )
         for name, least, most in (
             ("time_offset", -math.inf, math.inf),
             ("time_offset_sd", 0.0, LARGEST_OFFSET),
@@ -136,7 +138,7 @@ class Gnss(TableAid):
                 )
         if not (self.use_position or self.use_velocity):
             raise ConfigError(
-                "navigation.neither-places-nor-velocities-used",
+                "navigation.nothing-of-fixes-used",
                 quantity="use_position, use_velocity",
             )
         if not set(self.qualities) <= set(QUALITIES) - {0}:
@@ -275,7 +277,7 @@ def _refuse_certain(
         row, column = certain[0].tolist()
         what = "least_position_sd_m" if code == POSITION_CODE else "least_velocity_sd_m_per_s"
         raise DataError(
-            "navigation.standard-deviation-zero-rows-filter",
+            "navigation.sd-zero-in-rows",
             file=source_of(table),
             row=row + 1,
             quantity=columns[column],

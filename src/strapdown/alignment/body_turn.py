@@ -79,22 +79,22 @@ def turn_findings(
     size = float(np.sqrt(site.earth_rate @ site.earth_rate))
     mirrored = abs(rate + 2.0 * -vertical) < abs(rate) / 10.0
     # Against the level of a latitude, a body that stands turns by what that has too much.
-    told = (vertical - rate) / size
-    elsewhere = (
-        f"; if it stood, the latitude by its gyros is {np.degrees(np.arcsin(told)):.3g} deg"
-        if abs(told) <= 1.0
-        else ""
-    )
+    sine = (vertical - rate) / size
+    latitude = {"measured_deg": np.degrees(np.arcsin(sine))} if abs(sine) <= 1.0 else {}
+    if mirrored:
+        code = "alignment.turns-about-vertical-latitude-mirrored"
+    elif latitude:
+        code = "alignment.turns-about-vertical-as-elsewhere"
+    else:
+        code = "alignment.turns-about-vertical"
     return (
         Finding(
-            "alignment.turns-about-vertical-latitude-mirrored"
-            if mirrored
-            else "alignment.turns-about-vertical",
+            code,
             file=source,
             quantity="gyro",
             rate=rate * DEG_PER_HOUR,
             sd=sd * DEG_PER_HOUR,
             lat_deg=site.lat_deg,
-            elsewhere=elsewhere,
+            **latitude,
         ),
     )

@@ -199,19 +199,16 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
         )
     first, last = np.searchsorted(stamps, [time[0], time[-1]])
     cost = interpolation_cost(reference.iloc[max(0, first - 2) : last + 2], ellipsoid)
-    judged = (
-        "what that costs cannot be told from fewer than three rows"
-        if cost is None
-        else f"judged by leaving rows out, that costs up to {cost.position_m:.2g} m, "
-        f"{cost.velocity_m_s:.2g} m/s and {cost.rotation_deg:.2g}°"
-    )
+    costs = {} if cost is None else vars(cost)
     return [
         *findings,
         Finding(
-            "evaluation.reference-no-row-instants-estimate",
+            "evaluation.reference-interpolated-at-unknown-cost"
+            if cost is None
+            else "evaluation.reference-interpolated",
             file=source,
             quantity="time",
             size=time.size,
-            judged=judged,
+            **costs,
         ),
     ]

@@ -145,7 +145,7 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
     wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
     if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
         raise DataError(
-            "navigation.all-gyros-times-noisy-their",
+            "navigation.gyros-seem-in-deg-per-s",
             file=source_of(imu),
             quantity="gyro",
             times=times.min(),
@@ -167,7 +167,7 @@ def _refuse_unit(imu: pd.DataFrame) -> None:
         wanted = STANDARD_GRAVITY * factor
         if abs(size / wanted - 1.0) < NEAR:
             raise DataError(
-                "navigation.half-time-three-together-read",
+                "navigation.accelerometers-seem-in-other-unit",
                 file=source_of(imu),
                 quantity="accel",
                 size=size,

@@ -143,7 +143,7 @@ class Filtering:
         if steps.size and not steps.min() >= 1.0:
             row = int(np.argmin(steps))
             raise DataError(
-                "navigation.samples-not-evenly-spaced-followed",
+                "navigation.samples-uneven",
                 file=source,
                 quantity="time",
                 stamps=stamps[row],

@@ -72,7 +72,7 @@ def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
     if ((time >= stamps[0]) & (time <= stamps[-1])).any():
         return
     raise DataError(
-        "navigation.goes-inertial-record-nothing-within",
+        "navigation.aid-outside-record",
         file=source_of(table),
         quantity="time",
         time=time[0],
@@ -127,29 +127,28 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
     if getattr(spec.mechanization, "height", "free") != "free":
         return ()
     length = float(imu.index[-1] - imu.index[0])
-    grows = f"its error grows by e every {VERTICAL:g} s"
-    if length > LONG:
-        times = math.exp(min(length / VERTICAL, 700.0))
-        grows += f", {times:.2g} times in all"
+    times = math.exp(min(length / VERTICAL, 700.0))
     model = getattr(getattr(spec.filter, "error_model", None), "kind", "")
     if (named := ERROR_MODELS.get(model)) is not None and not named.has_height:
         return (
             Finding(
-                "navigation.error-model-no-state-height",
+                "navigation.error-model-without-height",
                 file=source_of(imu),
                 quantity="height",
                 model=model,
-                grows=grows,
+                e_folding_s=VERTICAL,
+                times=times,
             ),
         )
     if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values()):
         return ()
     return (
         Finding(
-            "navigation.nothing-aids-height-minutes",
+            "navigation.height-not-aided",
             file=source_of(imu),
             quantity="height",
             length=length / 60.0,
-            grows=grows,
+            e_folding_s=VERTICAL,
+            times=times,
         ),
     )
