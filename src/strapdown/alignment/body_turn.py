@@ -80,10 +80,10 @@ def turn_findings(
     mirrored = abs(rate + 2.0 * -vertical) < abs(rate) / 10.0
     # Against the level of a latitude, a body that stands turns by what that has too much.
     sine = (vertical - rate) / size
-    latitude = {"measured_deg": np.degrees(np.arcsin(sine))} if abs(sine) <= 1.0 else {}
+    measured = float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
     if mirrored:
         code = "alignment.turns-about-vertical-latitude-mirrored"
-    elif latitude:
+    elif abs(sine) <= 1.0:
         code = "alignment.turns-about-vertical-as-elsewhere"
     else:
         code = "alignment.turns-about-vertical"
@@ -95,6 +95,6 @@ def turn_findings(
             rate=rate * DEG_PER_HOUR,
             sd=sd * DEG_PER_HOUR,
             lat_deg=site.lat_deg,
-            **latitude,
+            measured_deg=measured,
         ),
     )
