@@ -1,4 +1,4 @@
-"""Every sentence of the catalogue is replaced by nonsense: no number, verdict or exit code moves."""
+"""Every sentence replaced by nonsense: no number, verdict or exit code changes."""
 
 from __future__ import annotations
 
