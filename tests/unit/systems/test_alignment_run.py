@@ -119,7 +119,7 @@ def test_without_a_fine_alignment_the_coarse_one_is_the_answer():
     assert result.fine is None and result.readiness.fine.empty
     assert np.array_equal(result.end.q_nb, result.coarse.q_nb)
     assert result.manoeuvres == ()
-    assert [one.code for one in trust(result).short] == ["alignment.not-contradicted"]
+    assert trust(result).short[-1].code == "alignment.not-contradicted"
 
 
 def test_a_reference_that_is_far_off_is_held_against_it(tmp_path):
