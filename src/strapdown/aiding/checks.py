@@ -34,12 +34,14 @@ def check_number(
     value = getattr(aid, name)
     good = is_number(value) and math.isfinite(value) and low <= value <= high
     if not good or (above and value == low):
+        if high < math.inf:
+            code = "navigation.option-not-between"
+        elif low == -math.inf:
+            code = "navigation.option-not-finite"
+        else:
+            code = "navigation.option-not-above" if above else "navigation.option-below"
         raise ConfigError(
-            "navigation.out-range" if is_number(value) else "navigation.no-number",
-            file=aid.name or None,
-            quantity=name,
-            value=value,
-            range=_range(low, high, above),
+            code, file=aid.name or None, quantity=name, value=value, least=low, most=high
         )
 
 
@@ -67,12 +69,12 @@ def check_numbers(aid: Aid, name: str, count: int, *, low: float = -math.inf) ->
         is_number(x) and math.isfinite(x) and x >= low for x in given
     ):
         raise ConfigError(
-            "navigation.no-numbers",
+            "navigation.no-numbers" if low == -math.inf else "navigation.no-numbers-from",
             file=aid.name or None,
             quantity=name,
             value=value,
             count=count,
-            value_2="" if low == -math.inf else f" of {low:g} or more",
+            least=low,
         )
     object.__setattr__(aid, name, tuple(float(x) for x in given))
 
@@ -110,11 +112,5 @@ def check_other_name(aid: Aid, name: str) -> None:
     value = getattr(aid, name)
     if not isinstance(value, str) or (value and value == aid.name):
         raise ConfigError(
-            "navigation.no-name-another-aid", file=aid.name or None, quantity=name, value=value
+            "navigation.other-aid-name-invalid", file=aid.name or None, quantity=name, value=value
         )
-
-
-def _range(low: float, high: float, above: bool) -> str:
-    if high < math.inf:
-        return f"from {low:g} to {high:g}"
-    return f"{'above' if above else 'of at least'} {low:g}" if low > -math.inf else "that is finite"

@@ -110,7 +110,9 @@ class Gnss(TableAid):
     def __post_init__(self) -> None:
         arm = self.lever_arm
         if len(arm) != 3 or not all(is_number(x) and math.isfinite(x) for x in arm):
-            raise ConfigError("navigation.no-lever-arm", quantity="lever_arm", arm=arm)
+            raise ConfigError(
+                "navigation.lever-arm-not-three-numbers", quantity="lever_arm", arm=arm
+            )
         for name, least, most in (
             ("time_offset", -math.inf, math.inf),
             ("time_offset_sd", 0.0, LARGEST_OFFSET),
@@ -124,16 +126,19 @@ class Gnss(TableAid):
             value = getattr(self, name)
             if not (is_number(value) and math.isfinite(value) and least <= value <= most):
                 raise ConfigError(
-                    "navigation.message",
+                    "navigation.option-not-between"
+                    if math.isfinite(most)
+                    else "navigation.option-below"
+                    if math.isfinite(least)
+                    else "navigation.option-not-finite",
                     quantity=name,
-                    message=f"{value!r} is out of range",
-                    remedy_text="give a finite number"
-                    + (f" from {least:g}" if math.isfinite(least) else "")
-                    + (f" to {most:g}" if math.isfinite(most) else ""),
+                    value=value,
+                    least=least,
+                    most=most,
                 )
         if not (self.use_position or self.use_velocity):
             raise ConfigError(
-                "navigation.neither-places-nor-velocities-used",
+                "navigation.nothing-of-fixes-used",
                 quantity="use_position, use_velocity",
             )
         if not set(self.qualities) <= set(QUALITIES) - {0}:
@@ -272,7 +277,7 @@ def _refuse_certain(
         row, column = certain[0].tolist()
         what = "least_position_sd_m" if code == POSITION_CODE else "least_velocity_sd_m_per_s"
         raise DataError(
-            "navigation.standard-deviation-zero-rows-filter",
+            "navigation.sd-zero-in-rows",
             file=source_of(table),
             row=row + 1,
             quantity=columns[column],

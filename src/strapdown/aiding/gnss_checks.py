@@ -61,7 +61,7 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     placed = good & np.isfinite(values_of(table, POSITION_SD)).all(axis=1)
     fast = good & np.isfinite(values_of(table, VELOCITY_SD)).all(axis=1)
     if not len(time):
-        raise DataError("navigation.no-fix-all", file=source, quantity="time")
+        raise DataError("navigation.no-fixes", file=source, quantity="time")
     if not (placed | fast).any():
         raise DataError(
             "navigation.none-rows-fix-quality-or", file=source, quantity="quality", count=len(time)
@@ -111,20 +111,12 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
     row = int(rows[np.flatnonzero(clear)[0]]) + 1
     # Radians taken for degrees are near the equator, where a degree of longitude is longer.
     small = bool((np.abs(place[:, :2]) <= [0.5 * np.pi, np.pi]).all())
-    for fits, what, remedy in (
-        (small and 0.016 < ratio < 0.1, "radians", "multiply them by 57.2957795"),
-        (55.0 < ratio < 65.0, "minutes", "divide them by 60"),
+    for fits, code in (
+        (small and 0.016 < ratio < 0.1, "navigation.fixes-in-radians"),
+        (55.0 < ratio < 65.0, "navigation.fixes-in-minutes"),
     ):
         if fits:
-            raise DataError(
-                "navigation.places-move-times-fast-velocity",
-                file=source,
-                row=row,
-                quantity="lat, lon",
-                ratio=ratio,
-                what=what,
-                remedy=remedy,
-            )
+            raise DataError(code, file=source, row=row, quantity="lat, lon", ratio=ratio)
 
 
 def _certain(table: pd.DataFrame, good: Flags, source: str | None) -> list[Finding]:
@@ -137,7 +129,7 @@ def _certain(table: pd.DataFrame, good: Flags, source: str | None) -> list[Findi
         if zero.any():
             out.append(
                 Finding(
-                    "navigation.standard-deviation-zero-no-fix",
+                    "navigation.fix-sd-zero",
                     file=source,
                     row=int(np.argmax(zero)) + 1,
                     quantity=", ".join(columns),
@@ -154,20 +146,18 @@ def _gaps(time: Array, told: Flags, source: str | None) -> list[Finding]:
     if not gaps:
         return []
     longest = max(gaps, key=lambda gap: gap.length)
-    listed = ", ".join(f"{gap.length:.3g} s from {gap.start:.9g} s" for gap in gaps[:NAMED])
-    more = f" and {len(gaps) - NAMED} more" if len(gaps) > NAMED else ""
+    listed = [f"{gap.length:.3g} s from {gap.start:.9g} s" for gap in gaps[:NAMED]]
+    listed += ["…"] if len(gaps) > NAMED else []
     return [
         Finding(
-            "navigation.outage-fixes-longest-usual",
+            "navigation.outages" if len(gaps) > 1 else "navigation.outage",
             file=source,
             row=int(rows[longest.sample]) + 1,
             quantity="time",
             count=len(gaps),
-            value="s" if len(gaps) > 1 else "",
             length=longest.length,
             usual=longest.usual,
             listed=listed,
-            more=more,
         )
     ]
 
@@ -200,7 +190,7 @@ def _jumps(
     at[rows[1:][struck]] = True
     return [
         Finding(
-            "navigation.place-jumps-most-beyond-velocity",
+            "navigation.position-jumps",
             file=source,
             row=int(rows[k + 1]) + 1,
             quantity="lat, lon, alt",
@@ -229,7 +219,7 @@ def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None
     first = int(runs[0][0])
     return [
         Finding(
-            "navigation.receiver-repeats-itself",
+            "navigation.receiver-repeats",
             file=source,
             row=first + 1,
             quantity="lat, lon, alt, VN, VE, VD",
@@ -239,7 +229,7 @@ def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None
     ]
 
 
-def _rows(struck: Flags) -> str:
+def _rows(struck: Flags) -> list[int | str]:
+    """The first rows, counted from 1; dots where there are more."""
     at = (np.flatnonzero(struck) + 1).tolist()
-    more = f" and {len(at) - NAMED} more" if len(at) > NAMED else ""
-    return f"row{'s' if len(at) > 1 else ''} {', '.join(map(str, at[:NAMED]))}{more}"
+    return [*at[:NAMED], "…"] if len(at) > NAMED else at

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -83,37 +84,27 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     source = source_of(gnss)
     within = (time >= stamps[0]) & (time <= stamps[-1])
     if not within.any():
-        why, remedy = _difference(time, stamps)
+        code, clocks = _difference(time, stamps)
         raise DataError(
-            "navigation.message",
+            code,
             file=source,
             quantity="time",
-            message=f"fixes go from {time[0]:.9g} to {time[-1]:.9g} s and the inertial record from {stamps[0]:.9g} to {stamps[-1]:.9g} s: none is within it{why}",
-            remedy_text=remedy,
+            begin=time[0],
+            end=time[-1],
+            record_begin=stamps[0],
+            record_end=stamps[-1],
+            **clocks,
         )
     found = []
     inside = np.flatnonzero(within)
     usual = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     slack = 3.0 * usual + 1.0
-    for late, row, where in (
-        (float(time[inside[0]] - stamps[0]), int(inside[0]), "first"),
-        (float(stamps[-1] - time[inside[-1]]), int(inside[-1]), "last"),
+    for late, row, code in (
+        (float(time[inside[0]] - stamps[0]), int(inside[0]), "navigation.fixes-begin-late"),
+        (float(stamps[-1] - time[inside[-1]]), int(inside[-1]), "navigation.fixes-end-early"),
     ):
         if late > slack:
-            begins = where == "first"
-            found.append(
-                Finding(
-                    "navigation.message",
-                    file=source,
-                    row=row + 1,
-                    quantity="time",
-                    message=f"the {where} fix within the record is {late:.3g} s "
-                    + ("after its start" if begins else "before its end"),
-                    remedy_text="begin with the first fix, or give place and velocity of the start"
-                    if begins
-                    else "the rest is navigated without fixes: look at its standard deviations",
-                )
-            )
+            found.append(Finding(code, file=source, row=row + 1, quantity="time", apart=late))
     outside = len(time) - len(inside)
     if outside > 0.2 * len(time):
         found.append(
@@ -213,16 +204,20 @@ def find_time_offset(
         SURE * found.sd, LEAST_OFFSET, 3.0 * assumed_sd
     ):
         return []
-    known = f"; {assumed:g} s are configured" if assumed else ""
     leap = abs(abs(found.offset - assumed) - LEAP) < 0.5
     return [
         Finding(
-            "navigation.message",
+            "navigation.receiver-clock-off-leap-seconds"
+            if leap
+            else "navigation.receiver-clock-off",
             file=source_of(gnss),
             quantity="time",
-            message=f"stamps of the receiver are {found.offset:+.3f} s (standard deviation {found.sd:.3f}) off the time of the inertial sensors{known}: so the changes of its {found.by} are explained to {100.0 * found.share:.0f} %"
-            + (", and 18 s are the leap seconds between GPS time and UTC" if leap else ""),
-            remedy_text=f"set time_offset_s = {found.offset:.3g} and time_offset_sd_s = {max(0.05, 2.0 * found.sd):.2g}, so that the filter finds the rest",
+            offset=found.offset,
+            sd=found.sd,
+            configured=assumed,
+            explained_by=found.by,
+            share=found.share,
+            sd_to_set=max(0.05, 2.0 * found.sd),
         )
     ]
 
@@ -306,59 +301,57 @@ def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]
     return stamps[kept], sums[kept]
 
 
-def _difference(time: Array, stamps: Array) -> tuple[str, str]:
-    """What the difference of two clocks looks like, and what to do."""
+def _difference(time: Array, stamps: Array) -> tuple[str, dict[str, Any]]:
+    """The code of what the difference of two clocks looks like, and its data."""
     apart = float(time[0] - stamps[0])
     span = max(float(time[-1] - time[0]), float(stamps[-1] - stamps[0]), 60.0)
     known = (
-        (GPS_EPOCH - LEAP, "the one is Unix time and the other GPS time since 1980"),
-        (GPS_EPOCH, "the one is Unix time and the other counts from 1980"),
+        (GPS_EPOCH - LEAP, "navigation.no-fix-in-record-unix-and-gps-time"),
+        (GPS_EPOCH, "navigation.no-fix-in-record-unix-and-since-1980"),
     )
-    for size, what in known:
+    for size, code in known:
         if abs(abs(apart) - size) < span:
-            return (
-                f"; {what}",
-                f"take {math.copysign(size, apart):.0f} s off the stamps of the fixes",
-            )
+            return code, {"shift": math.copysign(size, apart)}
     for ratio, unit in ((1e3, "ms"), (1e6, "µs"), (1e9, "ns")):
-        for scaled, other, whose in ((time, stamps, "the fixes"), (stamps, time, "the record")):
+        for scaled, other, code in (
+            (time, stamps, "navigation.no-fix-in-record-unit-of-fixes"),
+            (stamps, time, "navigation.no-fix-in-record-unit-of-record"),
+        ):
             if abs(scaled[0] / ratio - other[0]) < span / ratio + span and other[0] > span:
-                return f"; those of {whose} seem to be in {unit}", f"divide them by {ratio:g}"
+                return code, {"unit": unit, "ratio": ratio}
     kinds = [_kind(float(x[0]), span) for x in (time, stamps)]
     if kinds[0] != kinds[1]:
-        words = f"; the fixes seem to have {kinds[0]}, and the record {kinds[1]}"
-        week = "the second of the GPS week"
-        if set(kinds) == {"Unix time", week}:
-            shift = _to_week(time if kinds[0] == "Unix time" else stamps)
-            whose = "the fixes" if kinds[0] == "Unix time" else "the inertial record"
-            return words, f"take {shift:.0f} s off the stamps of {whose}"
-        return (
-            words,
-            "bring both to one clock: the stamp of one event in both gives what to take off",
-        )
-    for length, name in ((WEEK, "week"), (86_400.0, "day"), (3600.0, "hour")):
+        clocks = {"clock": kinds[0], "record_clock": kinds[1]}
+        if kinds == [UNIX_TIME, GPS_WEEK]:
+            shift = {"shift": _to_week(time)}
+            return "navigation.no-fix-in-record-fixes-in-unix-time", {**clocks, **shift}
+        if kinds == [GPS_WEEK, UNIX_TIME]:
+            shift = {"shift": _to_week(stamps)}
+            return "navigation.no-fix-in-record-record-in-unix-time", {**clocks, **shift}
+        return "navigation.no-fix-in-record-two-clocks", clocks
+    for length, code in (
+        (WEEK, "navigation.no-fix-in-record-weeks-apart"),
+        (86_400.0, "navigation.no-fix-in-record-days-apart"),
+        (3600.0, "navigation.no-fix-in-record-hours-apart"),
+    ):
         count = round(apart / length)
         if count and abs(apart - count * length) < min(span, 0.2 * length):
-            many = f"{abs(count)} {name}{'s' if abs(count) > 1 else ''}"
-            return (
-                f"; they are about {many} apart",
-                f"take {count * length:.0f} s off the stamps of the fixes, if it is a matter of "
-                "time zones or of the turn of the week",
-            )
-    return (
-        f"; they are {abs(apart):.6g} s apart",
-        f"give the fixes of this record, or set time_offset_s = {apart:.6g} if both began together",
-    )
+            return code, {"count": abs(count), "shift": count * length}
+    return "navigation.no-fix-in-record", {"apart": abs(apart), "shift": apart}
+
+
+UNIX_TIME, GPS_WEEK = "Unix time", "seconds of the GPS week"
 
 
 def _kind(first: float, span: float) -> str:
+    """Name of the clock that a first stamp looks like."""
     if UNIX[0] <= first <= UNIX[1]:
-        return "Unix time"
+        return UNIX_TIME
     if abs(first) < max(span, 100.0):
-        return "seconds from a start of their own"
+        return "seconds from its own start"
     if 0.0 <= first <= WEEK:
-        return "the second of the GPS week"
-    return "a clock of their own"
+        return GPS_WEEK
+    return "another clock"
 
 
 def _to_week(unix: Array) -> float:

@@ -144,24 +144,16 @@ def find_velocity_delay(table: pd.DataFrame, assumed: float = 0.0) -> list[Findi
     stated = float(np.median(sds[np.isfinite(sds)]))
     if abs(off) < SURE * found.sd or abs(off) * found.changing < MATTERS * stated:
         return []
-    known = f"; {assumed:g} s are configured" if assumed else ""
-    what = (
-        f"the velocity is {abs(found.delay):.3f} s (standard deviation {found.sd:.3f}) "
-        f"{'later' if found.delay > 0.0 else 'earlier'} than the places of the same rows{known}: "
-        f"its integral fits them best so, over {found.steps} steps"
-    )
-    remedy = (
-        f"set velocity_delay_s = {found.delay:.3g}"
-        if found.delay > 0.0
-        else "use two aids with this table, one with use_velocity = false and time_offset_s "
-        f"greater by {-found.delay:.3g} than that of the other, which has use_position = false"
-    )
     return [
         Finding(
-            "navigation.message",
+            "navigation.velocity-later-than-position"
+            if found.delay > 0.0
+            else "navigation.velocity-earlier-than-position",
             file=source_of(table),
             quantity="VN, VE, VD",
-            message=what,
-            remedy_text=remedy,
+            delay=abs(found.delay),
+            sd=found.sd,
+            configured=assumed,
+            steps=found.steps,
         )
     ]

@@ -99,17 +99,16 @@ class StandstillAid(WatchingAid):
     gate_time: float = field(default=0.0, metadata={"unit": "s"})
 
     def __post_init__(self) -> None:
-        for name, what, table in (
-            ("detector", "detector", STANDSTILL_DETECTORS),
-            ("threshold_rule", "rule of a threshold", STANDSTILL_THRESHOLDS),
+        for name, code, table in (
+            ("detector", "navigation.unknown-detector", STANDSTILL_DETECTORS),
+            ("threshold_rule", "navigation.unknown-threshold-rule", STANDSTILL_THRESHOLDS),
         ):
             value = getattr(self, name)
             if value not in table:
                 raise ConfigError(
-                    "navigation.no",
+                    code,
                     file=self.name or None,
                     quantity=name,
-                    what=what,
                     value=value,
                     word=str(value),
                     known=table,

@@ -79,22 +79,22 @@ def turn_findings(
     size = float(np.sqrt(site.earth_rate @ site.earth_rate))
     mirrored = abs(rate + 2.0 * -vertical) < abs(rate) / 10.0
     # Against the level of a latitude, a body that stands turns by what that has too much.
-    told = (vertical - rate) / size
-    elsewhere = (
-        f"; if it stood, the latitude by its gyros is {np.degrees(np.arcsin(told)):.3g} deg"
-        if abs(told) <= 1.0
-        else ""
-    )
+    sine = (vertical - rate) / size
+    measured = float(np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
+    if mirrored:
+        code = "alignment.turns-about-vertical-latitude-mirrored"
+    elif abs(sine) <= 1.0:
+        code = "alignment.turns-about-vertical-as-elsewhere"
+    else:
+        code = "alignment.turns-about-vertical"
     return (
         Finding(
-            "alignment.body-turns-about-vertical-h"
-            if mirrored
-            else "alignment.body-turns-about-vertical-h-2",
+            code,
             file=source,
             quantity="gyro",
             rate=rate * DEG_PER_HOUR,
             sd=sd * DEG_PER_HOUR,
             lat_deg=site.lat_deg,
-            elsewhere=elsewhere,
+            measured_deg=measured,
         ),
     )

@@ -141,7 +141,7 @@ def _sample(stamps: Array, time: float, imu: pd.DataFrame) -> int:
     slack = 0.5 * float(np.median(np.diff(stamps))) * (1.0 + 1e-6)
     if not stamps[0] - slack <= time <= stamps[-1] + slack:
         raise DataError(
-            "alignment.not-within-record-lasts-gyros",
+            "alignment.instant-outside-record",
             file=source_of(imu),
             quantity="time",
             time=time,

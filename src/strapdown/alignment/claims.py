@@ -66,7 +66,7 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
     moved = float(heading[-1] - heading[0])
     if result.heading_given and abs(moved) > BEYOND * result.prior_heading_sd_deg:
         raise DataError(
-            "alignment.filter-turned-heading-before-known",
+            "alignment.heading-contradicted-by-gyros",
             file=result.source,
             quantity="heading",
             moved=moved,
@@ -80,7 +80,7 @@ def refuse_false_claims(result: FineResult, site: Site) -> None:
         return
     gyro = DEG_PER_HOUR * float(np.max(result.filter.model.sensors[0].sd[:3]))
     raise DataError(
-        "alignment.filter-claims-heading-gyros-whose",
+        "alignment.heading-claimed-beyond-gyros",
         file=result.source,
         quantity="heading",
         sd=sd,

@@ -105,9 +105,7 @@ def course_fixes(
         last two of them are too slow.
     """
     if gnss is None:
-        raise DataError(
-            "alignment.no-fixes-course-comes-nothing", file=source_of(imu), quantity="gnss"
-        )
+        raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")
     check_gnss(gnss)
     source = source_of(gnss)
     first, last = float(imu.index[0]), float(imu.index[-1])
@@ -119,7 +117,7 @@ def course_fixes(
     good &= np.isfinite(sd[:, :2]).all(axis=1)
     if good.sum() < 2:
         raise DataError(
-            "alignment.fixes-between-inertial-record-velocity",
+            "alignment.too-few-fix-velocities",
             file=source,
             quantity="VN, VE",
             first=first,
@@ -135,7 +133,7 @@ def course_fixes(
     if not fast[-2:].all():
         k = len(fast) - 2 + int(np.flatnonzero(~fast[-2:])[-1])
         raise DataError(
-            "alignment.vehicle-moves-standard-deviation-course",
+            "alignment.vehicle-too-slow-for-course",
             file=source,
             row=int(rows[k]) + 1,
             quantity="VN, VE",

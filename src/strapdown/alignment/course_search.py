@@ -108,7 +108,7 @@ class CourseSearch:
         found = _converged(fit, found, Igg3())
         if found.onward < MOST:
             raise DataError(
-                "alignment.fixes-those-count-course-not",
+                "alignment.course-contradicts-forward",
                 file=fixes.source,
                 quantity="VN, VE",
                 count=len(fixes.time),
@@ -167,7 +167,7 @@ def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
     times = "it is" if len(out) == 1 else "they are"
     return (
         Finding(
-            "alignment.velocities-fixes-do-not-count",
+            "alignment.fix-velocities-rejected",
             file=fixes.source,
             row=int(fixes.row[out[0]]),
             quantity="VN, VE, VD",

@@ -23,7 +23,7 @@ from strapdown.alignment.fine_epochs import (
 from strapdown.alignment.fine_findings import fine_findings
 from strapdown.alignment.fine_record import telling_record
 from strapdown.alignment.fine_result import Epochs, FineResult, alignment_of
-from strapdown.alignment.north import unit_remedy
+from strapdown.alignment.north import seems_in_deg_per_s
 from strapdown.alignment.site import Site
 from strapdown.alignment.stationary import (
     OBSERVATIONS,
@@ -107,18 +107,18 @@ class FineAlignment:
     def __post_init__(self) -> None:
         if not is_number(self.interval) or not 0.0 < self.interval <= 60.0:
             raise ConfigError(
-                "alignment.no-interval-observations", quantity="interval", interval=self.interval
+                "alignment.interval-out-of-range", quantity="interval", interval=self.interval
             )
         unknown = [name for name in self.observe if name not in OBSERVATIONS]
         if unknown or "velocity" not in self.observe:
             raise ConfigError(
-                "alignment.not-rest-tells",
+                "alignment.unknown-rest-observation",
                 quantity="observe",
                 observe=", ".join(self.observe) or "nothing",
                 observations=OBSERVATIONS,
             )
         if self.mechanization.height == "damped":
-            raise ConfigError("alignment.height-damped-filter-no-states", quantity="height")
+            raise ConfigError("alignment.height-damped", quantity="height")
 
     def align(
         self,
@@ -192,7 +192,7 @@ class FineAlignment:
         ends = epoch_ends(begin, time, self.interval)
         if ends.size < LEAST_EPOCHS:
             raise DataError(
-                "alignment.record-epochs",
+                "alignment.too-few-epochs",
                 file=source_of(imu),
                 quantity="time",
                 time=time[-1] - begin,
@@ -247,7 +247,7 @@ class FineAlignment:
             back = self._backward(replace(home, time=end), increments)
             return replace(home, time=begin, q_nb=back.q_nb)
         raise DataError(
-            "alignment.coarse-alignment-holds-record-goes",
+            "alignment.coarse-alignment-at-other-instant",
             file=source_of(increments),
             quantity="time",
             time=coarse.time,
@@ -289,7 +289,7 @@ def _free_run(
         away = np.abs(rate - np.median(rate, axis=0))
         row, axis = (int(k) for k in np.unravel_index(int(away.argmax()), away.shape))
         raise DataError(
-            "alignment.record-not-body-rest-reckoned",
+            "alignment.record-not-stationary",
             file=source,
             row=row + 1,
             quantity=GYRO[axis],
@@ -303,12 +303,14 @@ def _check_coarse(coarse: Alignment, imu: pd.DataFrame, site: Site) -> None:
     sd = math.degrees(math.sqrt(coarse.covariance[2, 2]))
     if not sd <= math.degrees(MOST_HEADING):
         raise DataError(
-            "alignment.message",
+            "alignment.coarse-heading-too-uncertain-gyros-in-deg-per-s"
+            if seems_in_deg_per_s(values_of(imu, GYRO).mean(axis=0), site)
+            else "alignment.coarse-heading-too-uncertain",
             file=source_of(imu),
             quantity="heading",
-            message=f"alignment '{coarse.method}' knows the heading to ± {sd:.3g} deg (one standard deviation), and a fine alignment begins within {math.degrees(MOST_HEADING):.3g} deg",
-            remedy_text=unit_remedy(values_of(imu, GYRO).mean(axis=0), site)
-            or "state the heading, or align longer, or use gyros of a better grade",
+            method=coarse.method,
+            sd_deg=sd,
+            most_deg=math.degrees(MOST_HEADING),
         )
 
 
@@ -321,7 +323,7 @@ def _within(increments: pd.DataFrame, imu: pd.DataFrame) -> pd.DataFrame:
     part.attrs = dict(imu.attrs)
     if part.empty:
         raise DataError(
-            "alignment.increments-do-not-cover-record",
+            "alignment.increments-outside-record",
             file=source_of(imu),
             quantity="increments",
             first=first,

@@ -12,8 +12,10 @@ from strapdown.alignment.stationary import velocity_of_noise
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.errors import Finding
 
-#: Quantity of the finding of a body that rocks: no fault, where a coarse alignment lets it.
-ROCKS = "rocking"
+#: Code of the finding of a body that rocks: no fault, where a coarse alignment lets it.
+ROCKS = "alignment.body-rocks"
+#: Code of the finding of a bias that is beyond what the data sheet allows; data `sensor`.
+BIASED = "alignment.bias-beyond-data-sheet"
 # A heading less sure than this is no north.
 NO_NORTH = 5.0  # deg
 # Of what it was before, where a filter has found nothing.
@@ -54,7 +56,7 @@ def _north(result: FineResult, site: Site) -> Iterator[Finding]:
     if sd > min(NO_NORTH, UNCHANGED * result.prior_heading_sd_deg) and not result.heading_given:
         east = float(np.linalg.norm(site.earth_rate[:2])) * DEG_PER_HOUR
         yield Finding(
-            "alignment.heading-known-only-standard-deviation",
+            "alignment.heading-hardly-observable",
             file=result.source,
             quantity="heading",
             sd=sd,
@@ -73,15 +75,16 @@ def _stands(result: FineResult) -> Iterator[Finding]:
     moves = velocity > max(MOST_VELOCITY, OVER_NOISE * noise)
     if not moves and turn > MOST_TURN:
         yield Finding(
-            "alignment.body-rocks-epoch-epoch-turns",
+            ROCKS,
             file=result.source,
-            quantity=ROCKS,
+            quantity="rocking",
             turn=turn,
             velocity=velocity,
+            in_bound=True,
         )
     elif moves:
         yield Finding(
-            "alignment.body-does-not-stand-epoch",
+            "alignment.body-moves-between-epochs",
             file=result.source,
             quantity="time",
             velocity=velocity,
@@ -101,7 +104,7 @@ def _fits(result: FineResult) -> Iterator[Finding]:
         if mean > INCONSISTENT:
             at = float(late.index[int(share[:, worst].argmax())])
             yield Finding(
-                "alignment.observation-times-far-expected-squared",
+                "alignment.innovations-inconsistent",
                 file=result.source,
                 quantity=str(table.columns[worst]).removeprefix("nu "),
                 name=name,
@@ -121,7 +124,7 @@ def _biases(result: FineResult) -> Iterator[Finding]:
             if abs(value) > BEYOND * sd:
                 sensor = block.block.name.split("_")[0]
                 yield Finding(
-                    "alignment.reads-too-much-data-sheet",
+                    BIASED,
                     file=result.source,
                     quantity=f"{sensor}_{axis}",
                     sensor=sensor,

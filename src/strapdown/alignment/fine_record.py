@@ -13,9 +13,9 @@ from strapdown.errors import DataError, DivergenceError
 from strapdown.tables import GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = ["WITHOUT", "telling_record"]
+__all__ = ["telling_record"]
 
-WITHOUT = 'leave the fine alignment out (--coarse-only; kind = "none" in [fine])'
+GAPS = ("mechanization.gap-before-body-did-not", "mechanization.gap-body-did-not-known")
 
 
 @contextmanager
@@ -31,22 +31,17 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
         yield
     except DataError as error:
         f = error.finding
-        # A remedy that is an argument of a function helps nobody who has a command.
-        if f.remedy is None or "longest_step" not in f.remedy:
+        # The remedy of the mechanization is an argument that an alignment does not have.
+        if f.code not in GAPS:
             raise
         raise DataError(
-            "alignment.message",
-            file=f.file,
-            row=f.row,
-            quantity="time",
-            message=f.what,
-            remedy_text=f"align a stretch before or after it (--from, --duration; from_s and to_s in [log]), or {WITHOUT}",
+            "alignment.gap-in-fine-record", file=f.file, row=f.row, quantity="time", reason=f
         ) from None
     except DivergenceError as error:
         f = error.finding
         rate = float(np.linalg.norm(values_of(imu, GYRO).mean(axis=0)))
         raise DivergenceError(
-            "alignment.gyros-read-h-mean-earth",
+            "alignment.fine-alignment-diverged",
             file=imu.attrs.get("source"),
             row=f.row,
             quantity=f.quantity,

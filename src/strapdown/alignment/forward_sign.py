@@ -59,7 +59,7 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     if not (slope < 0.0 and abs(slope) > CLEAR * sd):
         return
     raise DataError(
-        "alignment.force-along-forward-axis-falls",
+        "alignment.drives-other-way",
         file=source_of(imu),
         quantity="heading",
         slope=-slope,

@@ -84,10 +84,9 @@ class GnssCourse(CoarseAlignment):
             value = getattr(self, name)
             if not (is_number(value) and math.isfinite(value) and value >= least):
                 raise ConfigError(
-                    "alignment.message",
+                    "alignment.not-finite" if least else "alignment.not-finite-or-negative",
                     quantity=name,
-                    message=f"{value!r} is out of range",
-                    remedy_text="give a finite number" + ("" if least else ", zero or more"),
+                    value=value,
                 )
 
     def align(
@@ -126,7 +125,7 @@ class GnssCourse(CoarseAlignment):
         sd = np.sqrt(np.linalg.eigvalsh(found.covariance[3:5, 3:5])[-1])
         if not sd < LARGEST_TILT_SD:
             raise DataError(
-                "alignment.fixes-leave-level-known-no",
+                "alignment.level-not-known-from-fixes",
                 file=fixes.source,
                 quantity="VN, VE",
                 time=fixes.time[-1] - fixes.time[0],

@@ -19,7 +19,7 @@ from strapdown.alignment.north import (
     LARGEST_SD,
     latitude_findings,
     north_findings,
-    unit_remedy,
+    seems_in_deg_per_s,
 )
 from strapdown.alignment.propagated_errors import sensor_covariance, sensor_noise
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
@@ -65,7 +65,11 @@ class InertialFrame(CoarseAlignment):
     def __post_init__(self) -> None:
         if self.at not in EPOCHS:
             raise ConfigError(
-                "alignment.no-epoch", quantity="at", at=self.at, word=str(self.at), known=EPOCHS
+                "alignment.unknown-epoch",
+                quantity="at",
+                at=self.at,
+                word=str(self.at),
+                known=EPOCHS,
             )
 
     def align(
@@ -154,26 +158,29 @@ def _refuse_travel(
     known = [f for f in findings if f.row is not None]
     if known:
         raise DataError(
-            "alignment.message",
+            "alignment.heading-lost",
             file=known[0].file,
             row=known[0].row,
             quantity=known[0].quantity,
-            message=f"{known[0].what}; the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
-            remedy_text=known[0].remedy,
+            reason=known[0],
+            sd_deg=np.degrees(sd[2]),
         )
     raise DataError(
-        "alignment.message",
+        "alignment.body-travelled-or-gyros-in-deg-per-s"
+        if seems_in_deg_per_s(rate, site)
+        else "alignment.body-travelled",
         file=source_of(imu),
         quantity="accel",
-        message=f"the body did not stay at its place, or the gyros do not tell its turns: within {length:.4g} s the second integral of the specific force departs from gravity's by {noise.sway:.3g} m (root mean square), {noise.ratio:.3g} times what the noise of the sensors explains, and the heading is not known to better than {np.degrees(sd[2]):.3g} deg",
-        remedy_text=unit_remedy(rate, site)
-        or "align while the vehicle stands (it may rock), or with gnss_course while it drives; check units and axes of the gyros",
+        length=length,
+        sway=noise.sway,
+        ratio=noise.ratio,
+        sd_deg=np.degrees(sd[2]),
     )
 
 
 def _left_over(noise: ResidualNoise, sd: float, length: float, source: str | None) -> Finding:
     return Finding(
-        "alignment.slow-motion-or-noise-sensors",
+        "alignment.unexplained-slow-motion",
         file=source,
         quantity="accel",
         ratio=noise.ratio,

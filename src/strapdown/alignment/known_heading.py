@@ -47,11 +47,11 @@ class KnownHeading(CoarseAlignment):
     def __post_init__(self) -> None:
         if not (is_number(self.heading_deg) and math.isfinite(self.heading_deg)):
             raise ConfigError(
-                "alignment.no-heading", quantity="heading_deg", heading_deg=self.heading_deg
+                "alignment.heading-not-finite", quantity="heading_deg", heading_deg=self.heading_deg
             )
         if not (is_number(self.sd_deg) and 0.0 < self.sd_deg < math.degrees(UNKNOWN_HEADING)):
             raise ConfigError(
-                "alignment.no-standard-deviation-heading", quantity="sd_deg", sd_deg=self.sd_deg
+                "alignment.heading-sd-not-positive", quantity="sd_deg", sd_deg=self.sd_deg
             )
 
     def align(

@@ -39,7 +39,7 @@ def level(accel_mean: ArrayLike) -> tuple[float, float]:
     f = np.asarray(accel_mean, dtype=np.float64)
     size = float(np.sqrt(f @ f))
     if not 0.8 * 9.81 <= size <= 1.2 * 9.81:
-        raise DataError("alignment.mean-specific-force-long-rest", quantity="accel", size=size)
+        raise DataError("alignment.levelling-force-not-gravity", quantity="accel", size=size)
     roll = float(np.degrees(np.arctan2(0.0 - f[1], -f[2])))
     pitch = float(np.degrees(np.arctan2(f[0], np.hypot(f[1], f[2]))))
     return roll, pitch

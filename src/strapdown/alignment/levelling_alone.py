@@ -46,7 +46,7 @@ class Levelling(CoarseAlignment):
         """
         found = level_at_rest(self.name, imu, site, sensors, 0.0, UNKNOWN_HEADING)
         unknown = Finding(
-            "alignment.heading-not-known-stands-any",
+            "alignment.heading-not-known",
             file=source_of(imu),
             quantity="heading",
             unknown_heading_deg=math.degrees(UNKNOWN_HEADING),

@@ -18,7 +18,7 @@ __all__ = [
     "LARGEST_SD",
     "latitude_findings",
     "north_findings",
-    "unit_remedy",
+    "seems_in_deg_per_s",
 ]
 
 #: A heading that is less well known than this, in rad, is no heading: a uniform one has 1.81.
@@ -61,9 +61,7 @@ def north_findings(
     if not sd <= LARGEST_SD:
         told = f"{np.degrees(sd):.3g} deg" if sd < 1e3 else "without bound"
         raise DataError(
-            "alignment.gyros-cannot-find-north-standard"
-            if across < 0.02 * size
-            else "alignment.gyros-cannot-find-north-standard-2",
+            "alignment.no-north-near-pole" if across < 0.02 * size else "alignment.no-north",
             file=source,
             quantity="heading",
             told=told,
@@ -76,7 +74,7 @@ def north_findings(
         return ()
     return (
         Finding(
-            "alignment.latitude-only-earth-rate-horizontal",
+            "alignment.high-latitude",
             file=source,
             quantity="heading",
             lat_deg=site.lat_deg,
@@ -87,8 +85,8 @@ def north_findings(
     )
 
 
-def unit_remedy(rate: Array, site: Site) -> str:
-    """Remedy for a mean rate of a body at rest that is 57 times the Earth's; else empty.
+def seems_in_deg_per_s(rate: Array, site: Site) -> bool:
+    """Whether the mean rate of a body at rest is 57 times the Earth's.
 
     Parameters
     ----------
@@ -97,12 +95,10 @@ def unit_remedy(rate: Array, site: Site) -> str:
 
     Returns
     -------
-    str
+    bool
     """
     size, earth = (float(np.sqrt(x @ x)) for x in (rate, site.earth_rate))
-    if abs(size / earth / np.degrees(1.0) - 1.0) < 0.1:
-        return "the gyros seem to be in deg/s: state the unit when the log is read"
-    return ""
+    return abs(size / earth / float(np.degrees(1.0)) - 1.0) < 0.1
 
 
 def _rounded(rate: float) -> str:
@@ -131,19 +127,17 @@ def latitude_findings(
     if not abs(off) > CONTRADICTION * sd_deg:
         return ()
     if abs(measured_deg) > 90.0 + CONTRADICTION * sd_deg:
-        told = "the Earth's rate, as the gyros read it, and gravity lie as at no latitude"
         return (
             Finding(
-                "alignment.site-says",
+                "alignment.no-latitude-fits",
                 file=source,
                 quantity="latitude",
-                told=told,
                 lat_deg=site.lat_deg,
             ),
         )
     return (
         Finding(
-            "alignment.sensors-tell-standard-deviation-earth",
+            "alignment.measured-latitude-contradicts-site",
             file=source,
             quantity="latitude",
             measured_deg=measured_deg,

@@ -44,19 +44,13 @@ def outlier_findings(values: Array, columns: list[str], source: str | None) -> t
     row = int(np.argmax(steps[:, channel])) + 1
     return (
         Finding(
-            "alignment.more-than-times-large-largest",
+            "alignment.outlier-or-shock" if len(large) == 1 else "alignment.outliers-or-shocks",
             file=source,
             row=row + 1,
             quantity=columns[channel],
-            steps=_steps(len(large)),
+            count=len(large),
             factor=FACTOR,
             ratio=ratio[channel],
             values=values[row, channel],
         ),
     )
-
-
-def _steps(count: int) -> str:
-    if count == 1:
-        return "one step from sample to sample is"
-    return f"{count} steps from sample to sample are"

@@ -39,8 +39,8 @@ class Readiness:
     table : DataFrame
         Index ``duration``, s. Columns: ``time``, s, at which the attitude holds; ``roll pitch
         heading``, deg; ``*_sd``, deg, as stated; ``*_error``, deg, estimate less reference, NaN
-        without one; ``findings``, how many there are; ``refused``, the message of a record that
-        gives no attitude, whose numbers are NaN, else empty.
+        without one; ``findings``, how many there are; ``refused``, the `Finding` of a record
+        that gives no attitude, whose numbers are NaN, else None.
     """
 
     method: str
@@ -86,11 +86,11 @@ def durations_of(imu: pd.DataFrame, count: int = 10) -> Array:
         The record is shorter than 10 s.
     """
     if count < 2:
-        raise ConfigError("alignment.durations-make-no-curve", quantity="count", count=count)
+        raise ConfigError("alignment.too-few-durations", quantity="count", count=count)
     length = float(imu.index[-1] - imu.index[0])
     if not length >= 2.0 * SHORTEST:
         raise DataError(
-            "alignment.record-lasts-readiness-asked",
+            "alignment.record-too-short-for-readiness",
             file=source_of(imu),
             quantity="time",
             length=length,
@@ -140,7 +140,7 @@ def readiness(
     rising = times.ndim == 1 and times.size > 0 and bool((np.diff(times, prepend=0.0) > 0.0).all())
     if not rising or not times[-1] <= length * (1.0 + 1e-9):
         raise ConfigError(
-            "alignment.durations-do-not-rise-within",
+            "alignment.durations-not-rising",
             quantity="durations",
             times=times.tolist(),
             length=length,
@@ -182,11 +182,11 @@ def _row(
     try:
         found = align(piece)
     except DataError as error:
-        return [*nothing, 0, str(error)]
+        return [*nothing, 0, error.finding]
     errors = np.full(3, np.nan)
     if reference is not None:
         row = int(np.argmin(np.abs(reference.index.to_numpy() - found.time)))
         true = rotation.euler_from_quaternion(reference[QUATERNION].to_numpy()[row])
         errors = rotation.within_half_turn(found.roll_pitch_heading - true)
     numbers = [found.time, *found.roll_pitch_heading, *found.sd_deg, *errors]
-    return [*numbers, len(found.findings), ""]
+    return [*numbers, len(found.findings), None]

@@ -23,7 +23,6 @@ NEAR_GRAVITY = 0.2
 LEAST_SAMPLES = 20
 # rad/s or m/s²; no sensor is as quiet, and no simulation without errors as loud.
 ROUNDING = 1e-12
-WHAT_IT_READS = {"gyro": "the rate of the Earth", "accel": "gravity"}
 
 
 def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
@@ -47,12 +46,10 @@ def check_record(imu: pd.DataFrame) -> tuple[Finding, ...]:
     check_imu(imu)
     source = source_of(imu)
     if ACCEL[0] not in imu.columns:
-        raise DataError(
-            "alignment.no-accelerometer-alignment-needs-direction", file=source, quantity="accel"
-        )
+        raise DataError("alignment.no-accelerometer", file=source, quantity="accel")
     if len(imu) < LEAST_SAMPLES:
         raise DataError(
-            "alignment.samples-over-tell-no-mean",
+            "alignment.too-few-samples",
             file=source,
             quantity="time",
             count=len(imu),
@@ -87,28 +84,19 @@ def check_gravity(force: Array, source: str | None) -> tuple[Finding, ...]:
     size = float(np.sqrt(force @ force))
     if not abs(size / STANDARD_GRAVITY - 1.0) <= NEAR_GRAVITY:
         if abs(size - 1.0) <= NEAR_GRAVITY:
-            remedy = "it seems to be in g: state the unit when the log is read"
+            code = "alignment.mean-force-seems-in-g"
         elif abs(size / (1e3 * STANDARD_GRAVITY) - 1.0) <= NEAR_GRAVITY or (
             abs(size / 1e3 - 1.0) <= NEAR_GRAVITY
         ):
-            remedy = "it seems to be in mg or mm/s²: state the unit when the log is read"
+            code = "alignment.mean-force-seems-in-mg"
         else:
-            remedy = (
-                "state the unit when the log is read, use a record whose acceleration still has "
-                "gravity in it, and align while the vehicle does not accelerate"
-            )
-        raise DataError(
-            "alignment.message",
-            file=source,
-            quantity="accel",
-            message=f"the mean specific force is {size:.4g} m/s² long, and gravity is 9.8",
-            remedy_text=remedy,
-        )
+            code = "alignment.mean-force-not-gravity"
+        raise DataError(code, file=source, quantity="accel", size=size)
     if not force[2] > 0.5 * size:
         return ()
     return (
         Finding(
-            "alignment.mean-specific-force-down-axis",
+            "alignment.force-points-down",
             file=source,
             quantity="accel_z",
             force=force[2],
@@ -136,7 +124,7 @@ def gravity_findings(change: float, sd: float, source: str | None) -> tuple[Find
         return ()
     return (
         Finding(
-            "alignment.gravity-measured-ppm-off-site",
+            "alignment.gravity-contradicts-site",
             file=source,
             quantity="accel",
             change=1000000.0 * change,
@@ -157,13 +145,12 @@ def _check_alive(values: Array, source: str | None) -> None:
         channel = (GYRO if name == "gyro" else ACCEL)[int(np.argmax(still))]
         value = values[0, columns][int(np.argmax(still))]
         raise DataError(
-            "alignment.reads-all-samples-while-other",
+            "alignment.dead-gyro" if name == "gyro" else "alignment.dead-accelerometer",
             file=source,
             row=1,
             quantity=channel,
             value=value,
             count=len(values),
-            what_it_reads=WHAT_IT_READS[name],
         )
 
 
@@ -172,14 +159,13 @@ def _gaps(time: Array, source: str | None) -> tuple[Finding, ...]:
     if not gaps:
         return ()
     worst = max(gaps, key=lambda gap: gap.length)
-    count = f"{len(gaps)} gaps" if len(gaps) > 1 else "a gap"
     return (
         Finding(
-            "alignment.longest-steps-rate-force-taken",
+            "alignment.gaps" if len(gaps) > 1 else "alignment.gap",
             file=source,
             row=worst.sample + 1,
             quantity="time",
-            count=count,
+            count=len(gaps),
             length=worst.length,
             start=worst.start,
             usual=worst.usual,

@@ -96,12 +96,13 @@ def _disturbed(
     length: float, loud: float, turning: float, swing: Array, source: str | None
 ) -> Finding:
     return Finding(
-        "alignment.body-does-not-stand-still",
+        "alignment.specific-force-scatters",
         file=source,
         quantity="accel",
         blocks=BLOCKS,
         length=length / BLOCKS,
         loud=loud,
         turning=turning,
-        sqrt_deg=np.degrees(np.sqrt(np.trace(swing))),
+        in_bound=True,
+        swing_deg=np.degrees(np.sqrt(np.trace(swing))),
     )

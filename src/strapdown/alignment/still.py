@@ -65,29 +65,15 @@ def still_by_gnss(
     meridian, _ = radii_of_curvature(site.lat_deg, ellipsoid=site.ellipsoid)
     rate = float(np.hypot(*mean)) / (float(meridian) + site.alt)
     error = rate / max(float(abs(site.earth_rate[0])), 1e-12)
-    what = (
-        f"the vehicle moves at {speed:.3g} m/s (mean of {int(told.sum())} fixes), and the method "
-        f"takes it for standing: the heading may err by {np.degrees(error):.2g} deg"
+    moves = Finding(
+        "alignment.vehicle-moves",
+        file=source_of(gnss),
+        row=int(np.flatnonzero(good)[0]) + 1,
+        quantity="VN, VE",
+        speed=speed,
+        fixes=int(told.sum()),
+        heading_deg=np.degrees(error),
     )
-    row = int(np.flatnonzero(good)[0]) + 1
-    file = source_of(gnss)
-    remedy = "align while the vehicle stands, or with gnss_course while it drives"
     if error > heading_sd:
-        raise DataError(
-            "alignment.message",
-            file=file,
-            row=row,
-            quantity="VN, VE",
-            message=what,
-            remedy_text=remedy,
-        )
-    return (
-        Finding(
-            "alignment.message",
-            file=file,
-            row=row,
-            quantity="VN, VE",
-            message=what,
-            remedy_text=remedy,
-        ),
-    )
+        raise DataError(moves)
+    return (moves,)

@@ -48,7 +48,7 @@ def error_of_force_and_heading(
     """
     if not abs(pitch_deg) <= STEEPEST:
         raise DataError(
-            "alignment.body-points-zenith-or-nadir",
+            "alignment.pitch-vertical",
             file=source,
             quantity="pitch",
             pitch_deg=pitch_deg,

@@ -25,7 +25,7 @@ from strapdown.alignment.north import (
     LARGEST_SD,
     latitude_findings,
     north_findings,
-    unit_remedy,
+    seems_in_deg_per_s,
 )
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
 from strapdown.alignment.site import Site
@@ -64,7 +64,7 @@ class TwoVector(CoarseAlignment):
     def __post_init__(self) -> None:
         if isinstance(self.blocks, bool) or self.blocks not in range(2, 1001):
             raise ConfigError(
-                "alignment.no-number-blocks-tells-scatter", quantity="blocks", blocks=self.blocks
+                "alignment.block-count-out-of-range", quantity="blocks", blocks=self.blocks
             )
 
     def align(
@@ -175,34 +175,33 @@ def _check_rate(
     if not abs(size - earth) > CONTRADICTION * sd:
         return ()
     bias = max(sensors.gyro.axis("bias")) * DEG_PER_HOUR
-    told = Finding(
-        "alignment.message",
+    in_deg = seems_in_deg_per_s(rate, site)
+    contradicts = Finding(
+        "alignment.mean-rate-seems-in-deg-per-s"
+        if in_deg
+        else "alignment.mean-rate-not-that-of-earth",
         file=source,
         quantity="gyro",
-        message=f"the mean rate over {means.length:.4g} s is {size * DEG_PER_HOUR:.4g} deg/h (standard deviation {sd * DEG_PER_HOUR:.2g}), and the Earth's is {earth * DEG_PER_HOUR:.4g}",
-        remedy_text=unit_remedy(rate, site)
-        or f"the vehicle turned or travelled, or the bias of the gyros is larger than stated ({bias:.3g} deg/h): align while it stands, or state the right sensor",
+        length=means.length,
+        rate=size * DEG_PER_HOUR,
+        sd=sd * DEG_PER_HOUR,
+        earth=earth * DEG_PER_HOUR,
+        bias=bias,
     )
     if size > 2.0 * earth + CONTRADICTION * sd:
-        raise DataError(
-            "alignment.message",
-            file=told.file,
-            quantity=told.quantity,
-            message=told.what,
-            remedy_text=told.remedy,
-        )
-    return (told,)
+        raise DataError(contradicts)
+    return (contradicts,)
 
 
 def _refuse_motion(disturbed: Finding, heading_sd: float, source: str | None) -> None:
     """Refuse where it is the motion that hides north."""
     if heading_sd > LARGEST_SD:
         raise DataError(
-            "alignment.message",
+            "alignment.heading-lost",
             file=source,
             quantity=disturbed.quantity,
-            message=f"{disturbed.what}: the heading is not known to better than {np.degrees(heading_sd):.3g} deg",
-            remedy_text=disturbed.remedy,
+            reason=disturbed,
+            sd_deg=np.degrees(heading_sd),
         )
 
 
@@ -239,7 +238,7 @@ def _disturbed(
     angle = np.degrees(np.sqrt(np.trace(swing)))
     first, last = (middle + off.min()) % 360.0, (middle + off.max()) % 360.0
     return Finding(
-        "alignment.body-does-not-stand-still-2",
+        "alignment.rate-scatters",
         file=source,
         quantity="gyro",
         count=len(off),

@@ -18,7 +18,7 @@ from strapdown.attitude.quaternion import Quaternion
 from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
-from strapdown.errors import ConfigError, DivergenceError, nearest
+from strapdown.errors import ConfigError, DivergenceError
 from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 
@@ -98,15 +98,15 @@ def _option(name: str, key: str, value: str, default: object) -> object:
     if isinstance(default, bool):
         if value in _BOOLEANS:
             return _BOOLEANS[value]
-        wanted = "true or false"
+        code = "attitude.option-not-boolean"
     elif isinstance(default, int):
         try:
             return int(value)
         except ValueError:
-            wanted = "a whole number"
+            code = "attitude.option-not-whole"
     else:
         return value
-    raise ConfigError("attitude.not", quantity=f"{name}:{key}", value=value, wanted=wanted)
+    raise ConfigError(code, quantity=f"{name}:{key}", value=value)
 
 
 def _refuse_overflow(algorithm: AttitudeAlgorithm, history: NDArray[np.float64]) -> None:

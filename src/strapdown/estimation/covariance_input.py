@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,54 +33,45 @@ def checked_covariance(P: Array) -> Array:
     """
     P = np.array(P, dtype=np.float64, order="C")
     if P.ndim != 2 or P.shape[0] != P.shape[1] or not P.size:
-        raise _bad(f"has the shape {P.shape}", "give a square matrix (n, n)")
+        raise _bad("estimation.covariance-not-square", shape=str(P.shape))
     if not np.isfinite(P).all():
         i, j = np.argwhere(~np.isfinite(P))[0]
-        raise _bad(f"is {P[i, j]} in row {i + 1}, column {j + 1}", "give a finite number")
+        raise _bad("estimation.covariance-not-finite", value=P[i, j], i=i + 1, j=j + 1)
     variances = np.diagonal(P)
     if (variances < 0.0).any():
         i = int(np.argmin(variances))
-        raise _bad(f"has a variance of {P[i, i]:.6g} in row {i + 1}", "give none below zero")
+        raise _bad("estimation.variance-negative", value=P[i, i], i=i + 1)
     sd = np.sqrt(variances)
     known = sd == 0.0
     if (P[known] != 0.0).any():
         i = int(np.flatnonzero(known & (P != 0.0).any(axis=1))[0])
-        raise _bad(
-            f"has no variance in row {i + 1}, and yet a covariance with another state",
-            "make the whole row and column zero, or give the state a variance",
-        )
+        raise _bad("estimation.covariance-without-variance", i=i + 1)
     unit = np.where(known, 1.0, sd)
     correlation = P / unit[:, None] / unit
     tolerance = ROUNDINGS * len(P) * np.finfo(np.float64).eps
     if np.abs(correlation - correlation.T).max() > tolerance:
         i, j = np.unravel_index(np.argmax(np.abs(correlation - correlation.T)), P.shape)
         raise _bad(
-            f"is not symmetric: {P[i, j]:.9g} in row {i + 1}, column {j + 1}, "
-            f"{P[j, i]:.9g} in row {j + 1}, column {i + 1}",
-            "give (P + P') / 2 if the difference is rounding",
+            "estimation.covariance-not-symmetric",
+            i=i + 1,
+            j=j + 1,
+            value=P[i, j],
+            mirrored=P[j, i],
         )
     P = 0.5 * (P + P.T)
     lowest = float(np.linalg.eigvalsh(0.5 * (correlation + correlation.T))[0])
     if lowest < -tolerance:
-        raise _bad(
-            f"has a negative eigenvalue: {lowest:.3g} of its correlations",
-            "no errors have such a covariance: look for a wrong sign or unit",
-        )
+        raise _bad("estimation.covariance-indefinite", eigenvalue=lowest)
     return P
 
 
 def indefinite(row: int) -> DataError:
     """Return what to raise where a factorisation finds a covariance indefinite."""
-    return _bad(
-        f"has a negative eigenvalue, seen in row {row + 1}",
-        "no errors have such a covariance: look for a wrong sign or unit",
-    )
+    return _bad("estimation.covariance-indefinite-in-row", i=row + 1)
 
 
-def _bad(what: str, remedy: str) -> DataError:
-    return DataError(
-        "estimation.message", quantity="P", message=f"the covariance {what}", remedy_text=remedy
-    )
+def _bad(code: str, **data: Any) -> DataError:
+    return DataError(code, quantity="P", **data)
 
 
 def check_prediction(state: Array, Phi: Array, Q: Array) -> None:

@@ -55,12 +55,16 @@ def check_rising(name: str, **values: float) -> None:
     before, known = 0.0, ""
     for quantity, value in values.items():
         if not (math.isfinite(value) and value > before):
-            limit = f"{known} = {before:g}" if known else "0"
             raise ConfigError(
-                "estimation.message",
+                "estimation.influence-bounds-not-rising"
+                if known
+                else "estimation.influence-bound-not-positive",
                 quantity=quantity,
-                message=f"{quantity} = {value} of the influence function '{name}' is not above {limit}",
-                remedy_text="give finite numbers, in standard deviations, that rise in the order "
-                + ", ".join(values),
+                parameter=quantity,
+                value=value,
+                name=name,
+                lower=known,
+                limit=before,
+                order=tuple(values),
             )
         before, known = value, quantity

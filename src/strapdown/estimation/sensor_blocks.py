@@ -158,7 +158,7 @@ def lever_arm(sd: TriadLike) -> SensorStates:
 def time_offset(sd: float) -> SensorStates:
     """Return the stamps of an aid less the time of the inertial sensors; `sd` in s."""
     if not is_number(sd):
-        raise _refused("time_offset", sd, "give one number in s, zero or more")
+        raise ConfigError("estimation.time-offset-sd-no-number", quantity="time_offset", sd=str(sd))
     return unseen("time_offset", ("t",), "s", _numbers(sd, "time_offset")[:1])
 
 
@@ -322,14 +322,5 @@ def _as_many(given: Any, k: int, name: str) -> Array:
         or len(numbers) != k
         or not all(is_number(x) and 0.0 <= x < math.inf for x in numbers)
     ):
-        raise _refused(name, given, f"give zero or more, finite: one number, or {k}")
+        raise ConfigError("estimation.sd-out-of-range", quantity=name, sd=str(given), count=k)
     return np.array([float(x) for x in numbers])
-
-
-def _refused(name: str, given: object, remedy: str) -> ConfigError:
-    return ConfigError(
-        "estimation.message",
-        quantity=name,
-        message=f"{given!r} is no standard deviation",
-        remedy_text=remedy,
-    )

@@ -148,27 +148,22 @@ def _far_apart(
     names = [t.attrs.get("source") for t in (estimate, reference)]
     degrees = np.array([np.degrees(1.0), np.degrees(1.0), 1.0])
     tried = [
-        (est[[1, 0, 2]], ref, "latitude and longitude are swapped in one of the two", "exchange"),
-        (est * degrees, ref, "the estimate's latitude and longitude are radians", "convert"),
-        (est, ref * degrees, "the reference's latitude and longitude are radians", "convert"),
-        (est * [1, -1, 1], ref, "one of the two counts longitude positive to the west", "turn"),
+        (est[[1, 0, 2]], ref, "evaluation.latitude-and-longitude-swapped"),
+        (est * degrees, ref, "evaluation.estimate-in-radians"),
+        (est, ref * degrees, "evaluation.reference-in-radians"),
+        (est * [1, -1, 1], ref, "evaluation.longitude-positive-west"),
     ]
-    acts = {
-        "exchange": "exchange the columns lat and lon of the one that is wrong",
-        "convert": "give latitude and longitude in degrees",
-        "turn": "turn the sign of its longitude: east is positive",
-    }
-    for a, b, why, act in tried:
+    for a, b, code in tried:
         latitude, longitude = np.abs([a[:2], b[:2]]).max(axis=0)
         # A hundredth is no accident.
         if latitude <= 90.0 and longitude <= 360.0 and distance(a, b) < 0.01 * apart:
             raise DataError(
-                "evaluation.message",
+                code,
                 file=names[0],
                 row=1,
                 quantity="lat, lon",
-                message=f"the trajectories begin {apart / 1000.0:.0f} km apart, and {distance(a, b) / 1000.0:.3g} km if {why}",
-                remedy_text=acts[act],
+                apart_km=apart / 1000.0,
+                mended_km=distance(a, b) / 1000.0,
             )
     return [
         Finding(
@@ -204,19 +199,16 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
         )
     first, last = np.searchsorted(stamps, [time[0], time[-1]])
     cost = interpolation_cost(reference.iloc[max(0, first - 2) : last + 2], ellipsoid)
-    judged = (
-        "what that costs cannot be told from fewer than three rows"
-        if cost is None
-        else f"judged by leaving rows out, that costs up to {cost.position_m:.2g} m, "
-        f"{cost.velocity_m_s:.2g} m/s and {cost.rotation_deg:.2g}°"
-    )
+    costs = {} if cost is None else vars(cost)
     return [
         *findings,
         Finding(
-            "evaluation.reference-no-row-instants-estimate",
+            "evaluation.reference-interpolated-at-unknown-cost"
+            if cost is None
+            else "evaluation.reference-interpolated",
             file=source,
             quantity="time",
             size=time.size,
-            judged=judged,
+            **costs,
         ),
     ]

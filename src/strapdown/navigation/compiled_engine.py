@@ -343,6 +343,4 @@ class CompiledEngine(Engine):
 
     def _no_covariance(self) -> DivergenceError:
         time = float(self._times[kernel.AT_STEP])
-        return DivergenceError(
-            "navigation.covariance-none-any-more-variance", quantity="covariance", time=time
-        )
+        return DivergenceError("navigation.covariance-lost", quantity="covariance", time=time)

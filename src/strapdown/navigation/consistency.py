@@ -170,7 +170,7 @@ def consistency_of(
         The window has not at least two epochs, or the probability is none.
     """
     if window < 2:
-        raise ConfigError("navigation.window-epochs-says-nothing", quantity="window", window=window)
+        raise ConfigError("navigation.window-too-short", quantity="window", window=window)
     if not 0.0 < false_alarm < 1.0:
         raise ConfigError(
             "navigation.no-probability-false-alarm", quantity="false_alarm", false_alarm=false_alarm

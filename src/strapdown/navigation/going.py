@@ -328,13 +328,12 @@ class Going:
             k = int(np.argmin(good))
             label = PHYSICAL_LABELS[k // 3] if k < 9 else list(model.layout.labels())[k - len(P)]
             raise LostCovarianceError(
-                np.asarray(variances[:3]),
-                f"the variance of {label} is {variances[k]:.3g} at {time:.9g} s, and so there is "
-                "no covariance any more",
+                "navigation.variance-lost",
+                place=np.asarray(variances[:3]),
                 quantity="covariance",
-                remedy="use update_rule 'robust' where it was 'paper', whose step takes more off "
-                "than there is with an influence that descends again; or covariance 'ud' or 'wd' "
-                "where it was 'plain' or 'joseph'",
+                state=label,
+                variance=variances[k],
+                time=time,
             )
         return np.sqrt(np.maximum(variances[9:], 0.0))
 

@@ -94,7 +94,7 @@ class InnovationMonitor:
             value = getattr(self, name)
             if not (math.isfinite(value) and value > least):
                 raise ConfigError(
-                    "navigation.monitor-not-above",
+                    "navigation.monitor-option-too-small",
                     quantity=name,
                     name=name,
                     value=value,

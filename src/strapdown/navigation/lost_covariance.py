@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DivergenceError
+from strapdown.errors import DivergenceError, Finding
 
 __all__ = ["LostCovarianceError"]
 
@@ -21,6 +23,6 @@ class LostCovarianceError(DivergenceError):
         What stood for the variances of the place then.
     """
 
-    def __init__(self, place: Array, what: str, *, quantity: str, remedy: str) -> None:
-        super().__init__(what, quantity=quantity, remedy=remedy)
-        self.place = place
+    def __init__(self, code: str | Finding, *, place: Array | None = None, **values: Any) -> None:
+        super().__init__(code, **values)
+        self.place = np.zeros(3) if place is None else place

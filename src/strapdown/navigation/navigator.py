@@ -72,7 +72,7 @@ class Navigator:
         for name in names:
             if not name or names.count(name) > 1:
                 raise ConfigError(
-                    "navigation.name-two-aids" if name else "navigation.aid-no-name",
+                    "navigation.aid-name-taken" if name else "navigation.aid-without-name",
                     quantity="aiding",
                     name=name,
                 )

@@ -85,7 +85,7 @@ class IntervalRecorder(Recorder):
     def __post_init__(self) -> None:
         if not is_number(self.rate_hz) or not 0.0 < self.rate_hz < math.inf:
             raise ConfigError(
-                "navigation.hz-no-rate-recorder", quantity="rate_hz", rate_hz=self.rate_hz
+                "navigation.recorder-rate-not-positive", quantity="rate_hz", rate_hz=self.rate_hz
             )
 
     @property
@@ -178,7 +178,7 @@ class Tape:
         """
         states = self._states.rows
         if not len(states):
-            raise DataError("navigation.navigation-made-no-step", file=source, quantity="time")
+            raise DataError("navigation.no-step", file=source, quantity="time")
         used, model = self.navigator.filter.mechanization, self.navigator.filter.model
         marks = self._marks.rows
         if self._newest_mark is not None:

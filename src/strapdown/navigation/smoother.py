@@ -75,7 +75,7 @@ class RauchTungStriebel(Smoother):
     def __post_init__(self) -> None:
         if not is_number(self.memory) or not 1.0 <= self.memory <= 1e6:
             raise ConfigError(
-                "navigation.mb-no-memory-smoother", quantity="memory_mb", memory=self.memory
+                "navigation.smoother-memory-too-small", quantity="memory_mb", memory=self.memory
             )
 
     def begin(self, navigator: Navigator) -> Smoothing:

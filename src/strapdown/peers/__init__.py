@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import ConfigError, Finding, nearest
+from strapdown.errors import ConfigError, Finding
 from strapdown.peers import peer_ahrs, peer_imufusion, peer_vqf
 from strapdown.peers.peer import (
     AIDINGS,

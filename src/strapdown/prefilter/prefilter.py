@@ -167,7 +167,7 @@ class Prefilter(ABC):
         changed = Changed.joined([p.changed for p in portions])
         if len(time) < 2:
             raise DataError(
-                "prefilter.samples-left-reaches-either-side",
+                "prefilter.too-few-samples",
                 file=source,
                 quantity="time",
                 count=len(values),
@@ -208,15 +208,7 @@ def grid_of(imu: pd.DataFrame) -> Grid:
     try:
         step = even_step(time)
     except DataError as error:
-        f = error.finding
-        raise DataError(
-            "prefilter.message",
-            file=source_of(imu),
-            row=f.row,
-            quantity=f.quantity,
-            message=f.what,
-            remedy_text=f.remedy,
-        ) from None
+        raise error.replaced(file=source_of(imu)) from None
     return Grid(float(time[0]), step, imu.attrs["sampling"] == "mean")
 
 
@@ -230,12 +222,12 @@ def whole_factor(rate: float, grid: Grid, name: str) -> int:
     """
     own = 1.0 / grid.step
     if not (math.isfinite(rate) and rate > 0.0):
-        raise ConfigError("prefilter.hz-no-rate", quantity="rate", rate=rate)
+        raise ConfigError("prefilter.rate-not-positive", quantity="rate", rate=rate)
     factor = round(own / rate)
     if factor < 1 or abs(own / rate - factor) > 1e-3 * factor:
         near = own / max(1, factor)
         raise ConfigError(
-            "prefilter.gives-every-manyth-sample-hz",
+            "prefilter.rate-not-a-whole-part",
             quantity="rate",
             name=name,
             rate=rate,

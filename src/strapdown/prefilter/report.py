@@ -105,8 +105,8 @@ class PrefilterReport:
     findings: tuple[Finding, ...]
 
 
-#: What to do about a pre-filter that cannot tell outliers from knocks: a caution, and no fault.
-LEAVE_IT_OUT = "leave the pre-filter out of a log of so low a rate, unless outliers are seen in it"
+#: Code of the finding that a pre-filter cannot tell outliers from knocks: a caution, and no fault.
+LOW_RATE = "prefilter.rate-too-low-for-knocks"
 # A knock on a body lasts some milliseconds; faster samples show more than one of it.
 SHORTEST_KNOCK = 2e-3  # s
 
@@ -173,7 +173,7 @@ def _bursts(
             a, b = int(number[event[0]]), int(number[event[-1]])
             found.append(
                 Finding(
-                    "prefilter.rows-samples-stand-out-too",
+                    "prefilter.outliers-too-close",
                     file=source,
                     row=a + 1,
                     quantity=column,
@@ -187,7 +187,7 @@ def _bursts(
         if left:
             found.append(
                 Finding(
-                    "prefilter.more-such-bursts",
+                    "prefilter.more-bursts",
                     file=source,
                     quantity=column,
                     severity="note",
@@ -200,7 +200,7 @@ def _bursts(
 def _too_many(share: dict[str, float], samples: int, source: str | None) -> list[Finding]:
     return [
         Finding(
-            "prefilter.samples-replaced-outliers-no-rare",
+            "prefilter.many-outliers",
             file=source,
             quantity=column,
             part=100.0 * part,
@@ -217,12 +217,11 @@ def _knocks(replaced: pd.DataFrame, grid: Any, source: str | None) -> list[Findi
     first = replaced.iloc[0]
     return [
         Finding(
-            "prefilter.replaced-hz-knock-body-lasts",
+            LOW_RATE,
             file=source,
             row=int(first["row"]),
             quantity=str(first["channel"]),
             count=len(replaced),
-            value="sample was" if len(replaced) == 1 else "samples were",
-            step=1.0 / grid.step,
+            rate=1.0 / grid.step,
         )
     ]

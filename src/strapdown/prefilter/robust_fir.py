@@ -77,7 +77,7 @@ class RobustFir(Prefilter):
         factor = whole_factor(self.rate, grid, self.name)
         if factor == 1:
             raise ConfigError(
-                "prefilter.give-hz-log-no-more",
+                "prefilter.rate-not-below-log",
                 quantity="rate",
                 name=self.name,
                 rate=self.rate,

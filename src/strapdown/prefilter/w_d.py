@@ -184,9 +184,7 @@ def _noise(samples: Array) -> Array:
     sd = MAD_TO_SD * np.median(rough, axis=0) / RESIDUAL if len(rough) else np.zeros(1)
     if not (sd > 0.0).all():
         c = int(np.argmin(sd))
-        raise DataError(
-            "prefilter.first-samples-channel-show-no", quantity="noise", count=len(samples), c=c
-        )
+        raise DataError("prefilter.no-noise-to-judge-by", quantity="noise", count=len(samples), c=c)
     return np.asarray(sd)
 
 

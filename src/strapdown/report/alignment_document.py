@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from strapdown import __version__
+from strapdown.errors import Finding
 from strapdown.report import alignment_charts as charts
 from strapdown.report.alignment_tables import (
     answer_table,
@@ -94,8 +95,11 @@ def _sensors(result: AlignmentResult) -> str:
     return "; ".join(p for p in parts if p)
 
 
-def _answer(result: AlignmentResult, reasons: tuple[tuple[bool, str], ...]) -> tuple[Block, ...]:
-    said = tuple(("For it" if good else "Against it", f"{text}.") for good, text in reasons)
+def _answer(result: AlignmentResult, reasons: tuple[Finding, ...]) -> tuple[Block, ...]:
+    said = tuple(
+        ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
+        for one in reasons
+    )
     blocks: list[Block] = [answer_table(result)]
     if said:
         blocks += [Paragraph("What speaks for the answer, and what against it:"), Items(said)]
@@ -140,7 +144,7 @@ def _findings(result: AlignmentResult) -> tuple[Block, ...]:
             (
                 "readiness",
                 f"{len(refused)} shorter lengths, up to {max(r[0] for r in refused):.3g} s, gave "
-                f"no attitude: {refused[-1][1]}.",
+                f"no attitude: {refused[-1][1].sentence()}.",
             )
         )
     return (Items(tuple(rows)),)

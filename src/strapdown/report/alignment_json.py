@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.errors import Finding
 from strapdown.report.alignment_trust import answer_error, trust
 from strapdown.report.alignment_words import limits
 from strapdown.systems.alignment_run import AlignmentResult
@@ -53,8 +52,8 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
         "end": _attitude(result.end),
         "trust": {
             "verdict": found.verdict,
-            "for": [why for good, why in found.reasons if good],
-            "against": [why for good, why in found.reasons if not good],
+            "for": [f.plain() for f in found.supporting],
+            "against": [f.plain() for f in found.against],
         },
         "limits": [f"{head}: {text}" for head, text in limits(result)],
         "coarse": {"method": result.coarse.method, **_attitude(result.coarse)},
@@ -71,7 +70,7 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
             "against": result.readiness.against,
             "coarse": _rows(result.readiness.coarse),
             "fine": _rows(_thinned(result.readiness.fine)),
-            "refused": [{"time_s": t, "why": why} for t, why in result.readiness.refused],
+            "refused": [{"time_s": t, "finding": f.plain()} for t, f in result.readiness.refused],
         },
         "what_a_turn_would_tell": [
             {
@@ -87,7 +86,7 @@ def alignment_json(result: AlignmentResult) -> dict[str, Any]:
         "method": spec.model_dump(
             mode="json", include={"prefilter", "coarse", "fine"}, serialize_as_any=True
         ),
-        "findings": [_finding(f) for f in result.findings],
+        "findings": [f.plain() for f in result.findings],
     }
 
 
@@ -154,7 +153,3 @@ def _rows(table: pd.DataFrame) -> list[dict[str, float | None]]:
 def _number(value: Any) -> float | None:
     number = float(value)
     return number if math.isfinite(number) else None
-
-
-def _finding(finding: Finding) -> dict[str, Any]:
-    return {k: v for k, v in asdict(finding).items() if v is not None}

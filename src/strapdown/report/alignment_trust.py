@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +12,17 @@ from numpy.typing import NDArray
 from strapdown.alignment.fine_findings import ROCKS
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import Finding
-from strapdown.report.alignment_values import (
-    small,
-)
 from strapdown.rotation import within_half_turn
 from strapdown.systems.alignment_readiness import reference_offset
 from strapdown.systems.alignment_run import AlignmentResult
 from strapdown.tables import EULER
 from strapdown.tables.checks import values_of
 
-__all__ = ["ORDER", "Trust", "answer_error", "bounds_hold", "trust"]
+__all__ = ["ORDER", "Trust", "answer_error", "bounds_hold", "reason", "trust"]
 
 Array = NDArray[np.float64]
 
 ORDER = (2, 1, 0)  # heading first: it is the one that is hard
-IN_BOUND = "this is in the stated uncertainty"
 MOST_SAID = 2  # of what speaks against an answer, in one sentence
 WORDS = {
     "trusted": "It can be trusted",
@@ -41,26 +38,44 @@ class Trust:
     Attributes
     ----------
     verdict : {'trusted', 'reserve', 'distrusted'}
-    reasons : tuple of (bool, str)
-        What speaks for it, and what against.
-    short : str
+    reasons : tuple of Finding
+        A note speaks for it, a warning against it.
+    short : tuple of Finding
         What speaks for it, in a few words.
     """
 
     verdict: str
-    reasons: tuple[tuple[bool, str], ...]
-    short: str = ""
+    reasons: tuple[Finding, ...]
+    short: tuple[Finding, ...] = ()
+
+    @property
+    def supporting(self) -> tuple[Finding, ...]:
+        """Reasons that speak for it."""
+        return tuple(one for one in self.reasons if one.severity == "note")
+
+    @property
+    def against(self) -> tuple[Finding, ...]:
+        """Reasons that speak against it."""
+        return tuple(one for one in self.reasons if one.severity != "note")
 
     @property
     def sentence(self) -> str:
         """The verdict in words, with what speaks against it."""
-        against = [why for good, why in self.reasons if not good]
+        against = [one.sentence() for one in self.against]
         said = WORDS[self.verdict]
         if against:
             more = len(against) - MOST_SAID
             rest = f"; and {more} more, under 'The answer'" if more > 0 else ""
             return f"{said}: {'; '.join(against[:MOST_SAID])}{rest}."
-        return f"{said}: {self.short}." if self.short else f"{said}."
+        short = [one.sentence() for one in self.short]
+        if len(short) > 1:
+            short = [f"{', '.join(short[:-1])}, and {short[-1]}"]
+        return f"{said}: {short[0]}." if short else f"{said}."
+
+
+def reason(good: bool, code: str, **data: Any) -> Finding:
+    """Return what speaks for an answer, or against it."""
+    return Finding(code, severity="note" if good else "warning", data=data)
 
 
 def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
@@ -85,7 +100,7 @@ def answer_error(result: AlignmentResult) -> tuple[str, Array, float] | None:
 
 def trust(result: AlignmentResult) -> Trust:
     """Judge the answer by what its own record says against it."""
-    reasons: list[tuple[bool, str]] = []
+    reasons: list[Finding] = []
     known = answer_error(result)
     sd = result.end.sd_deg
     if known is not None:
@@ -94,57 +109,55 @@ def trust(result: AlignmentResult) -> Trust:
         for k in ORDER:
             if math.isfinite(off[k]):
                 good = bool(abs(off[k]) <= 3.0 / TWO_SIDED_95 * bound[k])
-                within = "within" if abs(off[k]) <= bound[k] else "beyond"
+                within = bool(abs(off[k]) <= bound[k])
                 reasons.append(
-                    (
+                    reason(
                         good,
-                        f"the {EULER[k]} is {small(off[k])}° from {name}, {within} its bound of "
-                        f"{small(bound[k])}°",
+                        "alignment.error-within-bound"
+                        if within
+                        else "alignment.error-beyond-bound",
+                        angle=EULER[k],
+                        reference=name,
+                        off_deg=off[k],
+                        bound_deg=bound[k],
                     )
                 )
     # Causes before what they bring about.
     told = [*result.unread, *result.coarse.findings]
     told += () if result.fine is None else result.fine.findings
-    reasons += [(False, _shortly(f)) for f in told if not _allowed(f, result)]
+    reasons += [f for f in told if f.severity == "warning" and not _allowed(f, result)]
     reasons += _agreement(result)
     reasons += _surprises(result)
-    against = [why for good, why in reasons if not good]
+    against = [one for one in reasons if one.severity == "warning"]
     verdict = "trusted" if not against else "reserve"
     # What a bound accounts for does not speak against the bound.
-    counted = sum(IN_BOUND in f.what for f in told if not _allowed(f, result))
-    if len(against) - counted > 1 or (against and known is not None and not reasons[0][0]):
+    counted = sum(bool(one.data.get("in_bound")) for one in against)
+    off = known is not None and bool(against) and reasons[0].severity == "warning"
+    if len(against) - counted > 1 or off:
         verdict = "distrusted"
     return Trust(verdict, tuple(reasons), _short(result, known is not None))
 
 
 def bounds_hold(result: AlignmentResult) -> bool:
     """Whether nothing that the record itself shows contradicts the bounds."""
-    return all(good for good, _ in (*_agreement(result), *_surprises(result)))
-
-
-def _shortly(finding: Finding) -> str:
-    """What a finding says before its numbers."""
-    return finding.what.partition(": ")[0]
+    return all(one.severity == "note" for one in (*_agreement(result), *_surprises(result)))
 
 
 def _allowed(finding: Finding, result: AlignmentResult) -> bool:
     """Whether the coarse alignment was made for what a finding tells."""
-    return finding.quantity == ROCKS and result.coarse.method == "inertial_frame"
+    return finding.code == ROCKS and result.coarse.method == "inertial_frame"
 
 
-def _short(result: AlignmentResult, known: bool) -> str:
-    parts = []
-    if known:
-        parts.append("it is within three standard deviations of what is known from elsewhere")
+def _short(result: AlignmentResult, known: bool) -> tuple[Finding, ...]:
+    codes = ["alignment.near-known"] if known else []
     if result.fine is not None:
-        parts.append("coarse and fine alignment agree")
-        parts.append("at rest the sensors showed what was expected of them")
+        codes += ["alignment.coarse-and-fine-agree", "alignment.sensors-as-expected"]
     else:
-        parts.append("nothing in the record speaks against it; no fine alignment confirms it")
-    return ", and ".join([", ".join(parts[:-1]), parts[-1]]) if len(parts) > 1 else parts[0]
+        codes.append("alignment.not-contradicted")
+    return tuple(reason(True, code) for code in codes)
 
 
-def _agreement(result: AlignmentResult) -> list[tuple[bool, str]]:
+def _agreement(result: AlignmentResult) -> list[Finding]:
     """Coarse and fine alignment beside each other, at the end of the coarse one."""
     if result.fine is None:
         return []
@@ -156,18 +169,19 @@ def _agreement(result: AlignmentResult) -> list[tuple[bool, str]]:
     out = []
     for k in ORDER:
         good = bool(abs(off[k]) <= bound[k])
-        word = "agree" if good else "do not agree"
         out.append(
-            (
+            reason(
                 good,
-                f"coarse and fine alignment {word} in {EULER[k]}: they differ by "
-                f"{small(off[k])}°, and may by {small(bound[k])}°",
+                "alignment.angle-agrees" if good else "alignment.angle-disagrees",
+                angle=EULER[k],
+                off_deg=off[k],
+                bound_deg=bound[k],
             )
         )
     return out
 
 
-def _surprises(result: AlignmentResult) -> list[tuple[bool, str]]:
+def _surprises(result: AlignmentResult) -> list[Finding]:
     """Whether the innovations of the fine alignment are as large as they were expected."""
     if result.fine is None:
         return []
@@ -177,12 +191,14 @@ def _surprises(result: AlignmentResult) -> list[tuple[bool, str]]:
         ratios = [float(np.sqrt(np.mean(table[f"nu {x}"] ** 2 / table[f"s {x}"]))) for x in labels]
         worst = max(ratios, default=0.0)
         good = worst < 2.0
-        said = "as large as expected" if good else "larger than expected"
         out.append(
-            (
+            reason(
                 good,
-                f"the {name} at rest is {said}: {worst:.2g} of its standard deviation "
-                "(root mean square, worst axis)",
+                "alignment.innovations-as-expected"
+                if good
+                else "alignment.innovations-larger-than-expected",
+                name=name,
+                ratio=worst,
             )
         )
     return out

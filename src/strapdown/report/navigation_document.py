@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from strapdown import __version__
+from strapdown.errors import Finding
 from strapdown.report import navigation_charts as charts
 from strapdown.report import navigation_tables as tables
 from strapdown.report.document import (
@@ -116,8 +117,11 @@ def _facts(found: NavigationFound) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _answer(found: NavigationFound, reasons: tuple[tuple[bool, str], ...]) -> tuple[Block, ...]:
-    said = tuple(("For it" if good else "Against it", f"{text}.") for good, text in reasons)
+def _answer(found: NavigationFound, reasons: tuple[Finding, ...]) -> tuple[Block, ...]:
+    said = tuple(
+        ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
+        for one in reasons
+    )
     blocks: list[Block] = [tables.end_table(found)]
     if said:
         blocks += [Paragraph("What speaks for the answer, and what against it:"), Items(said)]

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.config.navigation_checks import STAGES
-from strapdown.errors import Finding
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord
 from strapdown.report.navigation_agreement import Agreement
@@ -57,8 +56,8 @@ def navigation_json(
         "answer": _plain(headline(found)),
         "trust": {
             "verdict": verdict.verdict,
-            "for": [_plain(why) for good, why in verdict.reasons if good],
-            "against": [_plain(why) for good, why in verdict.reasons if not good],
+            "for": [f.plain() for f in verdict.supporting],
+            "against": [f.plain() for f in verdict.against],
         },
         "cautions": [_plain(f"{head}: {text}") for head, text in cautions(found)],
         "record": {
@@ -112,7 +111,7 @@ def navigation_json(
         "against": _against(found),
         "control_points": _points(found),
         "method": _method(result),
-        "findings": [_finding(f) for f in result.findings],
+        "findings": [f.plain() for f in result.findings],
     }
 
 
@@ -265,7 +264,3 @@ def _plain(text: str) -> str:
 def _number(value: Any) -> float | None:
     number = float(value)
     return number if math.isfinite(number) else None
-
-
-def _finding(finding: Finding) -> dict[str, Any]:
-    return {k: v for k, v in asdict(finding).items() if v is not None}

@@ -37,6 +37,7 @@ from strapdown.report.verdict_words import (
     promise,
     repeated_words,
     span_words,
+    unwitnessed_words,
     witness_words,
 )
 from strapdown.systems.sins.carried_heading import UNSEEN
@@ -177,8 +178,8 @@ def _heading(result: NavigationResult) -> tuple[Block, ...]:
     if trust.unwitnessed:
         blocks.append(
             Paragraph(
-                f"Nothing could bear the heading out: {trust.unwitnessed}. It rests on its start, "
-                "or on one source alone, and is not green at any time.",
+                f"Nothing could confirm the heading: {unwitnessed_words(trust)}. It rests on its "
+                "start, or on one source alone, and is not green at any time.",
                 "warning",
             )
         )

@@ -82,7 +82,7 @@ def verdict_json(result: NavigationResult) -> dict[str, Any]:
             "green_below_deg": light.green,
             "red_beyond_deg": light.red,
             "borne_out": not trust.unwitnessed,
-            "why_not": trust.unwitnessed or None,
+            "why_not": [f.plain() for f in trust.unwitnessed],
             "borne_out_by": witness_words(trust) or None,
             "share": {c: light.share(c) for c in COLOURS},
             "at_end": spans[-1].colour if spans else None,
@@ -126,7 +126,7 @@ def _repeated(repeated: Repeated, result: NavigationResult) -> dict[str, Any]:
     out: dict[str, Any] = {
         "without": repeated.without,
         "answer": _plain(repeated_words(result)),
-        "failed": repeated.failed or None,
+        "failed": None if repeated.failed is None else repeated.failed.plain(),
         "left": [_doubt(i) for i in repeated.left],
     }
     if repeated.differences is not None:

@@ -17,6 +17,7 @@ from strapdown.report.navigation_values import (
     length_words,
     share_words,
 )
+from strapdown.systems.sins.repeat_without import Repeated
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.trust import NO_NORTH, Advice, Trust
 
@@ -88,8 +89,17 @@ def heading_words(trust: Trust) -> str:
     if witness and last.colour == "green":
         now = f"{now[:-1]}, borne out by {witness}."
     if trust.unwitnessed:
-        now += f" Nothing could bear it out: {trust.unwitnessed}."
+        now += f" Nothing could confirm it: {unwitnessed_words(trust)}."
     return f"Heading: {said} of the time; {now}"
+
+
+def unwitnessed_words(trust: Trust) -> str:
+    """Why nothing could confirm the heading, in words."""
+    return "; ".join(one.sentence() for one in trust.unwitnessed)
+
+
+def _failed(repeated: Repeated) -> str:
+    return "" if repeated.failed is None else repeated.failed.text()
 
 
 def promise(trust: Trust) -> tuple[tuple[str, str], ...]:
@@ -204,7 +214,7 @@ def repeated_words(result: NavigationResult) -> str:
             return ""
         return "It was not repeated without it: repeat is false in [trust]."
     if repeated.record is None or repeated.differences is None:
-        return f"Repeated {repeated.without}, the run fails: {repeated.failed}"
+        return f"Repeated {repeated.without}, the run fails: {_failed(repeated)}"
     table = repeated.differences
     place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
     turn = np.abs(table["heading"].to_numpy(dtype=np.float64))

@@ -55,13 +55,22 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
         if lost > MOST * len(imu) and not (whole and _alone(channel, faults)):
             worst = max(own, key=lambda f: f.last - f.first)
             said = worst.finding
+            time = index_of(imu)
+            before, after = worst.begin - float(time[0]), float(time[-1]) - worst.end
+            part = (
+                "alignment.channel-lost-align-before"
+                if before >= after
+                else "alignment.channel-lost-align-after"
+            )
             raise DataError(
-                "alignment.message",
+                "alignment.channel-lost" if whole else part,
                 file=said.file,
                 row=said.row,
                 quantity=said.quantity,
-                message=f"{said.what}: {100.0 * lost / len(imu):.0f} % of the record cannot be aligned with it",
-                remedy_text=said.remedy if whole else _without(imu, worst.begin, worst.end),
+                reason=said,
+                share=lost / len(imu),
+                before=before,
+                end=worst.end,
             )
     return (*(f.finding for f in faults), *_made_up(imu))
 
@@ -72,21 +81,13 @@ def _alone(channel: str, faults: Sequence[ChannelFault]) -> bool:
     return len({f.channel for f in faults if f.channel.startswith(triad)}) < len(GYRO)
 
 
-def _without(imu: pd.DataFrame, begin: float, end: float) -> str:
-    """Which stretch is left."""
-    time = index_of(imu)
-    before, after = begin - float(time[0]), float(time[-1]) - end
-    flags = f"--duration {before:.6g}" if before >= after else f"--from {end:.9g}"
-    return f"align the stretch that is sound ({flags}), use a redundant unit, or record again"
-
-
 def _made_up(imu: pd.DataFrame) -> tuple[Finding, ...]:
     columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
     if np.ptp(values_of(imu, columns), axis=0).any():
         return ()
     return (
         Finding(
-            "alignment.no-channel-ever-changes-all",
+            "alignment.no-channel-changes",
             file=source_of(imu),
             quantity="gyro, accel",
             count=len(imu),

@@ -12,7 +12,7 @@ from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step
 from strapdown.errors import DataError, Finding
 from strapdown.prefilter import PrefilterReport
-from strapdown.prefilter.report import LEAVE_IT_OUT
+from strapdown.prefilter.report import LOW_RATE
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, values_of
 
@@ -51,7 +51,7 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
         f = error.finding
         first = float(imu.index[rows[0]])
         raise DataError(
-            "alignment.samples-stand-out-outliers-first",
+            "alignment.outliers",
             file=f.file,
             row=f.row,
             quantity=f.quantity,
@@ -64,13 +64,13 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
 
 def _faults(report: PrefilterReport) -> tuple[Finding, ...]:
     """What a pre-filter found, but for the caution that goes with a low rate."""
-    return tuple(f for f in report.findings if f.remedy != LEAVE_IT_OUT)
+    return tuple(f for f in report.findings if f.code != LOW_RATE)
 
 
 def _after_prefilter(error: DataError, said: Finding) -> DataError:
     f = error.finding
     return DataError(
-        "alignment.pre-filter-said-before",
+        "alignment.fails-after-prefilter",
         file=f.file,
         row=f.row if said.row is None else said.row,
         quantity=f.quantity,
@@ -82,23 +82,32 @@ def _after_prefilter(error: DataError, said: Finding) -> DataError:
 
 def _with_unquiet(error: DataError, imu: pd.DataFrame) -> DataError:
     """The error with the stretch in which the record is least like itself."""
-    said = _unquiet(imu)
-    if not said:
+    found = _unquiet(imu)
+    if found is None:
         return error
+    channel, begin, end, ratio = found
     f = error.finding
     return DataError(
-        "alignment.reason-said", file=f.file, row=f.row, quantity=f.quantity, reason=f, said=said
+        "alignment.channel-scatters",
+        file=f.file,
+        row=f.row,
+        quantity=f.quantity,
+        reason=f,
+        channel=channel,
+        begin=begin,
+        end=end,
+        ratio=ratio,
     )
 
 
-def _unquiet(imu: pd.DataFrame) -> str:
-    """Seconds in which a channel scatters far more than it usually does, in words."""
+def _unquiet(imu: pd.DataFrame) -> tuple[str, float, float, float] | None:
+    """The channel that scatters far more than it usually does, from when to when, how much."""
     columns = [c for c in [*GYRO, *ACCEL] if c in imu.columns]
     time = index_of(imu)
     size = max(2, round(1.0 / float(np.median(np.diff(time)))))
     count = len(imu) // size
     if count < LEAST_SECONDS:
-        return ""
+        return None
     blocks = values_of(imu, columns)[: count * size].reshape(count, size, len(columns))
     scatter = blocks.std(axis=1)
     usual = np.median(scatter, axis=0)
@@ -108,16 +117,14 @@ def _unquiet(imu: pd.DataFrame) -> str:
     worst = float(ratio[second, channel])
     loud = ratio[:, channel] > LOUD
     if worst < LOUD or loud.mean() > MOST_LOUD:
-        return ""
+        return None
     first, last = second, second
     while first > 0 and loud[first - 1]:
         first -= 1
     while last + 1 < count and loud[last + 1]:
         last += 1
-    return (
-        f"from {time[first * size]:.6g} to {time[(last + 1) * size - 1]:.6g} s {columns[channel]} "
-        f"scatters up to {worst:.3g} times as much as it usually does"
-    )
+    begin, end = float(time[first * size]), float(time[(last + 1) * size - 1])
+    return columns[channel], begin, end, worst
 
 
 def _outliers(imu: pd.DataFrame) -> tuple[str, np.ndarray] | None:

@@ -13,6 +13,7 @@ from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.readiness import coarse_readiness
 from strapdown.alignment.site import Site
 from strapdown.config.alignment import ReferenceTable
+from strapdown.errors import Finding
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.imu_uncertainty import ImuUncertainty
 from strapdown.tables import EULER
@@ -39,14 +40,14 @@ class AlignmentReadiness:
         By time since the start in s: ``roll_sd``, ``pitch_sd``, ``heading_sd`` and
         ``roll_off``, ``pitch_off``, ``heading_off``, deg; NaN where nothing is known. The fine
         one is empty where there was none.
-    refused : tuple of (float, str)
+    refused : tuple of (float, Finding)
         Lengths at which the coarse alignment found no attitude, and why.
     """
 
     against: str
     coarse: pd.DataFrame
     fine: pd.DataFrame
-    refused: tuple[tuple[float, str], ...]
+    refused: tuple[tuple[float, Finding], ...]
 
 
 def alignment_readiness(
@@ -91,7 +92,7 @@ def alignment_readiness(
     known = attitude if truth is None else truth
     lengths = _lengths(float(imu.index[-1]) - begin)
     found = coarse_readiness(way, imu, site, sensors, gnss, lengths, known).table
-    refused = found["refused"].to_numpy() != ""
+    refused = found["refused"].notna().to_numpy()
     coarse = found[~refused]
     sd = coarse[[f"{a}_sd" for a in EULER]].to_numpy(dtype=np.float64)
     off = coarse[[f"{a}_error" for a in EULER]].to_numpy(dtype=np.float64) + offset
@@ -99,7 +100,7 @@ def alignment_readiness(
         against,
         _table(coarse.index.to_numpy(dtype=np.float64), np.hstack([sd, off])),
         _fine(fine, begin, known, offset),
-        tuple((float(t), str(why)) for t, why in found["refused"][refused].items()),
+        tuple((float(t), why) for t, why in found["refused"][refused].items()),
     )
 
 

@@ -203,7 +203,7 @@ def _first(imu: pd.DataFrame, duration: float) -> pd.DataFrame:
     kept = time <= time[0] + duration + 1e-6 * step
     if kept.sum() < 2:
         raise DataError(
-            "alignment.hold-no-two-samples", file=source_of(imu), quantity="time", duration=duration
+            "alignment.duration-too-short", file=source_of(imu), quantity="time", duration=duration
         )
     out: pd.DataFrame = imu.loc[kept]
     out.attrs = dict(imu.attrs)
@@ -216,7 +216,7 @@ def _after(imu: pd.DataFrame, part: pd.DataFrame) -> pd.DataFrame:
     out.attrs = dict(imu.attrs)
     if len(out) < 2:
         raise DataError(
-            "alignment.nothing-left-fine-alignment-coarse",
+            "alignment.no-record-left-for-fine",
             file=source_of(imu),
             quantity="coarse, duration_s",
             index=float(imu.index[-1] - imu.index[0]),

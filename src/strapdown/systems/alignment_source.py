@@ -210,7 +210,7 @@ def _said(recording: Recording, gyro: Array, accel: Array) -> Sequence[Finding]:
             continue
         out.append(
             Finding(
-                "alignment.turned-further-roll-pitch-heading",
+                "alignment.mounting-rotation-applied",
                 file=recording.name,
                 quantity=name,
                 severity="note",

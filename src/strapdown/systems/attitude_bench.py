@@ -287,7 +287,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeBench, Evide
         progress(algorithm.title, 0.05 + 0.15 * k / len(algorithms))
         runs.append(run_attitude(algorithm, increments, q_nb))
     span = (float(imu.index[0]), float(imu.index[-1]))
-    levelled = str(initial["from"]).startswith("levelled")
+    levelled = initial["method"] == "level"
     told = gather_references(spec, source, span, rests, levelled)
     references = told.points
     scores = [s for run in runs for s in truth_score(run, source)]

@@ -21,11 +21,6 @@ NEAR_POLE = 5.7  # deg: 1/cos = 10
 LARGE_STEP = 0.5  # rad
 
 
-def _how_near(run: AttitudeRun) -> str:
-    near = run.diagnostics["closest_to_pole_deg"]
-    return f"came within {near:.3g}° of" if near else "passed through"
-
-
 def passed_pole(run: AttitudeRun) -> bool:
     """Tell whether a run came so near ±90° of pitch that its angles are not to be trusted."""
     return run.diagnostics.get("closest_to_pole_deg", 90.0) < NEAR_POLE
@@ -118,10 +113,12 @@ def judge_runs(runs: list[AttitudeRun], increments: pd.DataFrame) -> list[Findin
         if passed_pole(run):
             findings.append(
                 Finding(
-                    "attitude.pitch-equations-divide-zero-says",
+                    "attitude.near-vertical-pitch"
+                    if run.diagnostics["closest_to_pole_deg"]
+                    else "attitude.through-vertical-pitch",
                     quantity=run.algorithm,
-                    how_near=_how_near(run),
-                    diagnostics=run.diagnostics["closest_to_pole_time_s"],
+                    apart_deg=run.diagnostics["closest_to_pole_deg"],
+                    time=run.diagnostics["closest_to_pole_time_s"],
                 )
             )
     turn = np.sqrt((increments[THETA].to_numpy() ** 2).sum(axis=1))

@@ -80,12 +80,9 @@ def gather_references(
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled and usable else None)
         if tilts.empty:
             raise ConfigError(
-                "attitude.message",
+                "attitude.no-rest-after-levelling" if levelled else "attitude.no-rest",
                 file=source.name,
                 quantity="--reference rests",
-                message="no rest with acceleration was found"
-                + (" after the one that the run is levelled from" if levelled else ""),
-                remedy_text="leave it out, or name reference points in words",
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return Told(

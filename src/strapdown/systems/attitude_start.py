@@ -170,6 +170,7 @@ def initial_attitude(
         "heading_deg": heading,
         "time_s": begin,
         "from": how,
+        "method": choice if choice in ("truth", "level", "zero") else "given",
     }
     return q_nb, words, begin
 

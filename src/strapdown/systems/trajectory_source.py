@@ -254,12 +254,6 @@ def with_key(name: str) -> Iterator[None]:
     try:
         yield
     except ConfigError as error:
-        raise _with_key(error, name) from None
-
-
-def _with_key(error: ConfigError, name: str) -> ConfigError:
-    """The error with the keys of a file in place of the simulation's own words."""
-    f = error.finding
-    parts = (f.quantity or "").split(", ")
-    words = [_KEYS.get(part, part).replace("place ", "waypoint ") for part in parts]
-    return ConfigError(f, file=name, quantity=", ".join(words))
+        parts = (error.finding.quantity or "").split(", ")
+        keys = ", ".join(_KEYS.get(part, part).replace("place ", "waypoint ") for part in parts)
+        raise error.replaced(file=name, quantity=keys) from None

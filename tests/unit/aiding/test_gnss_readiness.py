@@ -100,7 +100,8 @@ def test_the_offset_of_the_clocks_is_found_to_a_tenth_of_a_second(offset):
     assert found.offset == pytest.approx(offset, abs=3.0 * found.sd)
     (told,) = find_time_offset(table, imu())
     assert "time_offset_s" in told.remedy
-    assert ("leap" in told.what) == (offset == 18.0)
+    leap = told.code == "navigation.receiver-clock-off-leap-seconds"
+    assert leap == (offset == 18.0)
     # What the filter is to find is not told again.
     assert not find_time_offset(table, imu(), found.offset)
     assert not find_time_offset(table, imu(), 0.0, 0.0, assumed_sd=abs(offset))
@@ -122,8 +123,8 @@ def test_places_alone_are_enough_for_the_offset():
         (lambda t: t + 1_700_000_000.0, lambda t: t, "Unix time"),
         (lambda t: t + 1_700_000_000.0, lambda t: t + 1_384_035_218.0, "GPS time since 1980"),
         (lambda t: t + 1_700_000_000.0, lambda t: t + 252_818.0, "take 1699747182"),
-        (lambda t: t + 252_818.0, lambda t: t, "start of their own"),
-        (lambda t: t + 400_000.0 + 7200.0, lambda t: t + 400_000.0, "2 hours"),
+        (lambda t: t + 252_818.0, lambda t: t, "seconds from its own start"),
+        (lambda t: t + 400_000.0 + 7200.0, lambda t: t + 400_000.0, "hours (2)"),
         (lambda t: (t + 300_000.0) * 1000.0, lambda t: t + 300_000.0, "in ms"),
         (lambda t: t + 300_000.0 + 1234.0, lambda t: t + 300_000.0, "1234"),
     ],

@@ -178,9 +178,9 @@ def test_a_gap_is_told_with_its_row(method, stood):
     imu, _, sensors = stood
     holed = imu.drop(imu.index[1000:1040])
     holed.attrs = imu.attrs
-    assert "log.csv, row 1001, time: a gap, the longest of 2.05 s" in words(
-        method.align(holed, SITE, sensors)
-    )
+    (gap,) = [f for f in method.align(holed, SITE, sensors).findings if f.quantity == "time"]
+    assert (gap.code, gap.file, gap.row) == ("alignment.gap", "log.csv", 1001)
+    assert gap.data["length"] == pytest.approx(2.05)
 
 
 def moved(speed=((0.0,), (0.0,)), turn=((0.0,), (0.0,)), seed=3):

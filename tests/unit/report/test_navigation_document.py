@@ -97,14 +97,14 @@ def test_observations_are_counted():
     assert one.inside
 
 
-@pytest.mark.parametrize(("factor", "word"), [(3.0, "scatters more"), (0.2, "scatters less")])
-def test_what_does_not_agree_speaks_against_it(factor, word):
+@pytest.mark.parametrize(("factor", "code"), [(3.0, "larger"), (0.2, "smaller")])
+def test_what_does_not_agree_speaks_against_it(factor, code):
     made = record()
     table = made.innovations["rtk.position"]
     table[[c for c in table if c.startswith("nu ")]] *= factor
     found = trust(examine(told(made)))
     assert found.verdict == "reserve"
-    assert any(word in why for good, why in found.reasons if not good)
+    assert f"navigation.innovations-{code}" in [one.code for one in found.against]
 
 
 def test_what_lasts_speaks_against_it():
@@ -140,7 +140,8 @@ def test_most_epochs_far_off_refute_it_and_outliers_do_not():
     assert trust(examine(told(few))).verdict == "reserve"
     found = trust(examine(told(most)))
     assert found.verdict == "distrusted"
-    assert found.sentence.startswith("It should not be trusted: rtk.position scatters more")
+    assert found.against[0].code == "navigation.innovations-larger"
+    assert found.against[0].data["name"] == "rtk.position"
 
 
 def test_large_errors_that_last_refute_it():
@@ -161,22 +162,24 @@ def test_an_aid_that_is_mostly_refused_refutes_it():
     assert trust(examine(told(made))).verdict == "distrusted"
 
 
-def test_what_needs_no_remedy_speaks_against_nothing():
+@pytest.mark.parametrize(("severity", "verdict"), [("note", "trusted"), ("warning", "reserve")])
+def test_a_note_speaks_against_nothing_whatever_its_remedy(severity, verdict):
     made = record()
-    fact = Finding("gyro and accel: increments of each sample", file="log.imu")
+    fact = Finding("navigation.fixes-begin-late", severity=severity, file="log.imu", apart=3.0)
+    assert fact.remedy
     found = trust(examine(told(made, findings=(fact,), truth=shifted(made.trajectory))))
-    assert found.verdict == "trusted", found.sentence
+    assert found.verdict == verdict, found.sentence
 
 
 def test_sensors_alone_are_borne_out_by_nothing():
     found = trust(examine(told(without_aids(record()))))
     assert found.verdict == "reserve"
-    assert "nothing was observed beside it" in found.sentence
+    assert [one.code for one in found.against] == ["navigation.nothing-observed"]
 
 
 def test_many_rejections_speak_against_it():
     found = trust(examine(told(record(reject=range(20)))))
-    assert any("were rejected" in why for good, why in found.reasons if not good)
+    assert "navigation.many-rejected" in [one.code for one in found.against]
 
 
 def test_a_good_run_can_be_trusted():
@@ -328,12 +331,13 @@ def test_any_run_has_a_report_without_numbers_that_are_none(make):
 
 def test_findings_stand_with_their_remedies():
     made = record()
-    findings = (Finding("the velocity is late", file="rtk.csv", remedy="estimate its offset"),)
+    finding = Finding("navigation.fixes-begin-late", file="rtk.csv", apart=3.0)
+    findings = (finding,)
     document = navigation_document(told(made, findings=findings), "out")
     (section,) = [s for s in document.sections if s.slug == "findings"]
     assert section.blocks[0].rows[0] == (
         "rtk.csv",
-        "the velocity is late. estimate its offset.",
+        f"{finding.what}. {finding.remedy}.",
     )
 
 

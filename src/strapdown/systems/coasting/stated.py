@@ -85,10 +85,11 @@ def sensor_of(name: str) -> ImuUncertainty:
     for triad in ("gyro", "accel"):
         if triad not in {figure.key.partition(".")[0] for figure in sensor.sources}:
             raise ConfigError(
-                "outage.no",
+                "outage.sensor-without-gyros"
+                if triad == "gyro"
+                else "outage.sensor-without-accelerometers",
                 quantity="sensor",
                 name=sensor.name,
-                value="gyros" if triad == "gyro" else "accelerometers",
             )
     return stated_imu(sensor, {}, {})
 

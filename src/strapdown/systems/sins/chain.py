@@ -134,9 +134,9 @@ class Chain:
     def __post_init__(self) -> None:
         check_timeline(self.modes, self.start is not None)
         if len(self.modes) > 1 and self.sensors is None:
-            raise ConfigError("navigation.alignment-needs-know-sensors-may", quantity="sensors")
+            raise ConfigError("navigation.alignment-without-sensor-errors", quantity="sensors")
         if self.intake.gaps.beyond == "align" and len(self.modes) == 1:
-            raise ConfigError("navigation.no-alignment-begin-anew-after", quantity="gaps")
+            raise ConfigError("navigation.no-alignment-after-gap", quantity="gaps")
         for command in self.commands:
             self._check_word(command.word)
         if self.fixes is not None and self.fixes not in self._tables():
@@ -290,5 +290,5 @@ class Chain:
         words = ("next", *(mode.name for mode in self.modes[1:]))
         if word not in words:
             raise ConfigError(
-                "navigation.no-mode-can-commanded", quantity="commands", word=word, known=words
+                "navigation.unknown-mode", quantity="commands", word=word, known=words
             )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -81,12 +80,11 @@ def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, .
         if kind in SILENT and count > most * len(imu):
             said = worst[channel, kind].finding
             raise DataError(
-                "navigation.message",
+                "navigation.channel-lost",
                 file=said.file,
                 row=said.row,
                 quantity=said.quantity,
-                message=f"{said.what}: nothing can be navigated without it",
-                remedy_text=said.remedy,
+                reason=said,
             )
     return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
 
@@ -124,8 +122,15 @@ def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
 
 
 def _counted(finding: Finding, lost: int, samples: int) -> Finding:
-    share = f"{100.0 * lost / samples:.2g} % of the record in all"
-    return replace(finding, what=f"{finding.what} ({share})")
+    return Finding(
+        "navigation.channel-fault",
+        severity=finding.severity,
+        file=finding.file,
+        row=finding.row,
+        quantity=finding.quantity,
+        reason=finding,
+        percent=100.0 * lost / samples,
+    )
 
 
 def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
@@ -140,7 +145,7 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
     wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
     if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
         raise DataError(
-            "navigation.all-gyros-times-noisy-their",
+            "navigation.gyros-seem-in-deg-per-s",
             file=source_of(imu),
             quantity="gyro",
             times=times.min(),
@@ -162,7 +167,7 @@ def _refuse_unit(imu: pd.DataFrame) -> None:
         wanted = STANDARD_GRAVITY * factor
         if abs(size / wanted - 1.0) < NEAR:
             raise DataError(
-                "navigation.half-time-three-together-read",
+                "navigation.accelerometers-seem-in-other-unit",
                 file=source_of(imu),
                 quantity="accel",
                 size=size,
@@ -184,15 +189,12 @@ def _refuse_gravity(imu: pd.DataFrame, start: StartTable | None) -> None:
     apart = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
     if apart < FAR:
         return
-    shown = ", ".join(f"{x:.3g}" for x in force)
-    upside = apart > 180.0 - FAR
     raise DataError(
-        "navigation.message",
+        "navigation.gravity-upside-down"
+        if apart > 180.0 - FAR
+        else "navigation.gravity-contradicts-attitude",
         file=source_of(imu),
         quantity="accel",
-        message=f"the specific force of the first second, ({shown}) m/s² forward, right, down, is {apart:.0f}° away from where the attitude in [start] has it"
-        + (": gravity is upside down" if upside else ""),
-        remedy_text='at rest the accelerometer along down reads -9.8: give the sign as accel_unit = "-m/s2" in [log], or the axes in [axes]'
-        if upside
-        else "look at roll_deg and pitch_deg, or say in [axes] how the sensor lies in the body",
+        force=force,
+        apart_deg=apart,
     )

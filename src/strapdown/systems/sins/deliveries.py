@@ -103,7 +103,7 @@ class Deliveries:
     def __post_init__(self) -> None:
         if not is_number(self.outage) or not self.outage > 1.0:
             raise ConfigError(
-                "navigation.intervals-no-outage", quantity="outage", outage=self.outage
+                "navigation.outage-intervals-not-above-one", quantity="outage", outage=self.outage
             )
 
     def begin(self, tables: Sequence[str]) -> DeliveriesState:

@@ -176,7 +176,7 @@ def pieces_of(
 ) -> Iterator[ChainPiece]:
     """Run a chain over a record in chunks, and give the pieces as they come; see `run_batch`."""
     if not chunk > 0.0:
-        raise ConfigError("navigation.no-chunk", quantity="chunk", chunk=chunk)
+        raise ConfigError("navigation.chunk-not-positive", quantity="chunk", chunk=chunk)
     check_columns(imu, CHANNELS, source_of(imu))
     state = _begun(chain, imu)
     for name, table in (tables or {}).items():

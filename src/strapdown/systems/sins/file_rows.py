@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 
 import pandas as pd
 
@@ -32,7 +31,7 @@ def in_file(findings: Iterable[Finding], *tables: pd.DataFrame) -> tuple[Finding
     """
     known = {t.attrs.get("source"): t.attrs["first_row"] for t in tables if "first_row" in t.attrs}
     return tuple(
-        replace(one, row=_moved(one.row, known[one.file]))
+        one.replace(row=_moved(one.row, known[one.file]))
         if one.row is not None and one.file in known
         else one
         for one in findings
@@ -52,23 +51,10 @@ def said_of_file(*tables: pd.DataFrame) -> Iterator[None]:
         said = error.finding
         if said.file is not None or not tables:
             raise
-        raise DivergenceError(
-            "navigation.message",
-            file=source_of(tables[0]),
-            quantity=said.quantity,
-            message=said.what,
-            remedy_text=said.remedy,
-        ) from None
+        raise error.replaced(file=source_of(tables[0])) from None
     except DataError as error:
         said = error.finding
         (moved,) = in_file((said,), *tables)
         if moved == said:
             raise
-        raise DataError(
-            "navigation.message",
-            file=moved.file,
-            row=moved.row,
-            quantity=moved.quantity,
-            message=moved.what,
-            remedy_text=moved.remedy,
-        ) from None
+        raise error.replaced(row=moved.row) from None

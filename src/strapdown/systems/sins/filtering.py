@@ -91,26 +91,18 @@ class Filtering:
         except DataError as error:
             f = error.finding
             raise DataError(
-                "navigation.message",
+                "navigation.prefilter-needs-even-stamps",
                 file=source,
                 row=f.row,
                 quantity=f.quantity,
-                message=f.what,
-                remedy_text=f"a pre-filter needs even stamps: leave it out, or {f.remedy}",
+                reason=f,
             ) from None
         try:
             return FilteringState(grid, self.prefilter.begin(grid, 6))
         except ConfigError as error:
-            f = error.finding
-            if f.quantity != "rate":
+            if error.finding.quantity != "rate":
                 raise
-            raise ConfigError(
-                "navigation.message",
-                file=source,
-                quantity="prefilter, rate_hz",
-                message=f.what,
-                remedy_text=f.remedy,
-            ) from None
+            raise error.replaced(file=source, quantity="prefilter, rate_hz") from None
 
     def advance(
         self, state: FilteringState, time: Array, values: Array, last: bool, source: str | None
@@ -151,7 +143,7 @@ class Filtering:
         if steps.size and not steps.min() >= 1.0:
             row = int(np.argmin(steps))
             raise DataError(
-                "navigation.samples-not-evenly-spaced-followed",
+                "navigation.samples-uneven",
                 file=source,
                 quantity="time",
                 stamps=stamps[row],

@@ -195,7 +195,7 @@ def _good(
         if good.any():
             return values_of(fixes, GEODETIC)[good], sd[good], index_of(fixes)[good]
     raise DataError(
-        "navigation.no-fix-place-until-no",
+        "navigation.no-position-for-alignment",
         file=None if fixes is None else source_of(fixes),
         quantity="site",
         time=time,

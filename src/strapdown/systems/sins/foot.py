@@ -145,14 +145,14 @@ def on_foot(made: Proposal) -> Proposal:
     """
     if ACCEL[0] not in made.imu.columns:
         raise DataError(
-            "navigation.no-accelerometers-path-integral-they",
+            "navigation.no-accelerometers",
             file=source_of(made.imu),
             quantity="accel",
         )
     stand = first_stand(made.imu)
     if stand is None:
         raise DataError(
-            "navigation.stands-nowhere-roll-pitch-found",
+            "navigation.never-stationary",
             file=source_of(made.imu),
             quantity="accel",
             stepped=STEPPED,
@@ -209,7 +209,7 @@ def on_foot(made: Proposal) -> Proposal:
         findings = (
             *findings,
             Finding(
-                "navigation.moves-begins-first-left-out",
+                "navigation.moves-at-start",
                 file=source_of(made.imu),
                 quantity="accel",
                 late=late,

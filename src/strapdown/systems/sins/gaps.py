@@ -45,11 +45,9 @@ class GapPolicy:
 
     def __post_init__(self) -> None:
         if not is_number(self.usual) or not self.usual > 1.0:
-            raise ConfigError(
-                "navigation.times-usual-step-no-gap", quantity="usual", usual=self.usual
-            )
+            raise ConfigError("navigation.gap-factor-too-small", quantity="usual", usual=self.usual)
         if not is_number(self.coast) or not self.coast >= 0.0:
-            raise ConfigError("navigation.no-length-gap", quantity="coast", coast=self.coast)
+            raise ConfigError("navigation.gap-length-negative", quantity="coast", coast=self.coast)
         if self.beyond not in ("refuse", "align", "coast"):
             raise ConfigError(
                 "navigation.nothing-do-about-gap", quantity="beyond", beyond=self.beyond

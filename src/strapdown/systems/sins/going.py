@@ -114,10 +114,12 @@ class Going:
         where = f"{hole.length:.4g} s without samples, from {hole.begin:.9g} to {hole.end:.9g} s"
         if hole.length > policy.coast and policy.beyond == "refuse":
             raise DataError(
-                "navigation.body-did-then-not-known",
+                "navigation.gap",
                 file=self._state.intake.source,
                 quantity="time",
-                where=where,
+                length=hole.length,
+                begin=hole.begin,
+                end=hole.end,
             )
         anew = hole.length > policy.coast and policy.beyond == "align"
         done = "alignment begins anew" if anew else "bridged along a line, and not well known since"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,12 +14,12 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.fine_findings import ROCKS
+from strapdown.alignment.fine_findings import BIASED, ROCKS
 from strapdown.alignment.fine_result import FineResult
 from strapdown.alignment.inertial_frame import InertialFrame
 from strapdown.alignment.site import Site
 from strapdown.ellipsoids import Ellipsoid
-from strapdown.errors import StrapdownError
+from strapdown.errors import Finding, StrapdownError
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.evaluation.heading_light import SURE
 from strapdown.navigation.record import NavigationRecord
@@ -88,7 +89,7 @@ def compasses_of(
     record: NavigationRecord,
     aligned: Sequence[Aligned],
     ellipsoid: Ellipsoid,
-) -> tuple[list[Compass], list[float], str]:
+) -> tuple[list[Compass], list[float], Finding | None]:
     """Return what the alignments and the rests of a run found, each by itself.
 
     Of an alignment that was told its heading, and of each rest that an aid saw, a fine alignment of
@@ -113,11 +114,11 @@ def compasses_of(
         In the order of time.
     doubts : list of float, s
         Ends of rests at which the gyros were not what they are stated to be.
-    why : str
-        Why there is none, in words; empty where there is one.
+    why : Finding or None
+        Why there is none; None where there is one.
     """
     found: list[Compass] = []
-    refused: list[str] = []
+    refused: list[Finding] = []
     doubts: list[float] = []
     rests = seen_rests(chain, imu, record)
     coarse: Alignment | None = None
@@ -137,7 +138,7 @@ def compasses_of(
         if of_gyros:
             doubts.append(one.end)
         if against:
-            refused.append(f"its alignment does not bear itself out ({against})")
+            refused.append(_note("navigation.alignment-not-consistent", reason=against))
         else:
             found.append(
                 _judged(one.fine, begin, _site(record, one.fine.alignment.time, ellipsoid))
@@ -149,21 +150,25 @@ def compasses_of(
         except StrapdownError as error:
             # It stood, by its aids, and its gyros do not show that.
             doubts.append(end)
-            refused.append(f"a rest did not tell north ({error.finding.what.partition(': ')[0]})")
+            refused.append(_note("navigation.rest-without-north", reason=error.finding))
             continue
         against, of_gyros = _against(fine, before)
         if of_gyros:
             doubts.append(end)
         if against:
-            refused.append(f"a rest does not bear itself out ({against})")
+            refused.append(_note("navigation.rest-not-consistent", reason=against))
         else:
             found.append(_judged(fine, begin, site))
     found = [replace(one, unsteady=_unsteady(imu, one, sensors, ellipsoid)) for one in found]
     if found:
-        return sorted(found, key=lambda one: one.time), doubts, ""
+        return sorted(found, key=lambda one: one.time), doubts, None
     if refused:
         return [], doubts, refused[-1]
-    return [], doubts, "it found north by no fine alignment, and no aid saw it stand for a minute"
+    return [], doubts, _note("navigation.never-at-rest-for-north")
+
+
+def _note(code: str, **data: Any) -> Finding:
+    return Finding(code, severity="note", data=data)
 
 
 def _judged(fine: FineResult, begin: float, site: Site) -> Compass:
@@ -245,28 +250,29 @@ def _scatter(fine: FineResult) -> float:
     return worst
 
 
-def _against(fine: FineResult, coarse: Alignment | None) -> tuple[str, bool]:
-    """What speaks against an alignment, in a few words, and whether it is the gyros.
+def _against(fine: FineResult, coarse: Alignment | None) -> tuple[Finding | None, bool]:
+    """What speaks against an alignment, and whether it is the gyros.
 
     A vehicle that does not quite stand tells nothing; gyros that read what they should not have
     changed since they were believed.
     """
-    told = [one for one in fine.findings if one.quantity != ROCKS]
-    for one in told:
-        if (one.quantity or "").startswith("gyro") or "rad/s" in (one.quantity or ""):
-            return one.what.partition(",")[0], True
-    if told:
-        return told[0].what.partition(":")[0].partition(" (")[0].partition(",")[0], False
+    found = [one for one in fine.findings if one.code != ROCKS]
+    for one in found:
+        if one.code == BIASED and one.data["sensor"] == "gyro":
+            return one, True
+    if found:
+        return found[0], False
     scatter = _scatter(fine)
     if scatter > INCONSISTENT:
-        return f"what it observed scatters {scatter:.2g} times as much as it should", False
+        return _note("navigation.alignment-innovations-scatter", ratio=scatter), False
     if coarse is None or coarse.heading_given:
-        return "", False
+        return None, False
     beside = fine.at_start if abs(coarse.time - fine.at_start.time) < 1.0 else fine.alignment
     apart = rotation.within_half_turn(coarse.roll_pitch_heading[2] - beside.roll_pitch_heading[2])
     if abs(float(apart)) > SURE * math.hypot(float(coarse.sd_deg[2]), float(beside.sd_deg[2])):
-        return f"coarse and fine alignment differ by {abs(float(apart)):.2g}°", True
-    return "", False
+        apart_deg = abs(float(apart))
+        return _note("navigation.coarse-and-fine-heading-differ", apart_deg=apart_deg), True
+    return None, False
 
 
 def _aligned_anew(

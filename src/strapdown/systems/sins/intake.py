@@ -320,7 +320,7 @@ def _check(state: IntakeState, time: Array, values: Array) -> None:
     if steps.size and not steps.min() > 0.0:
         k = int(np.argmax(~(steps > 0.0)))
         raise DataError(
-            "navigation.time-does-not-advance-followed",
+            "navigation.time-decreases",
             file=state.source,
             row=state.count + k + 2 - (len(stamps) - len(time)),
             quantity="time",

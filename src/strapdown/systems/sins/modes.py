@@ -64,7 +64,7 @@ class Until:
         for name in ("duration", "heading_sd_deg", "tilt_sd_deg", "least"):
             value = getattr(self, name)
             if value is not None and not (is_number(value) and value > 0.0):
-                raise ConfigError("navigation.ends-no-mode", quantity=name, value=value)
+                raise ConfigError("navigation.mode-end-not-positive", quantity=name, value=value)
         if not is_number(self.pause) or not 0.0 <= self.pause <= 1.0:
             raise ConfigError("navigation.no-part-time", quantity="pause", pause=self.pause)
 
@@ -166,11 +166,11 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
     names = [mode.name for mode in modes]
     for name in names:
         if names.count(name) > 1 or name == "next":
-            raise ConfigError("navigation.cannot-name-two-modes-nor", quantity="modes", name=name)
+            raise ConfigError("navigation.mode-name-taken", quantity="modes", name=name)
     kinds = [mode.kind for mode in modes]
     if not kinds or kinds[-1] != "navigation" or kinds.count("navigation") > 1:
         raise ConfigError(
-            "navigation.modes-do-not-end-navigation",
+            "navigation.modes-end-without-navigation",
             quantity="modes",
             names=", ".join(names) or "(none)",
         )
@@ -179,9 +179,9 @@ def check_timeline(modes: tuple[Mode, ...], known_start: bool) -> None:
             "navigation.state-start-known-would-look", quantity="modes", names=names[0]
         )
     if not known_start and len(kinds) == 1:
-        raise ConfigError("navigation.navigation-nothing-begin", quantity="modes")
+        raise ConfigError("navigation.no-start", quantity="modes")
     for before, mode in zip([None, *kinds], modes, strict=False):
         if mode.kind == "fine" and before != "coarse":
             raise ConfigError(
-                "navigation.begins-attitude-no-coarse-alignment", quantity="modes", name=mode.name
+                "navigation.mode-without-coarse-alignment", quantity="modes", name=mode.name
             )

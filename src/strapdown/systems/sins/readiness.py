@@ -72,7 +72,7 @@ def _refuse_apart(table: pd.DataFrame, imu: pd.DataFrame) -> None:
     if ((time >= stamps[0]) & (time <= stamps[-1])).any():
         return
     raise DataError(
-        "navigation.goes-inertial-record-nothing-within",
+        "navigation.aid-outside-record",
         file=source_of(table),
         quantity="time",
         time=time[0],
@@ -103,15 +103,18 @@ def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, ai
     swapped = abs(fix[0]) <= 180.0 and abs(fix[1]) <= 90.0
     swapped = swapped and _apart(fix[[1, 0, 2]], here) <= allowed
     raise DataError(
-        "navigation.message",
+        "navigation.fixes-swap-latitude-and-longitude"
+        if swapped
+        else "navigation.first-fix-far-from-stated-position",
         file=source_of(table),
         row=k + 1,
         quantity="lat, lon",
-        message=f"the first fix, {fix[0]:.6f}°, {fix[1]:.6f}°, is {off / 1000.0:.4g} km from the place in [{name}], {here[0]:.6f}°, {here[1]:.6f}°"
-        + (": latitude and longitude of the fixes seem to be swapped" if swapped else ""),
-        remedy_text="name its columns: columns = {lat = …, lon = …} of this aid"
-        if swapped
-        else f"look at lat_deg and lon_deg in [{name}], or state a position_sd_m that is so large",
+        table=name,
+        lat_deg=fix[0],
+        lon_deg=fix[1],
+        stated_lat_deg=here[0],
+        stated_lon_deg=here[1],
+        apart_km=off / 1000.0,
     )
 
 
@@ -124,29 +127,28 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
     if getattr(spec.mechanization, "height", "free") != "free":
         return ()
     length = float(imu.index[-1] - imu.index[0])
-    grows = f"its error grows by e every {VERTICAL:g} s"
-    if length > LONG:
-        times = math.exp(min(length / VERTICAL, 700.0))
-        grows += f", {times:.2g} times in all"
+    times = math.exp(min(length / VERTICAL, 700.0))
     model = getattr(getattr(spec.filter, "error_model", None), "kind", "")
     if (named := ERROR_MODELS.get(model)) is not None and not named.has_height:
         return (
             Finding(
-                "navigation.error-model-no-state-height",
+                "navigation.error-model-without-height",
                 file=source_of(imu),
                 quantity="height",
                 model=model,
-                grows=grows,
+                e_folding_s=VERTICAL,
+                times=times,
             ),
         )
     if length <= LONG or any(aid.kind in HOLDS_HEIGHT for aid in aids_of(spec).values()):
         return ()
     return (
         Finding(
-            "navigation.nothing-aids-height-minutes",
+            "navigation.height-not-aided",
             file=source_of(imu),
             quantity="height",
             length=length / 60.0,
-            grows=grows,
+            e_folding_s=VERTICAL,
+            times=times,
         ),
     )

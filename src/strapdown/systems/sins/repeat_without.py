@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.aiding.aid import Aid, TableAid, lasting
 from strapdown.aiding.gnss import Gnss
 from strapdown.ellipsoids import Ellipsoid
-from strapdown.errors import StrapdownError
+from strapdown.errors import Finding, StrapdownError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.navigation.consistency import consistency_of_all
 from strapdown.navigation.first_inconsistency import Inconsistency, inconsistencies
@@ -53,15 +53,15 @@ class Repeated:
         Run less repeated run (`trajectory_differences`), once a second.
     left : tuple of Inconsistency
         What is not consistent in the repeated run.
-    failed : str
-        Why it could not be run; empty where it could.
+    failed : Finding or None
+        Why it could not be run; None where it could.
     """
 
     without: str
     record: NavigationRecord | None
     differences: pd.DataFrame | None
     left: tuple[Inconsistency, ...] = ()
-    failed: str = ""
+    failed: Finding | None = None
 
 
 def repeat_without(
@@ -102,7 +102,7 @@ def repeat_without(
             changed, imu, told, IntervalRecorder(rate_hz=RATE), progress, chunk=60.0
         ).record
     except StrapdownError as error:
-        return Repeated(words, None, None, failed=str(error))
+        return Repeated(words, None, None, failed=error.finding)
     rows = run.trajectory
     span = record.trajectory.index
     rows = rows[(rows.index >= span[0]) & (rows.index <= span[-1])]

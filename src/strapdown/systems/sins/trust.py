@@ -15,7 +15,7 @@ from strapdown.aiding.gnss import Gnss
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.navigation_modules import make_filter
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.errors import StrapdownError
+from strapdown.errors import Finding, StrapdownError
 from strapdown.evaluation.heading_light import (
     SURE,
     HeadingLight,
@@ -53,6 +53,7 @@ MOST_ADVISED, LEAST_ADVISED = 4, 5.0
 NO_NORTH = 45.0
 #: Between states from which a witness can begin, s.
 LONGEST_STEP = 0.25
+NO_FIXES = "navigation.no-receiver-fixes"
 
 
 @dataclass(frozen=True)
@@ -84,8 +85,8 @@ class Trust:
     Attributes
     ----------
     light : HeadingLight
-    unwitnessed : str
-        Why nothing could tell a heading by itself, in words; empty where something could.
+    unwitnessed : tuple of Finding
+        Why nothing could tell a heading by itself; empty where something could.
     north_sd : float, deg
         To how much these gyros find north at rest, one standard deviation.
     advice : tuple of Advice
@@ -99,7 +100,7 @@ class Trust:
     """
 
     light: HeadingLight
-    unwitnessed: str
+    unwitnessed: tuple[Finding, ...]
     north_sd: float
     advice: tuple[Advice, ...]
     consistency: Mapping[str, ObservationConsistency]
@@ -155,14 +156,15 @@ def trust_of(
     evidence: list[Evidence] = []
     made, why = None, _unable(chain, record)
     try:
-        if not why:
+        if why is None:
             made = witnesses_of(make_filter(spec, sensors), chain, imu, tables, record, consistency)
-            why = "" if made is not None else "it took no fixes of a satellite receiver"
+            why = None if made is not None else Finding(NO_FIXES, severity="note")
         if made is not None:
             evidence = hear_witnesses(made, record, asked.heading_limit_deg / 3.0)
     except StrapdownError as error:
         # Where a second reckoning is not possible, the first one stands without it.
-        made, evidence, why = None, [], f"a second reckoning was not possible ({error})"
+        made, evidence = None, []
+        why = Finding("navigation.no-second-solution", severity="note", reason=error.finding)
     carried, no_north = _carried(spec, chain, sensors, imu, record, aligned)
     sources = agreeing_sources(chain, record, carried)
     heard: list[Heard] = [*evidence, *carried, *sources]
@@ -189,7 +191,7 @@ def trust_of(
         )
     return Trust(
         light=light,
-        unwitnessed="" if heard or not why else f"{why}; {no_north}",
+        unwitnessed=() if heard or why is None else (why, *no_north),
         north_sd=_north_sd(spec, sensors, record),
         advice=_advice(light, evidence, made, record),
         consistency=consistency,
@@ -205,23 +207,25 @@ def _carried(
     imu: pd.DataFrame,
     record: NavigationRecord,
     aligned: Sequence[Aligned],
-) -> tuple[list[CarriedHeading], str]:
+) -> tuple[list[CarriedHeading], tuple[Finding, ...]]:
     """What rests tell of the headings after them, or why they tell nothing."""
     ellipsoid = find_ellipsoid(spec.ellipsoid)
     north = _north_sd(spec, sensors, record)
     if not SURE * north <= spec.trust.heading_limit_deg:
         if north >= NO_NORTH:
-            return [], "its gyros find no north"
-        return [], f"its gyros find north to ± {north:.2g}° only"
+            return [], (Finding("navigation.gyros-find-no-north", severity="note"),)
+        code = "navigation.gyros-find-north-coarsely"
+        return [], (Finding(code, severity="note", north_sd_deg=north),)
     try:
         found, doubts, why = compasses_of(chain, sensors, imu, record, aligned, ellipsoid)
         if not found:
-            return [], why
+            return [], () if why is None else (why,)
         end = float(record.trajectory.index[-1])
         steps = joined_steps(chain.intake, imu, found[0].time, end)
-        return carry_headings(found, doubts, steps, record, sensors, ellipsoid), ""
+        return carry_headings(found, doubts, steps, record, sensors, ellipsoid), ()
     except StrapdownError as error:
-        return [], f"its gyros could not be followed ({error.finding.what})"
+        code = "navigation.gyros-not-followed"
+        return [], (Finding(code, severity="note", reason=error.finding),)
 
 
 def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationRecord) -> float:
@@ -229,14 +233,14 @@ def _north_sd(spec: NavigationSpec, sensors: ImuUncertainty, record: NavigationR
     return north_within(sensors, lat_deg, find_ellipsoid(spec.ellipsoid))
 
 
-def _unable(chain: Chain, record: NavigationRecord) -> str:
+def _unable(chain: Chain, record: NavigationRecord) -> Finding | None:
     """Why witnesses by fixes cannot be begun from a record."""
     if not any(type(aid) is Gnss for aid in chain.navigator.aids):
-        return "it took no fixes of a satellite receiver"
+        return Finding(NO_FIXES, severity="note")
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     if len(time) < 2 or float(np.median(np.diff(time))) > LONGEST_STEP:
-        return "the recorder keeps fewer than four states a second"
-    return ""
+        return Finding("navigation.recorder-too-slow-for-second-solution", severity="note")
+    return None
 
 
 def _advice(

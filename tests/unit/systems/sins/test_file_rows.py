@@ -35,15 +35,15 @@ def test_rows_are_moved_by_what_stands_before_them():
 
 def test_errors_are_moved_too():
     with pytest.raises(DataError) as caught, said_of_file(table(first_row=4)):
-        raise DataError("stuck", file="log.csv", row=2, quantity="gyro_x", remedy="mend it")
+        raise DataError("sensors.stuck", file="log.csv", row=2, quantity="gyro_x", value=1.0)
     assert caught.value.finding == Finding(
-        "stuck", file="log.csv", row=5, quantity="gyro_x", remedy="mend it"
+        "sensors.stuck", severity="error", file="log.csv", row=5, quantity="gyro_x", value=1.0
     )
 
 
 def test_a_state_that_diverges_is_of_the_first_table():
     with pytest.raises(DivergenceError) as caught, said_of_file(table(first_row=4)):
-        raise DivergenceError("it diverged at 40 s", quantity="state")
+        raise DivergenceError("estimation.diverged", quantity="state")
     assert caught.value.finding.file == "log.csv"
 
 
