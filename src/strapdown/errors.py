@@ -103,8 +103,8 @@ class Finding:
         put(self, "line", line)
         given: dict[str, Any] = {**(data or {}), **values}
         # Of a table of choices the names are data, and not what they name.
-        choices = {k: tuple(given[k]) for k in ("known", "also") if k in given}
-        put(self, "data", {k: _plain(v) for k, v in {**given, **choices}.items()})
+        given |= {k: tuple(given[k]) for k in ("known", "also") if k in given}
+        put(self, "data", {k: _plain(v) for k, v in given.items()})
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError(f"a Finding is immutable: make another by replace({name}=...)")

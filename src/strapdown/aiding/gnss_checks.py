@@ -231,5 +231,5 @@ def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None
 
 def _rows(struck: Flags) -> list[int | str]:
     """The first rows, counted from 1; dots where there are more."""
-    at = (np.flatnonzero(struck) + 1).tolist()
+    at: list[int | str] = [*(np.flatnonzero(struck) + 1).tolist()]
     return [*at[:NAMED], "…"] if len(at) > NAMED else at

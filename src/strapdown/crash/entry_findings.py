@@ -23,13 +23,14 @@ LATE = frozenset(
 
 def say_outliers(record: pd.DataFrame) -> None:
     """Say of each fix that lost weight how far it is off."""
+    why: list[tuple[Finding, ...]] = record["why"].tolist()
     for name in ("position", "velocity"):
         lower = record["used"] & (record[f"{name}_weight"] < 1.0)
         misfits = record.loc[lower, f"{name}_misfit"].to_numpy(dtype=np.float64)
         for row, misfit in zip(np.flatnonzero(lower), misfits.tolist(), strict=True):
             reason = Finding(f"crash.fix-{name}-misfit", severity="note", misfit=misfit)
-            column = record.columns.get_loc("why")
-            record.iat[row, column] = (*record.iat[row, column], reason)
+            why[row] = (*why[row], reason)
+    record["why"] = pd.Series(why, index=record.index, dtype=object)
 
 
 def findings(

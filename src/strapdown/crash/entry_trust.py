@@ -116,7 +116,7 @@ def record_of_fixes(stamps: Array, why: list[tuple[Finding, ...]]) -> pd.DataFra
     return pd.DataFrame(
         {
             "used": used,
-            "why": pd.array(np.fromiter(why, dtype=object, count=len(why)), dtype=object),
+            "why": pd.Series(why, index=stamps, dtype=object),
             "position_weight": used.astype(np.float64),
             "velocity_weight": used.astype(np.float64),
             "position_misfit": np.full(len(why), np.nan),

@@ -132,8 +132,8 @@ def trust(result: AlignmentResult) -> Trust:
     verdict = "trusted" if not against else "reserve"
     # What a bound accounts for does not speak against the bound.
     counted = sum(bool(one.data.get("in_bound")) for one in against)
-    off = known is not None and bool(against) and reasons[0].severity == "warning"
-    if len(against) - counted > 1 or off:
+    wrong = known is not None and bool(against) and reasons[0].severity == "warning"
+    if len(against) - counted > 1 or wrong:
         verdict = "distrusted"
     return Trust(verdict, tuple(reasons), _short(result, known is not None))
 

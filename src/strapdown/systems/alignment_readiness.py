@@ -100,7 +100,9 @@ def alignment_readiness(
         against,
         _table(coarse.index.to_numpy(dtype=np.float64), np.hstack([sd, off])),
         _fine(fine, begin, known, offset),
-        tuple((float(t), why) for t, why in found["refused"][refused].items()),
+        tuple(
+            zip(found.index[refused].tolist(), found["refused"][refused].tolist(), strict=True)
+        ),
     )
 
 

@@ -232,7 +232,7 @@ def run_bench(spec: AttitudeSpec, progress: Progress = silent) -> AttitudeBench:
         answer=find_answer(together, spec.tolerance_deg),
         trials=gather(benches, names),
         findings=tuple(
-            replace(f, file=f.file or name)
+            f.replace(file=f.file or name)
             for b, name in zip(benches, names, strict=True)
             for f in b.findings
         )

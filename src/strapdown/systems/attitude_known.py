@@ -128,7 +128,7 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, Second | No
     recording = read_log(spec.reference_log_path)
     aligned = align_second_log(source.imu, recording.imu)
     inside = (source.imu.index >= aligned.start) & (source.imu.index <= aligned.end)
-    findings = tuple(replace(f, file=f.file or recording.name) for f in recording.findings)
+    findings = tuple(f.replace(file=f.file or recording.name) for f in recording.findings)
     inputs = input_files("reference-log", spec.reference_log_path, recording.files)
     imu = source.imu[inside]
     truth = scored = None
