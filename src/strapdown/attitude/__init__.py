@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields
+from importlib import import_module
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -194,3 +198,18 @@ def run_attitude(
         attitude=attitude_table(time, q),
         diagnostics=algorithm.diagnostics(state, time),
     )
+
+
+class _CallableRoom(ModuleType):
+    """The package, callable as the public function: ``strapdown.attitude(t, gyro, accel)``.
+
+    Importing a package sets it as an attribute of its parent, so that the name cannot be that of
+    a function alone.
+    """
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """As `strapdown.api.attitude.attitude`."""
+        return import_module("strapdown.api.attitude").attitude(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _CallableRoom
