@@ -23,6 +23,7 @@ from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.exceptions import ConfigError, DivergenceError, nearest
+from strapdown.plugins import plugin
 from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 
@@ -72,13 +73,13 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
         The name, an option or a value is not known; the message names the nearest.
     """
     name, _, rest = text.strip().lower().partition(":")
-    if name not in ALGORITHMS:
+    cls = ALGORITHMS.get(name) or plugin("attitude", name, AttitudeAlgorithm)
+    if cls is None:
         raise ConfigError(
             f"'{name}' is no attitude algorithm",
             quantity="algorithms",
             remedy=nearest(name, ALGORITHMS),
         )
-    cls = ALGORITHMS[name]
     known = {f.name: f.default for f in fields(cls)}
     options: dict[str, object] = {}
     for item in filter(None, (part.strip() for part in rest.split(","))):

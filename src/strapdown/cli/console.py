@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from strapdown.exceptions import Finding
     from strapdown.report.document import TableBlock
 
+_log = logging.getLogger("strapdown")
 
 # Redirected output has no width of its own; a table is then as wide as it is.
 PIPE_WIDTH = 160
@@ -43,6 +45,21 @@ def console(*, err: bool = False) -> Console:
     return out
 
 
+@contextmanager
+def logged() -> Iterator[None]:
+    """Show messages of the logger on the error stream: warnings, unless a flag sets the level."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(levelname)s: %(message)s"))
+    before = _log.level
+    _log.addHandler(handler)
+    _log.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        _log.removeHandler(handler)
+        _log.setLevel(before)
+
+
 class Stopwatch:
     """Pass progress on, and keep how long each stage took."""
 
@@ -61,7 +78,9 @@ class Stopwatch:
         """End the last stage."""
         if self._stage is not None:
             name, start = self._stage
-            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+            taken = perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + taken
+            _log.info("%s: %.2f s", name, taken)
         self._stage = None
 
 

@@ -254,6 +254,16 @@ def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
     algorithms = [make_algorithm(text) for text in texts]
     if not algorithms:
         raise ConfigError("none is named", quantity="algorithms", remedy="name at least one")
+    for one in algorithms:
+        kernel = type(one).advance_kernel
+        home = getattr(kernel, "py_func", kernel).__module__
+        if not home.startswith("strapdown."):
+            raise ConfigError(
+                f"'{one.name}' is of a plug-in ({home}): its operations cannot be counted, nor run "
+                "in single precision",
+                quantity="algorithms",
+                remedy="run it by itself: strapdown.attitude(..., algorithm=...) in Python",
+            )
     if len({a.label for a in algorithms}) < len(algorithms):
         raise ConfigError(
             f"one is named twice: {', '.join(a.label for a in algorithms)}",
