@@ -73,7 +73,7 @@ def write_alignment(
     name = Path(out).absolute().name if name is None else name
     seals: list[Seal] = []
     with report_bundle(
-        result, out, "align", key="alignment", name=name, force=force, seals=seals
+        result, out, "align", key="alignment", name=name, force=force, seals=seals, report=report
     ) as folder:
         write_text(folder / "align.json", to_json(alignment_json(result)))
         told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}

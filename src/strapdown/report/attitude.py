@@ -61,7 +61,7 @@ def write_attitude(
     with write_bundle(
         Path(out),
         command="attitude",
-        configuration=bench.specification,
+        configuration={**bench.specification, **({} if report else {"report": False})},
         inputs=bench.inputs,
         force=force,
         seals=seals,

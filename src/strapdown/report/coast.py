@@ -158,7 +158,15 @@ def write_coast(
     beside = {} if result.navigation is None else {"navigation": result.navigation}
     seals: list[Seal] = []
     with report_bundle(
-        result, out, "coast", key="coast", name=name, force=force, seals=seals, beside=beside
+        result,
+        out,
+        "coast",
+        key="coast",
+        name=name,
+        force=force,
+        seals=seals,
+        beside=beside,
+        report=report,
     ) as folder:
         progress("writing the tables", 0.78)
         write_text(folder / "coast.json", to_json(coast_json(result)))

@@ -82,6 +82,7 @@ def write_crash(
         seals=seals,
         role="case",
         path_key="case_path",
+        report=report,
     ) as folder:
         _write_numbers(result, folder)
         if report:

@@ -74,7 +74,14 @@ def write_navigation(
     name = Path(out).absolute().name if name is None else name
     seals: list[Seal] = []
     with report_bundle(
-        result, out, "navigate", key="navigation", name=name, force=force, seals=seals
+        result,
+        out,
+        "navigate",
+        key="navigation",
+        name=name,
+        force=force,
+        seals=seals,
+        report=report,
     ) as folder:
         progress("writing the tables", 0.82)
         found = examine(told_of(result))
