@@ -131,7 +131,7 @@ class CrashRun(CaseResult):
         return f"<CrashRun {self.spec.name}\n{self.reconstruction!r}>"
 
     def _repr_html_(self) -> str:
-        table = self.to_pandas().to_html(float_format="%.4g")
+        table = self.to_pandas().to_html(float_format="{:.4g}".format)
         return f"<div><b>{escape(self.spec.title or self.spec.name)}</b></div>{table}"
 
 

@@ -307,7 +307,7 @@ class NavigationRun(NavigationResult):
         shown = rows[[*GEODETIC, *VELOCITY, *EULER, "north_sd", "east_sd", "heading_sd"]]
         found = "".join(f"<li>{escape(str(f))}</li>" for f in self.findings)
         return (
-            f"<div><b>{escape(repr(self)[1:-1])}</b></div>{shown.to_html(float_format='%.6g')}"
+            f"<div><b>{escape(repr(self)[1:-1])}</b></div>{shown.to_html(float_format='{:.6g}'.format)}"
             f"<ul>{found}</ul>"
         )
 

@@ -88,7 +88,8 @@ def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
     findings : tuple of Finding
         One of each plug-in that cannot be used.
     """
-    lists, findings = [], []
+    lists: list[Listed] = []
+    findings: list[Finding] = []
     for one in _literal():
         if one.key not in _PLUGINS:
             lists.append(one)

@@ -128,7 +128,7 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
             remedy="check that the recording was saved and copied whole",
         )
     if form is not None:
-        named = READERS.get(form) or plugin("reader", form, Reader)
+        named: Reader | None = READERS.get(form) or plugin("reader", form, Reader)
         if named is None:
             raise ConfigError(
                 f"'{form}' is no format of a log",
@@ -143,7 +143,8 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
     others, broken = plugins("reader", Reader)
     for other in others.values():
         if other.detect(path):
-            return other.read(path)
+            raw: RawLog = other.read(path)
+            return raw
     for one in broken:
         _log.warning("%s", one)
     kinds = "; ".join(r.title for r in READERS.values())
