@@ -11,16 +11,15 @@ Conventions, everywhere:
   body relative to inertial space; angles in degrees and everything else in SI at this surface,
   radians inside the kernels; time in seconds.
 
-Three lines that answer a question::
+Samples in any form go in, and data comes out; only ``save`` and ``write_*`` write files::
 
-    import strapdown
-    bench = strapdown.bench_attitude("alexiev-fig4", rate=100)
-    print(bench.summary)
-
-And of a crash, from the records of its units (see the page "Crash" of the manual)::
-
-    crash = strapdown.reconstruct_crash(units, strapdown.Entry.from_speed(14.0, 0.3))
-    print(crash.summary())
+    import strapdown as sd
+    imu = sd.read_imu("drive.csv", axes="forward-left-up")
+    run = sd.navigate(imu, [sd.Gnss(sd.read_gnss("fixes.pos"))], sensor="icm-42688-p")
+    run.trajectory, run.sd, run.innovations["gnss.position"], run.findings
+    run.save("out/")
+    sd.compare_attitude(imu, rates_hz=[100, 50]).answer
+    sd.reconstruct("case.toml").vehicles["1"].delta_v
 """
 
 from __future__ import annotations
@@ -30,6 +29,29 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from strapdown.alignment.fine import FineAlignment
     from strapdown.alignment.site import Site
+    from strapdown.api.alignment import AlignmentRun, OutageRun, align, coast
+    from strapdown.api.attitude import (
+        Attitude,
+        AttitudeComparison,
+        OrientationFilter,
+        attitude,
+        compare_attitude,
+    )
+    from strapdown.api.crash import CrashRun, reconstruct
+    from strapdown.api.navigation import (
+        Barometer,
+        BodyVelocity,
+        Gnss,
+        Heading,
+        Measurement,
+        NavigationRun,
+        NonHolonomic,
+        Odometer,
+        ZeroAngularRate,
+        ZeroVelocity,
+        navigate,
+    )
+    from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
     from strapdown.crash.entry import Entry
     from strapdown.crash.monte_carlo import sample_paths
     from strapdown.evaluation.trajectory_differences import trajectory_differences
@@ -40,18 +62,8 @@ if TYPE_CHECKING:
     from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.formats.trajectory_writers import write_trajectory
     from strapdown.increments import motion_increments
-    from strapdown.mechanization import (
-        NavTracker,
-        NorthEastDown,
-        WanderAzimuth,
-        run_mechanization,
-    )
+    from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
-    from strapdown.report.alignment import align
-    from strapdown.report.attitude import write_attitude
-    from strapdown.report.coast import coast
-    from strapdown.report.crash_case import reconstruct_case
-    from strapdown.report.navigation import navigate
     from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
@@ -61,37 +73,59 @@ if TYPE_CHECKING:
     from strapdown.sensors.imu_uncertainty import ImuUncertainty
     from strapdown.sensors.redundant_units import vote_units
     from strapdown.sensors.triad_uncertainty import TriadUncertainty
-    from strapdown.systems.attitude_bench import bench_attitude
     from strapdown.systems.crash_reconstruction import reconstruct_crash
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "AlignmentRun",
     "Assumed",
+    "Attitude",
+    "AttitudeComparison",
+    "Barometer",
+    "BodyVelocity",
+    "CrashRun",
     "CrashUnit",
     "Entry",
     "FineAlignment",
+    "Gnss",
+    "GnssFixes",
+    "Heading",
+    "Imu",
     "ImuUncertainty",
+    "Measurement",
     "Mounting",
     "NavState",
     "NavTracker",
+    "NavigationRun",
+    "NonHolonomic",
     "NorthEastDown",
+    "Odometer",
+    "OrientationFilter",
+    "OutageRun",
     "RecordedTriad",
     "Site",
+    "Streams",
     "TriadUncertainty",
     "WanderAzimuth",
+    "ZeroAngularRate",
+    "ZeroVelocity",
     "__version__",
     "align",
-    "bench_attitude",
+    "attitude",
     "check_imu_channels",
     "coast",
+    "compare_attitude",
     "motion_increments",
     "navigate",
+    "read",
     "read_crash_record",
+    "read_gnss",
+    "read_imu",
     "read_log",
     "read_nhtsa",
     "read_trajectory",
-    "reconstruct_case",
+    "reconstruct",
     "reconstruct_crash",
     "reproduce",
     "run_mechanization",
@@ -101,51 +135,75 @@ __all__ = [
     "trajectory_differences",
     "verify",
     "vote_units",
-    "write_attitude",
     "write_trajectory",
 ]
 
 # Loaded on first use: numba alone takes longer to import than most commands take to run.
 _HOMES = {
-    "vote_units": "strapdown.sensors.redundant_units",
-    "ImuUncertainty": "strapdown.sensors.imu_uncertainty",
-    "check_imu_channels": "strapdown.sensors.imu_health",
-    "align": "strapdown.report.alignment",
-    "WanderAzimuth": "strapdown.mechanization",
-    "Site": "strapdown.alignment.site",
     "FineAlignment": "strapdown.alignment.fine",
-    "Assumed": "strapdown.sensors.assumed",
-    "CrashUnit": "strapdown.sensors.crash_unit",
+    "Site": "strapdown.alignment.site",
+    "AlignmentRun": "strapdown.api.alignment",
+    "OutageRun": "strapdown.api.alignment",
+    "align": "strapdown.api.alignment",
+    "coast": "strapdown.api.alignment",
+    "Attitude": "strapdown.api.attitude",
+    "AttitudeComparison": "strapdown.api.attitude",
+    "OrientationFilter": "strapdown.api.attitude",
+    "compare_attitude": "strapdown.api.attitude",
+    "CrashRun": "strapdown.api.crash",
+    "reconstruct": "strapdown.api.crash",
+    "Barometer": "strapdown.api.navigation",
+    "BodyVelocity": "strapdown.api.navigation",
+    "Gnss": "strapdown.api.navigation",
+    "Heading": "strapdown.api.navigation",
+    "Measurement": "strapdown.api.navigation",
+    "NavigationRun": "strapdown.api.navigation",
+    "NonHolonomic": "strapdown.api.navigation",
+    "Odometer": "strapdown.api.navigation",
+    "ZeroAngularRate": "strapdown.api.navigation",
+    "ZeroVelocity": "strapdown.api.navigation",
+    "navigate": "strapdown.api.navigation",
+    "GnssFixes": "strapdown.api.reading",
+    "Imu": "strapdown.api.reading",
+    "Streams": "strapdown.api.reading",
+    "read": "strapdown.api.reading",
+    "read_gnss": "strapdown.api.reading",
+    "read_imu": "strapdown.api.reading",
     "Entry": "strapdown.crash.entry",
-    "Mounting": "strapdown.sensors.crash_unit",
-    "NavState": "strapdown.nav_state",
-    "NavTracker": "strapdown.mechanization",
-    "NorthEastDown": "strapdown.mechanization",
-    "RecordedTriad": "strapdown.sensors.crash_unit",
-    "TriadUncertainty": "strapdown.sensors.triad_uncertainty",
-    "bench_attitude": "strapdown.systems.attitude_bench",
-    "coast": "strapdown.report.coast",
-    "motion_increments": "strapdown.increments",
-    "navigate": "strapdown.report.navigation",
+    "sample_paths": "strapdown.crash.monte_carlo",
+    "trajectory_differences": "strapdown.evaluation.trajectory_differences",
+    "summarise_differences": "strapdown.evaluation.trajectory_summary",
     "read_log": "strapdown.formats",
     "read_crash_record": "strapdown.formats.crash_records",
     "read_nhtsa": "strapdown.formats.nhtsa",
     "read_trajectory": "strapdown.formats.trajectory_readers",
-    "reconstruct_case": "strapdown.report.crash_case",
-    "reconstruct_crash": "strapdown.systems.crash_reconstruction",
-    "reproduce": "strapdown.report.reproduction",
-    "run_mechanization": "strapdown.mechanization",
-    "sample_paths": "strapdown.crash.monte_carlo",
-    "simulate": "strapdown.report.simulation",
-    "summarise_differences": "strapdown.evaluation.trajectory_summary",
-    "trajectory_differences": "strapdown.evaluation.trajectory_differences",
-    "verify": "strapdown.report.verify",
-    "write_attitude": "strapdown.report.attitude",
     "write_trajectory": "strapdown.formats.trajectory_writers",
+    "motion_increments": "strapdown.increments",
+    "NavTracker": "strapdown.mechanization",
+    "NorthEastDown": "strapdown.mechanization",
+    "WanderAzimuth": "strapdown.mechanization",
+    "run_mechanization": "strapdown.mechanization",
+    "NavState": "strapdown.nav_state",
+    "reproduce": "strapdown.report.reproduction",
+    "simulate": "strapdown.report.simulation",
+    "verify": "strapdown.report.verify",
+    "Assumed": "strapdown.sensors.assumed",
+    "CrashUnit": "strapdown.sensors.crash_unit",
+    "Mounting": "strapdown.sensors.crash_unit",
+    "RecordedTriad": "strapdown.sensors.crash_unit",
+    "check_imu_channels": "strapdown.sensors.imu_health",
+    "ImuUncertainty": "strapdown.sensors.imu_uncertainty",
+    "vote_units": "strapdown.sensors.redundant_units",
+    "TriadUncertainty": "strapdown.sensors.triad_uncertainty",
+    "reconstruct_crash": "strapdown.systems.crash_reconstruction",
 }
 
 
 def __getattr__(name: str) -> Any:
+    if name == "attitude":
+        from importlib import import_module
+
+        return import_module("strapdown.attitude")
     if name in _HOMES:
         from importlib import import_module
 

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude, rotation
+from strapdown import rotation
+from strapdown.systems.attitude_bench import bench_attitude
 
 
 def final_errors(rate: float, algorithms: str, **options) -> dict[str, float]:

@@ -156,13 +156,13 @@ def test_a_part_without_room_for_an_outage_is_refused(drive, run_cli, tmp_path, 
 
 
 def test_from_python(tmp_path):
-    seal = strapdown.coast(
+    run = strapdown.coast(
         "hg1700",
-        tmp_path / "out",
-        outage=20.0,
+        20.0,
         start={"aided_s": 0.0, "heading_sd_deg": 1.0},
         motion={"speed_m_per_s": 20.0, "turn_rate_deg_per_s": 3.0},
     )
+    seal = run.save(tmp_path / "out")
     assert (seal.path / "report.html").is_file()
 
 

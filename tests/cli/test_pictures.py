@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude, simulate
+from strapdown import simulate
 from strapdown.config import read_trajectory_spec
 from strapdown.config.alignment import LogTable
 from strapdown.config.navigation_file import read_navigation_spec
@@ -25,6 +25,7 @@ from strapdown.report.navigation_result import told_of
 from strapdown.report.svg_chart import draw
 from strapdown.report.trajectory_simulation import simulation_chart
 from strapdown.report.verdict_picture import light_picture
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.systems.sins.draft import draft_navigation
 from strapdown.systems.sins.run import run_navigation
 from strapdown.systems.trajectory_source import make_motion

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from strapdown import bench_attitude, frames, read_log, rotation
+from strapdown import frames, read_log, rotation
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION
 
 

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from strapdown import bench_attitude, read_log, rotation
+from strapdown import read_log, rotation
 from strapdown.attitude import Quaternion, run_attitude
 from strapdown.evaluation.differences import error_angles
 from strapdown.increments import increments_from_imu
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
 TURNS = {

@@ -7,11 +7,13 @@ import shutil
 
 import pytest
 
-from strapdown import bench_attitude, simulate, verify, write_attitude
+from strapdown import simulate, verify
 from strapdown.bundle import sha256, write_bundle
 from strapdown.bundle.seal import MANIFEST
 from strapdown.errors import ConfigError, DataError
+from strapdown.report.attitude import write_attitude
 from strapdown.results import InputFiles
+from strapdown.systems.attitude_bench import bench_attitude
 
 pytestmark = pytest.mark.usefixtures("sketched_module")
 

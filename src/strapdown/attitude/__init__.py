@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import fields
+from importlib import import_module
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,6 +23,7 @@ from strapdown.attitude.rotation_vector import RotationVector
 from strapdown.attitude.runge_kutta import RungeKutta
 from strapdown.attitude.tracker import AttitudeTracker
 from strapdown.errors import ConfigError, DivergenceError
+from strapdown.plugins import plugin
 from strapdown.results.runs import AttitudeRun
 from strapdown.tables import attitude_table
 
@@ -68,7 +73,8 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
         The name, an option or a value is not known; the message names the nearest.
     """
     name, _, rest = text.strip().lower().partition(":")
-    if name not in ALGORITHMS:
+    cls = ALGORITHMS.get(name) or plugin("attitude", name, AttitudeAlgorithm)
+    if cls is None:
         raise ConfigError(
             "attitude.no-attitude-algorithm",
             quantity="algorithms",
@@ -76,7 +82,6 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
             word=name,
             known=ALGORITHMS,
         )
-    cls = ALGORITHMS[name]
     known = {f.name: f.default for f in fields(cls)}
     options: dict[str, object] = {}
     for item in filter(None, (part.strip() for part in rest.split(","))):
@@ -196,3 +201,18 @@ def run_attitude(
         attitude=attitude_table(time, q),
         diagnostics=algorithm.diagnostics(state, time),
     )
+
+
+class _CallableRoom(ModuleType):
+    """The package, callable as the public function: ``strapdown.attitude(t, gyro, accel)``.
+
+    Importing a package sets it as an attribute of its parent, so that the name cannot be that of
+    a function alone.
+    """
+
+    def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        """As `strapdown.api.attitude.attitude`."""
+        return import_module("strapdown.api.attitude").attitude(*args, **kwargs)
+
+
+sys.modules[__name__].__class__ = _CallableRoom

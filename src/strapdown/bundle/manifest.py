@@ -69,12 +69,13 @@ def _keep(
     folder: Path, inputs: Sequence[InputFiles]
 ) -> tuple[list[dict[str, Any]], dict[str, str]]:
     """Copy the inputs, or refer to them: their lines in the manifest, and where each is now."""
-    copy = sum(f.stat().st_size for i in inputs for f in i.files) <= COPY_LIMIT
+    small = sum(f.stat().st_size for i in inputs for f in i.files) <= COPY_LIMIT
     kept: list[dict[str, Any]] = []
     moved: dict[str, str] = {}
     places: dict[Path, Path] = {}
     names: set[Path] = set()
     for item in inputs:
+        copy = small or item.copied
         place = _place(item, places)
         if place in places and not item.path.is_dir():
             continue

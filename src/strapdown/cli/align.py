@@ -102,6 +102,7 @@ def align(
     drifts and biases; the report says how well each is known, what limits it, and after how long
     it was known.
     """
+    from strapdown.api.alignment import run_specified
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_timing
     from strapdown.cli.align_options import refuse_beside_file, spec_of_flags
@@ -109,8 +110,6 @@ def align(
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.alignment_file import read_alignment_spec
-    from strapdown.report.alignment import write_alignment
-    from strapdown.systems.alignment_run import run_alignment
 
     given: dict[str, Any] = {
         "lat": lat,
@@ -134,8 +133,8 @@ def align(
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         spec = spec_of_flags(source, given) if asked is None else asked
-        result = run_alignment(spec, source if own else None, report)
-        seal = write_alignment(result, folder, force=write.force, progress=report)
+        result = run_specified(spec, source if own else None, report)
+        seal = result.save(folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
     if write.json:

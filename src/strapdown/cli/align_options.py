@@ -8,13 +8,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from strapdown.api.alignment import specify_alignment
+from strapdown.api.reading import ImuFile
 from strapdown.cli.shared_options import log_keys
-from strapdown.config.alignment import AlignmentSpec
-from strapdown.config.alignment_checks import NOT_BEFORE_FINE
-from strapdown.config.alignment_file import alignment_spec
+from strapdown.config.alignment import AlignmentSpec, LogTable
 from strapdown.config.spec import misfit
 from strapdown.errors import ConfigError, Finding
-from strapdown.formats import read_raw
 
 __all__ = [
     "LOG_FLAGS",
@@ -112,24 +111,23 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     DataError
         The log cannot be read.
     """
-    keys = log_keys(given)
-    if given["sensor"] is None:
-        raise ConfigError("cli.no-sensor-for-alignment", quantity="--sensor")
-    coarse = module_of_flag(given["method"] or "inertial_frame")
-    alone = given["coarse_only"] or coarse["kind"] in NOT_BEFORE_FINE
-    table = {
-        "name": log.resolve().stem,
-        "log": {"path": str(log), **keys},
-        "axes": {"axes": given["axes"]},
-        "site": _site(log, given),
-        "sensors": {"sensor": given["sensor"]},
-        "prefilter": module_of_flag(given["prefilter"] or "none"),
-        "gnss": None if given["gnss"] is None else {"path": str(given["gnss"])},
-        "coarse": coarse,
-        "fine": {"kind": "none" if alone else "filter"},
-    }
     try:
-        return alignment_spec(table)
+        table = LogTable(path=str(log), **log_keys(given))
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise refused_flag({**first, "loc": ("log", *first["loc"])}) from None
+    site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
+    try:
+        return specify_alignment(
+            ImuFile(table, given["axes"]),
+            site={key: float(value) for key, value in site.items() if value is not None},
+            sensor=given["sensor"],
+            coarse=module_of_flag(given["method"] or "inertial_frame"),
+            fine=not given["coarse_only"],
+            gnss=None if given["gnss"] is None else str(given["gnss"]),
+            prefilter=module_of_flag(given["prefilter"] or "none"),
+            called=lambda argument: f"--{argument}",
+        )
     except ValidationError as error:
         raise refused_flag(error.errors()[0]) from None
     except ConfigError as error:
@@ -171,19 +169,6 @@ def _flag(place: str) -> str:
     if stage not in _STAGES:
         return place
     return f"{_STAGES[stage]}, {rest}" if rest and rest != "kind" else _STAGES[stage]
-
-
-def _site(log: Path, given: Mapping[str, Any]) -> dict[str, float]:
-    place = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
-    if given["lat"] is None and given["lon"] is None:
-        start = read_raw(log).start
-        if start is not None:
-            said = {"lat_deg": start.lat_deg, "lon_deg": start.lon_deg, "alt_m": start.alt}
-            return {k: v if place[k] is None else place[k] for k, v in said.items()}
-    for key, flag in (("lat_deg", "--lat"), ("lon_deg", "--lon")):
-        if place[key] is None:
-            raise ConfigError("cli.no-position", quantity=flag)
-    return {k: float(v) for k, v in place.items() if v is not None}
 
 
 def module_of_flag(text: str) -> dict[str, Any]:

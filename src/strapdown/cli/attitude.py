@@ -171,6 +171,7 @@ def attitude(
     them with what is known, splits their error into the sensor's and their own, counts what they
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
+    from strapdown.api.attitude import compare_attitude
     from strapdown.attitude import make_algorithm
     from strapdown.attitude.speed import time_algorithms
     from strapdown.bundle.destination import check_destination
@@ -179,9 +180,8 @@ def attitude(
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.formats.columns import parse_column_option
-    from strapdown.report.attitude import attitude_json, write_attitude
+    from strapdown.report.attitude import attitude_json
     from strapdown.report.attitude_c import check_c, chosen_for_c, write_c
-    from strapdown.systems.attitude_bench import bench_attitude
 
     for source in sources:
         refuse_result(source, "log")
@@ -190,37 +190,39 @@ def attitude(
     check_c(export_c, write.force)
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        bench = bench_attitude(
+        bench = compare_attitude(
             sources,
-            algorithms=_split(algorithms),
-            rates=_numbers(rates),
+            _split(algorithms),
+            rates_hz=_numbers(rates),
             tolerance_deg=tolerance_deg,
-            interpolation=interpolation,
-            trials=trials,
             reference=reference or [],
-            reference_log=reference_log,
-            peers=(peers or "").replace(",", " ").split(),
-            initial=initial,
             gyro_bias=gyro_bias,
-            rate=log.rate,
-            sampling=log.sampling,
-            seed=seed,
-            sensor=sensor,
-            columns=parse_column_option(log.columns or []),
-            gyro_unit=log.gyro_unit,
-            accel_unit=log.accel_unit,
-            time_unit=log.time_unit,
-            axes=log.axes,
-            repair=log.repair,
-            from_s=log.from_s,
-            to_s=log.to_s,
-            duration_s=log.duration,
+            options={
+                "interpolation": interpolation,
+                "trials": trials,
+                "reference_log": reference_log,
+                "peers": (peers or "").replace(",", " ").split(),
+                "initial": initial,
+                "rate": log.rate,
+                "sampling": log.sampling,
+                "seed": seed,
+                "sensor": sensor,
+                "columns": parse_column_option(log.columns or []),
+                "gyro_unit": log.gyro_unit,
+                "accel_unit": log.accel_unit,
+                "time_unit": log.time_unit,
+                "axes": log.axes,
+                "repair": log.repair,
+                "from_s": log.from_s,
+                "to_s": log.to_s,
+                "duration_s": log.duration,
+            },
             progress=report,
         )
         if export_c is not None:
             chosen_for_c(bench)
         report("writing", 0.95)
-        seal = write_attitude(bench, folder, force=write.force, png=png)
+        seal = bench.save(folder, force=write.force, png=png)
         if export_c is not None:
             exported = write_c(bench, export_c, force=write.force)
         report("timing", 0.99)

@@ -149,14 +149,14 @@ def coast(
     Of a sensor the answer is by its data sheet, along a motion that is stated. Of a run of
     navigation the filter's own state is taken, and the drifts that came are laid over the forecast.
     """
+    from strapdown.api.alignment import run_outage
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_timing
     from strapdown.cli.coast_options import coast_of_flags
     from strapdown.cli.coast_tables import print_coast
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, source_name
-    from strapdown.report.coast import read_coasting_run, write_coast
-    from strapdown.systems.coasting.run import run_coast
+    from strapdown.report.coast import read_coasting_run
     from strapdown.systems.part_of_log import check_part
 
     check_part(from_s, to_s, duration)
@@ -198,8 +198,8 @@ def coast(
         )
         if navigation is not None:
             WORDS.set("file")
-        result = run_coast(spec, navigation, file, report)
-        seal = write_coast(result, folder, force=write.force, progress=report)
+        result = run_outage(spec, navigation, file, report)
+        seal = result.save(folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
     if write.json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from strapdown.errors import Finding, Words
     from strapdown.report.document import TableBlock
 
+_log = logging.getLogger("strapdown")
 
 #: Whose words messages speak: those of options, or the keys of the file that a command runs.
 WORDS: ContextVar[Words] = ContextVar("words", default="cli")
@@ -46,6 +48,21 @@ def console(*, err: bool = False) -> Console:
     return out
 
 
+@contextmanager
+def logged() -> Iterator[None]:
+    """Show messages of the logger on the error stream: warnings, unless a flag sets the level."""
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(logging.Formatter("%(levelname)s: %(message)s"))
+    before = _log.level
+    _log.addHandler(handler)
+    _log.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        _log.removeHandler(handler)
+        _log.setLevel(before)
+
+
 class Stopwatch:
     """Pass progress on, and keep how long each stage took."""
 
@@ -64,7 +81,9 @@ class Stopwatch:
         """End the last stage."""
         if self._stage is not None:
             name, start = self._stage
-            self.seconds[name] = self.seconds.get(name, 0.0) + perf_counter() - start
+            taken = perf_counter() - start
+            self.seconds[name] = self.seconds.get(name, 0.0) + taken
+            _log.info("%s: %.2f s", name, taken)
         self._stage = None
 
 

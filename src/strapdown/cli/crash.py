@@ -26,6 +26,7 @@ def crash(
     Reads the records that the case names and writes a report (HTML and PDF), JSON, CSV and
     figures, sealed so that any change is found.
     """
+    from strapdown.api.crash import reconstruct
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_timing
     from strapdown.cli.console import (
@@ -38,19 +39,15 @@ def crash(
     )
     from strapdown.cli.crash_tables import print_crash
     from strapdown.cli.result_folder import default_folder, refuse_result
-    from strapdown.config.crash_case_file import read_case_spec
-    from strapdown.report.crash_case import write_crash
-    from strapdown.systems.crash_case import run_case
 
     refuse_result(case, "case")
     folder = out or default_folder(case, "crash")
     check_destination(folder, write.force)
     WORDS.set("file")
-    spec = read_case_spec(case)
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        result = run_case(spec, case, report)
-        seal = write_crash(result, folder, force=write.force, progress=report)
+        result = reconstruct(case, progress=report)
+        seal = result.save(folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
     if write.json:
@@ -58,7 +55,7 @@ def crash(
         return
     if write.quiet:
         return
-    console().print(spec.title, style="bold")
+    console().print(result.spec.title, style="bold")
     print_crash(result)
     print_findings(result.findings)
     print_seal(seal, "report.html")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from strapdown.report.demo_page import Shown
@@ -59,7 +59,7 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
     turns = data / _TURNS
 
     def scenario(folder: Path, force: bool, progress: Progress) -> None:
-        _attitude(["alexiev-fig6"], folder / "hand", force, progress, rate=200.0)
+        _attitude(["alexiev-fig6"], folder / "hand", force, progress, options={"rate": 200.0})
 
     def turn(folder: Path, force: bool, progress: Progress) -> None:
         _attitude(
@@ -72,18 +72,20 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
         )
 
     def pole(folder: Path, force: bool, progress: Progress) -> None:
-        from strapdown.report.crash_case import reconstruct_case
+        from strapdown.api.crash import reconstruct
         from strapdown.report.simulation import simulate
 
         progress("simulating the records", 0.0)
         simulate("pole", folder / "pole-records", force=force)
         case = folder / "pole-records" / "case.toml"
-        reconstruct_case(case, folder / "pole", force=force, progress=progress)
+        made = reconstruct(case, progress=progress)
+        made.save(folder / "pole", force=force, progress=progress)
 
     def coasting(folder: Path, force: bool, progress: Progress) -> None:
-        from strapdown.report.coast import coast
+        from strapdown.api.alignment import coast
 
-        coast(folder / "tunnel", folder / "cone", outage=_OUTAGE, force=force, progress=progress)
+        made = coast(folder / "tunnel", _OUTAGE, progress=progress)
+        made.save(folder / "cone", force=force, progress=progress)
 
     return [
         DemoRun(
@@ -196,25 +198,24 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
 
 
 def _attitude(
-    sources: list[str], out: Path, force: bool, progress: Progress, **options: object
+    sources: list[str], out: Path, force: bool, progress: Progress, **options: Any
 ) -> None:
-    from strapdown.report.attitude import write_attitude
-    from strapdown.systems.attitude_bench import bench_attitude
+    from strapdown.api.attitude import compare_attitude
 
-    bench = bench_attitude(sources, progress=progress, **options)  # type: ignore[arg-type]
+    made = compare_attitude(sources, progress=progress, **options)
     progress("writing", 0.9)
-    write_attitude(bench, out, force=force)
+    made.save(out, force=force)
 
 
 def _navigation(name: str, data: Path) -> Callable[[Path, bool, Progress], None]:
     def make(folder: Path, force: bool, progress: Progress) -> None:
-        from strapdown.report.navigation import navigate
+        from strapdown.api.navigation import navigate
 
         packaged = files("strapdown.cli").joinpath("demo_files", f"{name}.toml")
         text = packaged.read_text("utf-8").replace("{data}", data.resolve().as_posix())
         folder.mkdir(parents=True, exist_ok=True)
         file = folder / f"{name}.toml"
         file.write_text(text, encoding="utf-8", newline="\n")
-        navigate(file, folder / name, force=force, progress=progress)
+        navigate(file, progress=progress).save(folder / name, force=force, progress=progress)
 
     return make

@@ -14,6 +14,7 @@ from strapdown.cli.shared_options import (
     WITH_PANEL,
     LogFlags,
     Quiet,
+    Verbose,
     log_keys,
     spread,
 )
@@ -72,6 +73,7 @@ def crash(
     out: Annotated[Path, _file_to_write("case.toml")] = Path("case.toml"),
     force: Force = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Write the case file of a crash: records are looked through, and what is not in them is asked.
 
@@ -122,6 +124,7 @@ def align(
     out: Annotated[Path, _file_to_write("align.toml")] = Path("align.toml"),
     force: Force = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Write the file of an alignment: what a log tells is filled in, and what it does not is asked.
 
@@ -186,6 +189,7 @@ def navigate(
     out: Annotated[Path, _file_to_write("navigate.toml")] = Path("navigate.toml"),
     force: Force = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Write the file of a run of navigation: what log and fixes tell is filled in.
 

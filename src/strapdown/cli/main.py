@@ -27,7 +27,7 @@ from strapdown.cli import (
     simulate,
     verify,
 )
-from strapdown.cli.console import WORDS
+from strapdown.cli.console import WORDS, logged
 from strapdown.cli.interrupts import keep_interrupts
 from strapdown.errors import Finding, StrapdownError
 
@@ -42,7 +42,6 @@ app = typer.Typer(
     help="From an inertial sensor log to an answer that you can trust.",
     epilog=EXIT_CODES,
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -100,7 +99,8 @@ def run() -> None:
         signal.signal(number, lambda got, _: sys.exit(128 + got))
     keep_interrupts()
     try:
-        app()
+        with logged():
+            app()
     except StrapdownError as error:
         _fail(error.finding.text(WORDS.get()), error.exit_code)
     except OSError as error:

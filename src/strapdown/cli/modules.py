@@ -12,12 +12,13 @@ EPILOG = "Example: strapdown modules\n\nExample: strapdown modules --json"
 def modules(json: Json = False) -> None:
     """List what can stand in each slot: algorithms, the modules of a chain, sensors, formats."""
     from strapdown.bundle.json_text import to_json
-    from strapdown.cli.console import console, print_table
+    from strapdown.cli.console import console, print_findings, print_table
     from strapdown.cli.modules_list import HEADINGS, cell_text, listed_modules
 
-    lists = listed_modules()
+    lists, findings = listed_modules()
     if json:
         typer.echo(to_json({one.key: one.rows for one in lists}), nl=False)
+        print_findings(findings)
         return
     out = console()
     for one in lists:
@@ -31,3 +32,4 @@ def modules(json: Json = False) -> None:
             [[cell_text(row[column]) for column in columns] for row in one.rows],
             text=[k for k, column in enumerate(columns) if column not in one.numbers],
         )
+    print_findings(findings)

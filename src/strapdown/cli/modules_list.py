@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
+from strapdown.aiding.aid import Aid
 from strapdown.aiding.standstill_detectors import STANDSTILL_DETECTORS
 from strapdown.aiding.standstill_thresholds import STANDSTILL_THRESHOLDS
-from strapdown.attitude import ALGORITHMS
+from strapdown.attitude import ALGORITHMS, AttitudeAlgorithm
 from strapdown.config.motions import KINDS
 from strapdown.config.slots import SLOTS, Slot, options_of
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.formats import READERS
+from strapdown.errors import Finding
+from strapdown.formats import READERS, Reader
 from strapdown.formats.crash_records import CRASH_READERS
 from strapdown.formats.gnss_files import GNSS_READERS
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.plugins import plugins
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import SCENARIOS
 from strapdown.simulation.crash_cases import CASES
@@ -68,8 +71,41 @@ def cell_text(value: Any) -> str:
     return value or "–"
 
 
-def listed_modules() -> tuple[Listed, ...]:
-    """Return every list, in the order in which they are printed."""
+#: Of each list, the kind of the plug-ins that can stand in it, and what they must be.
+_PLUGINS: dict[str, tuple[str, type]] = {
+    "attitude_algorithms": ("attitude", AttitudeAlgorithm),
+    "aiding": ("measurement", Aid),
+    "log_formats": ("reader", Reader),
+}
+
+
+def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
+    """Return every list, in the order in which they are printed, with what plug-ins add.
+
+    Returns
+    -------
+    lists : tuple of Listed
+    findings : tuple of Finding
+        One of each plug-in that cannot be used.
+    """
+    lists: list[Listed] = []
+    findings: list[Finding] = []
+    for one in _literal():
+        if one.key not in _PLUGINS:
+            lists.append(one)
+            continue
+        found, broken = plugins(*_PLUGINS[one.key])
+        findings += broken
+        added = {
+            "attitude_algorithms": _algorithm_rows,
+            "aiding": _module_rows,
+            "log_formats": _titles,
+        }[one.key](found)
+        lists.append(replace(one, rows=(*one.rows, *added)))
+    return tuple(lists), tuple(findings)
+
+
+def _literal() -> tuple[Listed, ...]:
     slots = {name: slot for name, slot in SLOTS.items() if name != "mechanization"}
     return (
         _algorithms(),
@@ -131,15 +167,19 @@ def _algorithms() -> Listed:
     return Listed(
         "attitude_algorithms",
         "Attitude algorithms",
-        tuple(
-            {
-                "name": name,
-                "source": f"{cls.source} {cls.equations}".strip(),
-                "options": [f"{f.name}={f.default}".lower() for f in fields(cls)],
-                "summary": cls.summary,
-            }
-            for name, cls in ALGORITHMS.items()
-        ),
+        _algorithm_rows(ALGORITHMS),
+    )
+
+
+def _algorithm_rows(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
+    return tuple(
+        {
+            "name": name,
+            "source": f"{cls.source} {cls.equations}".strip(),
+            "options": [f"{f.name}={f.default}".lower() for f in fields(cls)],
+            "summary": cls.summary,
+        }
+        for name, cls in entries.items()
     )
 
 
@@ -164,16 +204,19 @@ def _slot(name: str, slot: Slot) -> Listed:
     return Listed(
         name,
         f"{slot.title} ([{name}] of a chain{_UNSAID.get(name, '')})",
-        tuple(
-            {
-                "name": kind,
-                "source": getattr(entry, "source", "") or None,
-                "options": [o.key for o in options_of(entry)],
-                "summary": getattr(entry, "summary", "")
-                or (entry.__doc__ or "").partition("\n")[0],
-            }
-            for kind, entry in slot.entries.items()
-        ),
+        _module_rows(slot.entries),
+    )
+
+
+def _module_rows(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
+    return tuple(
+        {
+            "name": kind,
+            "source": getattr(entry, "source", "") or None,
+            "options": [o.key for o in options_of(entry)],
+            "summary": getattr(entry, "summary", "") or (entry.__doc__ or "").partition("\n")[0],
+        }
+        for kind, entry in entries.items()
     )
 
 

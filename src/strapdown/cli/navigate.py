@@ -144,18 +144,17 @@ def navigate(
     write: OutFlags,
 ) -> None:
     """Find place, velocity and attitude over a record, from inertial sensors and what aids them."""
+    from strapdown.api.navigation import run_specified, smoothed_too
     from strapdown.bundle.destination import check_destination
     from strapdown.bundle.timing import write_latency, write_timing
     from strapdown.cli.align_options import flag_of, refuse_beside_file
     from strapdown.cli.console import WORDS, Stopwatch, print_findings, print_seal, progress
     from strapdown.cli.latency_table import print_latency
-    from strapdown.cli.navigate_options import FLAGS, navigation_of_flags, smoothed_too
+    from strapdown.cli.navigate_options import FLAGS, navigation_of_flags
     from strapdown.cli.navigate_tables import print_navigation
     from strapdown.cli.result_folder import default_folder, refuse_result, source_name
     from strapdown.config.navigation_file import read_navigation_spec
     from strapdown.live.replay import Replay, parse_pace
-    from strapdown.report.navigation import write_navigation
-    from strapdown.systems.sins.run import run_navigation
 
     refuse_result(source, "log")
     played = None if pace is None else Replay(parse_pace(pace))
@@ -204,8 +203,8 @@ def navigate(
         report("looking through", 0.01)
         spec = navigation_of_flags(source, given) if asked is None else asked
         drive: dict[str, Any] = {} if played is None else {"drive": played}
-        result = run_navigation(spec, source if own else None, report, **drive)
-        seal = write_navigation(result, folder, force=write.force, progress=report)
+        result = run_specified(spec, source if own else None, report, **drive)
+        seal = result.save(folder, force=write.force, progress=report)
         report.stop()
         write_timing(seal, report.seconds)
         latency = None if played is None else played.tape.latency()

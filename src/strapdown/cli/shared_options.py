@@ -7,6 +7,7 @@ as the flags of the set.
 from __future__ import annotations
 
 import inspect
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import wraps
@@ -23,6 +24,7 @@ __all__ = [
     "LogFlags",
     "OutFlags",
     "Quiet",
+    "Verbose",
     "WriteFlags",
     "folder_to_make",
     "log_keys",
@@ -190,9 +192,38 @@ Force = Annotated[
     bool,
     typer.Option("--force", help="Replace a result that is there.", rich_help_panel=OUT_PANEL),
 ]
+
+
+def log_level(level: int) -> Callable[[bool], bool]:
+    """A callback of a flag that sets from which level on messages of the logger are shown."""
+
+    def shown(asked: bool) -> bool:
+        if asked:
+            logging.getLogger("strapdown").setLevel(level)
+        return asked
+
+    return shown
+
+
 Quiet = Annotated[
     bool,
-    typer.Option("--quiet", "-q", help="Print nothing but errors.", rich_help_panel=OUT_PANEL),
+    typer.Option(
+        "--quiet",
+        "-q",
+        help="Print nothing but errors.",
+        rich_help_panel=OUT_PANEL,
+        callback=log_level(logging.ERROR),
+    ),
+]
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose",
+        "-v",
+        help="Print each stage with its duration, and which reader took which file.",
+        rich_help_panel=OUT_PANEL,
+        callback=log_level(logging.INFO),
+    ),
 ]
 
 
@@ -208,6 +239,7 @@ class WriteFlags:
 
     force: Force = False
     quiet: Quiet = False
+    verbose: Verbose = False
 
 
 @dataclass(frozen=True)
@@ -217,6 +249,7 @@ class OutFlags:
     force: Force = False
     json: Json = False
     quiet: Quiet = False
+    verbose: Verbose = False
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:

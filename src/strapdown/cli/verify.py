@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Json, Quiet
+from strapdown.cli.shared_options import Json, Quiet, Verbose
 
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
 CHANGED = 6
@@ -17,6 +17,7 @@ def verify(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a run wrote.")],
     json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run a result again from its own configuration and compare it bit for bit.
 

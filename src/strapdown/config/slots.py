@@ -25,6 +25,7 @@ from strapdown.navigation.damping import DAMPINGS, Damping
 from strapdown.navigation.filter_options import FilterOptions
 from strapdown.navigation.recorder import RECORDERS, Recorder
 from strapdown.navigation.smoother import SMOOTHERS, Smoother
+from strapdown.plugins import WithPlugins
 from strapdown.prefilter import PREFILTERS, Prefilter
 
 __all__ = ["GIVEN", "SLOTS", "Option", "Slot", "options_of"]
@@ -65,7 +66,7 @@ SLOTS: dict[str, Slot] = {
     "covariance": Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
     "update_rule": Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
     "influence": Slot("influence", "Influence functions", Influence, INFLUENCES),
-    "aiding": Slot("aiding", "Aids", Aid, AIDS),
+    "aiding": Slot("aiding", "Aids", Aid, WithPlugins(AIDS, "measurement", Aid)),
     "damping": Slot("damping", "Dampings", Damping, DAMPINGS),
     "smoother": Slot("smoother", "Smoothers", Smoother, SMOOTHERS),
     "recorder": Slot("recorder", "Recorders", Recorder, RECORDERS),

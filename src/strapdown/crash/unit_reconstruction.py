@@ -74,6 +74,12 @@ class UnitReconstruction:
         """Answers with their bounds of 95 %: `summary_table` of this unit."""
         return summary_table([self])
 
+    @property
+    def delta_v(self) -> VelocityChange | None:
+        """Change of velocity of the severest event, along the turning axes; None without one."""
+        changes = [one.event for one in self.body]
+        return max(changes, key=lambda change: change.resultant) if changes else None
+
 
 def reconstruct_unit(
     at_point: AtPoint,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +38,9 @@ from strapdown.formats import (
 from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog, ReadOptions, Recording
+from strapdown.plugins import plugin, plugins
+
+_log = logging.getLogger("strapdown")
 
 __all__ = ["READERS", "ReadOptions", "Reader", "Recording", "read_joined", "read_log", "read_raw"]
 
@@ -116,14 +120,23 @@ def read_raw(path: Path, form: str | None = None) -> RawLog:
     if path.is_file() and path.stat().st_size == 0:
         raise DataError("io.file-empty", file=path.name)
     if form is not None:
-        if form not in READERS:
+        named: Reader | None = READERS.get(form) or plugin("reader", form, Reader)
+        if named is None:
             raise ConfigError(
                 "io.unknown-format-of-log", quantity="format", form=form, word=form, known=READERS
             )
-        return READERS[form].read(path)
-    for reader in READERS.values():
+        return named.read(path)
+    for name, reader in READERS.items():
         if reader.detect(path):
+            _log.info("%s: read as %s (%s)", path.name, name, reader.title)
             return reader.read(path)
+    others, broken = plugins("reader", Reader)
+    for other in others.values():
+        if other.detect(path):
+            raw: RawLog = other.read(path)
+            return raw
+    for one in broken:
+        _log.warning("%s", one)
     kinds = "; ".join(r.title for r in READERS.values())
     if path.is_dir():
         raise _no_recording(path)

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle.destination import check_destination
 from strapdown.bundle.json_text import to_json
 from strapdown.bundle.seal import Seal
-from strapdown.config.alignment_file import alignment_spec, read_alignment_spec
+from strapdown.config.alignment_file import alignment_spec
 from strapdown.report.alignment_document import CONVENTIONS, alignment_document
 from strapdown.report.alignment_json import alignment_json
 from strapdown.report.crash_csv import write_table
@@ -24,48 +23,16 @@ from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 from strapdown.tables import EULER
 
-__all__ = ["align", "rerun_alignment", "write_alignment"]
+__all__ = ["rerun_alignment", "write_alignment"]
 
 
-def align(
-    file: str | Path, out: str | Path, *, force: bool = False, progress: Progress = silent
-) -> Seal:
-    """Align a body as the file of an alignment says, and write the report as a sealed bundle.
-
-    Parameters
-    ----------
-    file : str or Path
-        The alignment, in TOML.
-    out : str or Path
-        Folder to make.
-    force : bool
-        Replace a bundle that is there.
-    progress : callable, optional
-        Called with a stage and the share that is done.
-
-    Returns
-    -------
-    Seal
-
-    Raises
-    ------
-    ConfigError
-        The file does not hold together, or `out` may not be written.
-    DataError
-        The record cannot be aligned.
-    """
-    check_destination(Path(out), force)
-    result = run_alignment(read_alignment_spec(file), Path(file), progress)
-    return write_alignment(result, out, force=force, progress=progress)
-
-
-def rerun_alignment(configuration: dict[str, Any], out: Path) -> Seal:
-    """Run a sealed alignment again from its configuration."""
+def rerun_alignment(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
+    """Run a sealed alignment again from its configuration, with or without its page."""
     spec = alignment_spec(configuration["alignment"])
     path = configuration.get("file_path")
     name = str(configuration["name"])
     return write_alignment(
-        run_alignment(spec, None if path is None else Path(path)), out, name=name
+        run_alignment(spec, None if path is None else Path(path)), out, name=name, report=report
     )
 
 
@@ -75,6 +42,7 @@ def write_alignment(
     out: str | Path,
     *,
     name: str | None = None,
+    report: bool = True,
     force: bool = False,
     progress: Progress = silent,
 ) -> Seal:
@@ -87,6 +55,8 @@ def write_alignment(
         Folder to make.
     name : str, optional
         Of the folder, as the report names it; that of `out`, if not given.
+    report : bool
+        Whether the page and the figures are written, too.
     force : bool
         Replace a bundle that is there.
     progress : callable, optional
@@ -101,21 +71,22 @@ def write_alignment(
         `out` exists and may not be replaced.
     """
     name = Path(out).absolute().name if name is None else name
-    document = alignment_document(result, name)
     seals: list[Seal] = []
     with report_bundle(
-        result, out, "align", key="alignment", name=name, force=force, seals=seals
+        result, out, "align", key="alignment", name=name, force=force, seals=seals, report=report
     ) as folder:
         write_text(folder / "align.json", to_json(alignment_json(result)))
         told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
         write_table(_attitude(result), folder / "attitude.csv", told)
         if result.fine is not None:
             write_table(_history(result.fine.history), folder / "fine.csv", told)
-        progress("drawing the figures", 0.75)
-        stills = draw_stills(document)
-        write_drawings(document, stills, folder / "figures")
-        progress("writing the page", 0.9)
-        write_text(folder / "report.html", document_page(document, stills=stills))
+        if report:
+            progress("drawing the figures", 0.75)
+            document = alignment_document(result, name)
+            stills = draw_stills(document)
+            write_drawings(document, stills, folder / "figures")
+            progress("writing the page", 0.9)
+            write_text(folder / "report.html", document_page(document, stills=stills))
     return seals[0]
 
 

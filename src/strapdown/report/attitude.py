@@ -25,7 +25,12 @@ __all__ = ["attitude_json", "attitude_page", "write_attitude"]
 
 
 def write_attitude(
-    bench: AttitudeBench, out: str | Path, *, force: bool = False, png: bool = False
+    bench: AttitudeBench,
+    out: str | Path,
+    *,
+    report: bool = True,
+    force: bool = False,
+    png: bool = False,
 ) -> Seal:
     """Write a bench as a sealed bundle.
 
@@ -34,6 +39,8 @@ def write_attitude(
     bench : AttitudeBench
     out : str or Path
         Folder to make.
+    report : bool
+        Whether the page and the figures are written, too.
     force : bool
         Replace a bundle that is there.
     png : bool
@@ -54,7 +61,7 @@ def write_attitude(
     with write_bundle(
         Path(out),
         command="attitude",
-        configuration=bench.specification,
+        configuration={**bench.specification, **({} if report else {"report": False})},
         inputs=bench.inputs,
         force=force,
         seals=seals,
@@ -65,14 +72,15 @@ def write_attitude(
         _write_csv(bench, folder / "attitude.csv")
         if len(bench.sweep):
             _write_sweep(bench, folder / "sweep.csv")
-        (folder / "figures").mkdir()
-        drawn = charts(bench)
-        for chart in drawn:
-            for ending in ("svg", "png") if png else ("svg",):
-                draw(chart, folder / "figures" / f"{chart.slug}.{ending}")
-        (folder / "report.html").write_text(
-            attitude_page(bench, drawn), encoding="utf-8", newline="\n"
-        )
+        if report:
+            (folder / "figures").mkdir()
+            drawn = charts(bench)
+            for chart in drawn:
+                for ending in ("svg", "png") if png else ("svg",):
+                    draw(chart, folder / "figures" / f"{chart.slug}.{ending}")
+            (folder / "report.html").write_text(
+                attitude_page(bench, drawn), encoding="utf-8", newline="\n"
+            )
     return seals[0]
 
 

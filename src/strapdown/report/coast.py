@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle.configuration_paths import resolved
-from strapdown.bundle.destination import check_destination
 from strapdown.bundle.json_text import to_json
 from strapdown.bundle.reading import read_manifest, unsealed_changes
 from strapdown.bundle.seal import Seal
@@ -26,54 +25,7 @@ from strapdown.systems.coasting.run import CoastResult, run_coast
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 
-__all__ = ["coast", "read_coasting_run", "rerun_coast", "write_coast"]
-
-
-def coast(
-    source: str | Path,
-    out: str | Path,
-    *,
-    outage: float = 60.0,
-    force: bool = False,
-    progress: Progress = silent,
-    **options: Any,
-) -> Seal:
-    """Foretell how far a sensor, or a run of navigation, drifts in an outage; write a bundle.
-
-    Parameters
-    ----------
-    source : str or Path
-        A sensor of the catalogue or its file; or a run of navigation: its folder or its
-        configuration.
-    out : str or Path
-        Folder to make.
-    outage : float, s
-    force : bool
-        Replace a bundle that is there.
-    progress : callable, optional
-        Called with a stage and the share that is done.
-    **options
-        Tables and keys of `config.coast.CoastSpec`: ``motion={"speed_m_per_s": 15.0}``,
-        ``start={"heading_sd_deg": 1.0}``, ``aiding={"no_slip": {}}``, ``places``, ``at_s``,
-        ``from_s``, ``to_s``, ``duration_s``.
-
-    Returns
-    -------
-    Seal
-
-    Raises
-    ------
-    ConfigError
-        There is no such sensor, or an option cannot be.
-    DataError
-        The run of navigation has no record any more.
-    """
-    check_destination(Path(out), force)
-    navigation, file = read_coasting_run(source)
-    sensor = str(source) if navigation is None else None
-    spec = coast_spec({"outage_s": float(outage), "sensor": sensor, **options})
-    result = run_coast(spec, navigation, file, progress)
-    return write_coast(result, out, force=force, progress=progress)
+__all__ = ["read_coasting_run", "rerun_coast", "write_coast"]
 
 
 def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
@@ -143,15 +95,15 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
     return spec, None if file is None else Path(file)
 
 
-def rerun_coast(configuration: dict[str, Any], out: Path) -> Seal:
-    """Run a sealed forecast again from its configuration."""
+def rerun_coast(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
+    """Run a sealed forecast again from its configuration, with or without its page."""
     table = configuration.get("navigation")
     navigation = None if table is None else navigation_spec(table)
     path = configuration.get("file_path")
     result = run_coast(
         coast_spec(configuration["coast"]), navigation, None if path is None else Path(path)
     )
-    return write_coast(result, out, name=str(configuration["name"]))
+    return write_coast(result, out, name=str(configuration["name"]), report=report)
 
 
 @one_thread()
@@ -160,6 +112,7 @@ def write_coast(
     out: str | Path,
     *,
     name: str | None = None,
+    report: bool = True,
     force: bool = False,
     progress: Progress = silent,
 ) -> Seal:
@@ -172,6 +125,8 @@ def write_coast(
         Folder to make.
     name : str, optional
         Of the folder, as the report names it; that of `out`, if not given.
+    report : bool
+        Whether the page and the figures are written, too.
     force : bool
         Replace a bundle that is there.
     progress : callable, optional
@@ -189,15 +144,24 @@ def write_coast(
     beside = {} if result.navigation is None else {"navigation": result.navigation}
     seals: list[Seal] = []
     with report_bundle(
-        result, out, "coast", key="coast", name=name, force=force, seals=seals, beside=beside
+        result,
+        out,
+        "coast",
+        key="coast",
+        name=name,
+        force=force,
+        seals=seals,
+        beside=beside,
+        report=report,
     ) as folder:
         progress("writing the tables", 0.78)
         write_text(folder / "coast.json", to_json(coast_json(result)))
         write_coast_tables(result, folder)
-        progress("drawing the figures", 0.8)
-        document = coast_document(result, name)
-        stills = draw_stills(document)
-        write_drawings(document, stills, folder / "figures")
-        progress("writing the page", 0.95)
-        write_text(folder / "report.html", document_page(document, stills=stills))
+        if report:
+            progress("drawing the figures", 0.8)
+            document = coast_document(result, name)
+            stills = draw_stills(document)
+            write_drawings(document, stills, folder / "figures")
+            progress("writing the page", 0.95)
+            write_text(folder / "report.html", document_page(document, stills=stills))
     return seals[0]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle.destination import check_destination
 from strapdown.bundle.json_text import to_json
 from strapdown.bundle.seal import Seal
 from strapdown.config.crash_case import CaseSpec
-from strapdown.config.crash_case_file import read_case_spec
 from strapdown.formats.mme_writer import write_mme
 from strapdown.report.crash_assumptions import CONVENTIONS
 from strapdown.report.crash_csv import signals_table, trajectory_table, write_table
@@ -26,48 +24,16 @@ from strapdown.systems.crash_case import CaseResult, run_case
 from strapdown.systems.one_thread import one_thread
 from strapdown.systems.progress import Progress, silent
 
-__all__ = ["file_name", "reconstruct_case", "rerun_crash", "write_crash"]
+__all__ = ["file_name", "rerun_crash", "write_crash"]
 
 
-def reconstruct_case(
-    case: str | Path, out: str | Path, *, force: bool = False, progress: Progress = silent
-) -> Seal:
-    """Reconstruct a crash from its case file and write the report as a sealed bundle.
-
-    Parameters
-    ----------
-    case : str or Path
-        The case, in TOML.
-    out : str or Path
-        Folder to make.
-    force : bool
-        Replace a bundle that is there.
-    progress : callable, optional
-        Called with a stage and the share that is done.
-
-    Returns
-    -------
-    Seal
-
-    Raises
-    ------
-    ConfigError
-        The case does not hold together, or `out` may not be written.
-    DataError
-        A record cannot be used.
-    """
-    check_destination(Path(out), force)
-    spec = read_case_spec(Path(case))
-    result = run_case(spec, Path(case), progress)
-    return write_crash(result, out, force=force, progress=progress)
-
-
-def rerun_crash(configuration: dict[str, Any], out: Path) -> Seal:
-    """Run a sealed case again from its configuration."""
+def rerun_crash(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
+    """Run a sealed case again from its configuration, with or without its report."""
     spec = CaseSpec.model_validate(configuration["case"])
     path = configuration.get("case_path")
     name = str(configuration["name"])
-    return write_crash(run_case(spec, None if path is None else Path(path)), out, name=name)
+    result = run_case(spec, None if path is None else Path(path))
+    return write_crash(result, out, name=name, report=report)
 
 
 @one_thread()
@@ -76,6 +42,7 @@ def write_crash(
     out: str | Path,
     *,
     name: str | None = None,
+    report: bool = True,
     force: bool = False,
     progress: Progress = silent,
 ) -> Seal:
@@ -88,6 +55,8 @@ def write_crash(
         Folder to make.
     name : str, optional
         Of the folder, as the report names it; that of `out`, if not given.
+    report : bool
+        Whether page, PDF and figures are written, too.
     force : bool
         Replace a bundle that is there.
     progress : callable, optional
@@ -102,8 +71,6 @@ def write_crash(
         `out` exists and may not be replaced.
     """
     name = Path(out).absolute().name if name is None else name
-    progress("drawing the report", 0.55)
-    document = crash_document(result, crash_figures(result), name)
     seals: list[Seal] = []
     with report_bundle(
         result,
@@ -115,15 +82,19 @@ def write_crash(
         seals=seals,
         role="case",
         path_key="case_path",
+        report=report,
     ) as folder:
         _write_numbers(result, folder)
-        progress("drawing the figures", 0.65)
-        stills = draw_stills(document)
-        write_drawings(document, stills, folder / "figures")
-        progress("writing the page", 0.85)
-        write_text(folder / "report.html", document_page(document, stills=stills))
-        progress("setting the PDF", 0.9)
-        write_pdf(document, folder / "report.pdf", stills=stills)
+        if report:
+            progress("drawing the report", 0.55)
+            document = crash_document(result, crash_figures(result), name)
+            progress("drawing the figures", 0.65)
+            stills = draw_stills(document)
+            write_drawings(document, stills, folder / "figures")
+            progress("writing the page", 0.85)
+            write_text(folder / "report.html", document_page(document, stills=stills))
+            progress("setting the PDF", 0.9)
+            write_pdf(document, folder / "report.pdf", stills=stills)
     return seals[0]
 
 

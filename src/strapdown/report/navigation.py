@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from strapdown.bundle.destination import check_destination
 from strapdown.bundle.json_text import to_json
 from strapdown.bundle.seal import Seal
-from strapdown.config.navigation_file import navigation_spec, read_navigation_spec
+from strapdown.config.navigation_file import navigation_spec
 from strapdown.report.document_data import draw_stills, no_stills
 from strapdown.report.document_files import write_drawings, write_text
 from strapdown.report.document_html import document_page
@@ -25,48 +24,16 @@ from strapdown.systems.progress import Progress, silent
 from strapdown.systems.sins.result import NavigationResult
 from strapdown.systems.sins.run import run_navigation
 
-__all__ = ["navigate", "rerun_navigation", "write_navigation"]
+__all__ = ["rerun_navigation", "write_navigation"]
 
 
-def navigate(
-    file: str | Path, out: str | Path, *, force: bool = False, progress: Progress = silent
-) -> Seal:
-    """Navigate as a configuration says, and write everything as a sealed bundle.
-
-    Parameters
-    ----------
-    file : str or Path
-        The configuration, in TOML.
-    out : str or Path
-        Folder to make.
-    force : bool
-        Replace a bundle that is there.
-    progress : callable, optional
-        Called with a stage and the share that is done.
-
-    Returns
-    -------
-    Seal
-
-    Raises
-    ------
-    ConfigError
-        The file does not hold together, or `out` may not be written.
-    DataError
-        The record cannot be navigated by.
-    """
-    check_destination(Path(out), force)
-    result = run_navigation(read_navigation_spec(file), Path(file), progress)
-    return write_navigation(result, out, force=force, progress=progress)
-
-
-def rerun_navigation(configuration: dict[str, Any], out: Path) -> Seal:
-    """Run a sealed run of navigation again from its configuration."""
+def rerun_navigation(configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
+    """Run a sealed run of navigation again from its configuration, with or without its page."""
     spec = navigation_spec(configuration["navigation"])
     path = configuration.get("file_path")
     name = str(configuration["name"])
     return write_navigation(
-        run_navigation(spec, None if path is None else Path(path)), out, name=name
+        run_navigation(spec, None if path is None else Path(path)), out, name=name, report=report
     )
 
 
@@ -76,6 +43,7 @@ def write_navigation(
     out: str | Path,
     *,
     name: str | None = None,
+    report: bool = True,
     force: bool = False,
     progress: Progress = silent,
 ) -> Seal:
@@ -88,6 +56,8 @@ def write_navigation(
         Folder to make.
     name : str, optional
         Of the folder, as the report names it; that of `out`, if not given.
+    report : bool
+        Whether the pages and the figures are written, too.
     force : bool
         Replace a bundle that is there.
     progress : callable, optional
@@ -104,21 +74,29 @@ def write_navigation(
     name = Path(out).absolute().name if name is None else name
     seals: list[Seal] = []
     with report_bundle(
-        result, out, "navigate", key="navigation", name=name, force=force, seals=seals
+        result,
+        out,
+        "navigate",
+        key="navigation",
+        name=name,
+        force=force,
+        seals=seals,
+        report=report,
     ) as folder:
         progress("writing the tables", 0.82)
         found = examine(told_of(result))
         write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
         write_navigation_files(result, folder)
-        write_verdict(result, name, folder)
-        progress("drawing the figures", 0.86)
-        document = navigation_document(found.told, name, found, light_section(result))
-        if result.spec.output.figures:
-            stills = draw_stills(document)
-            write_drawings(document, stills, folder / "figures")
-        else:
-            stills = no_stills(document)
-        progress("writing the page", 0.95)
-        write_text(folder / "report.html", document_page(document, stills=stills))
+        if report:
+            write_verdict(result, name, folder)
+            progress("drawing the figures", 0.86)
+            document = navigation_document(found.told, name, found, light_section(result))
+            if result.spec.output.figures:
+                stills = draw_stills(document)
+                write_drawings(document, stills, folder / "figures")
+            else:
+                stills = no_stills(document)
+            progress("writing the page", 0.95)
+            write_text(folder / "report.html", document_page(document, stills=stills))
         progress("sealing", 0.97)
     return seals[0]

@@ -40,6 +40,7 @@ def report_bundle(
     role: str = "configuration",
     path_key: str = "file_path",
     beside: Mapping[str, Spec] | None = None,
+    report: bool = True,
 ) -> Iterator[Path]:
     """Write the bundle of a report, whole or not at all; as `write_bundle`.
 
@@ -62,6 +63,8 @@ def report_bundle(
         Of the file that the specification was read from, among the inputs.
     beside : mapping of str to Spec, optional
         Further specifications that were run, by where they stand in what is sealed.
+    report : bool
+        Whether it has its pages and figures; sealed where it has not.
 
     Yields
     ------
@@ -79,6 +82,7 @@ def report_bundle(
         key: result.spec.plain(),
         **{name: spec.plain() for name, spec in (beside or {}).items()},
         **({} if file is None else {path_key: file}),
+        **({} if report else {"report": False}),
     }
     with write_bundle(
         Path(out),

@@ -70,10 +70,17 @@ class Verification:
     details: tuple[str, ...]
 
 
+def _with_page(configuration: dict[str, Any]) -> bool:
+    """Whether the bundle was written with its page and figures, which change no number."""
+    return bool(configuration.get("report", True))
+
+
 def _rerun_attitude(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
     # Pictures that were asked for in a second form change no number and are no configuration.
     png = any(name.endswith(".png") for name in sealed)
-    return write_attitude(run_bench(AttitudeSpec.model_validate(configuration)), out, png=png)
+    asked = {key: value for key, value in configuration.items() if key != "report"}
+    bench = run_bench(AttitudeSpec.model_validate(asked))
+    return write_attitude(bench, out, png=png, report=_with_page(configuration))
 
 
 def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
@@ -91,19 +98,19 @@ def _rerun_reproduction(configuration: dict[str, Any], out: Path, sealed: set[st
 
 
 def _rerun_crash(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_crash(configuration, out)
+    return rerun_crash(configuration, out, report=_with_page(configuration))
 
 
 def _rerun_alignment(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_alignment(configuration, out)
+    return rerun_alignment(configuration, out, report=_with_page(configuration))
 
 
 def _rerun_navigation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_navigation(configuration, out)
+    return rerun_navigation(configuration, out, report=_with_page(configuration))
 
 
 def _rerun_coast(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return rerun_coast(configuration, out)
+    return rerun_coast(configuration, out, report=_with_page(configuration))
 
 
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {

@@ -22,12 +22,16 @@ class InputFiles:
         Every file that was read.
     digests : tuple of str
         SHA-256 of each when it was read.
+    copied : bool
+        Whether a bundle copies them, whatever their size: they are of tables in memory, and exist
+        nowhere else.
     """
 
     role: str
     path: Path
     files: tuple[Path, ...]
     digests: tuple[str, ...]
+    copied: bool = False
 
 
 @dataclass(frozen=True)

@@ -100,9 +100,7 @@ def alignment_readiness(
         against,
         _table(coarse.index.to_numpy(dtype=np.float64), np.hstack([sd, off])),
         _fine(fine, begin, known, offset),
-        tuple(
-            zip(found.index[refused].tolist(), found["refused"][refused].tolist(), strict=True)
-        ),
+        tuple(zip(found.index[refused].tolist(), found["refused"][refused].tolist(), strict=True)),
     )
 
 

@@ -254,6 +254,13 @@ def _make_algorithms(texts: Sequence[str]) -> list[AttitudeAlgorithm]:
     algorithms = [make_algorithm(text) for text in texts]
     if not algorithms:
         raise ConfigError("attitude.none-named", quantity="algorithms")
+    for one in algorithms:
+        kernel = type(one).advance_kernel
+        home = getattr(kernel, "py_func", kernel).__module__
+        if not home.startswith("strapdown."):
+            raise ConfigError(
+                "attitude.plugin-not-countable", quantity="algorithms", name=one.name, home=home
+            )
     if len({a.label for a in algorithms}) < len(algorithms):
         raise ConfigError(
             "attitude.named-twice", quantity="algorithms", algorithms=[a.label for a in algorithms]

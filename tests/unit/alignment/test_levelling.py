@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude, rotation
+from strapdown import rotation
 from strapdown.alignment.levelling import level
 from strapdown.errors import DataError
 from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import imu_table
 
 ANGLES = [(0, 0), (10, -20), (-170, 5), (90, 0), (-90, 30), (3, 89), (0, -90), (180, 0)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude, rotation
+from strapdown import rotation
 from strapdown.attitude import make_algorithm, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
@@ -18,6 +18,7 @@ from strapdown.evaluation.reference_points import (
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
 from strapdown.report.attitude_words import standing
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import imu_table
 
 

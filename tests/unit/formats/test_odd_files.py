@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from strapdown import bench_attitude, rotation, simulate
+from strapdown import rotation, simulate
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.references import read_truth
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO
 
 HEAD = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"

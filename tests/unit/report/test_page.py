@@ -8,10 +8,10 @@ from html.parser import HTMLParser
 
 import pytest
 
-from strapdown import bench_attitude
 from strapdown.report.attitude import attitude_page, write_attitude
 from strapdown.report.attitude_charts import charts
 from strapdown.report.chart import BUCKETS, break_jumps, thin
+from strapdown.systems.attitude_bench import bench_attitude
 
 EVIL = "</script><script>alert(1)</script><!--<img src=x onerror=alert(2)>"
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from strapdown import bench_attitude, verify, write_attitude
+from strapdown import verify
+from strapdown.report.attitude import write_attitude
+from strapdown.systems.attitude_bench import bench_attitude
 
 FEW = ("euler", "quaternion")
 

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown import bench_attitude
 from strapdown.attitude import make_algorithm
 from strapdown.attitude.cost import count_cost
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import SCENARIOS, ImuErrors, find_scenario, simulate_imu
 from strapdown.systems.attitude_answer import Evidence, choices, find_answer
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import imu_table
 
 NAMES = ("naive", "quaternion", "rk4")

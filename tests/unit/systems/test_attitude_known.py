@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude, rotation
+from strapdown import rotation
 from strapdown.attitude import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import attitude_at
@@ -16,6 +16,7 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import find_scenario, simulate_imu
 from strapdown.simulation.handling import Handling
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import ACCEL, GYRO, QUATERNION, attitude_table, imu_table
 
 MOTION = Handling(duration=60.0, seed=3)

@@ -7,8 +7,10 @@ import shutil
 
 import pytest
 
-from strapdown import bench_attitude, simulate, verify, write_attitude
+from strapdown import simulate, verify
 from strapdown.peers import available_peers
+from strapdown.report.attitude import write_attitude
+from strapdown.systems.attitude_bench import bench_attitude
 
 pytestmark = pytest.mark.usefixtures("sketched")
 

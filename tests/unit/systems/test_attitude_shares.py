@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
 
-from strapdown import bench_attitude, simulate
+from strapdown import simulate
 from strapdown.attitude import RotationVector, attitude_history, make_algorithm
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import QUATERNION, imu_table
 
 SINGLE = 2.0**-24

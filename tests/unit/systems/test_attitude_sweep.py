@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude
 from strapdown.attitude import make_algorithm
 from strapdown.errors import ConfigError
 from strapdown.evaluation.known import Known
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.systems.attitude_shares import OwnTruth
 from strapdown.systems.attitude_sweep import (
     Grounds,

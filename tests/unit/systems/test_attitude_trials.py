@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from strapdown import bench_attitude, simulate
+from strapdown import simulate
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import ConfigError
 from strapdown.formats.log_writers import LOG_WRITERS
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.systems.attitude_trials import rank, trial_names, worst_sweep
 
 ALGORITHMS = ["naive", "quaternion"]

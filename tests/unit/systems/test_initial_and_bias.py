@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strapdown import bench_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.systems.attitude_bench import bench_attitude
 from strapdown.tables import GYRO, imu_table
 
 BIAS = np.array([0.02, -0.03, 0.01])

@@ -27,7 +27,7 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Proposal", "propose"]
+__all__ = ["CODE_RECEIVER", "Proposal", "propose"]
 
 Array = NDArray[np.float64]
 
@@ -113,6 +113,7 @@ def propose(
     sensor: str | None = None,
     site: tuple[float, float, float] | None = None,
     heading_deg: float | None = None,
+    fixes_as: GnssOptions | None = None,
 ) -> Proposal:
     """Look through a log and the fixes beside it, and say how it can be navigated by.
 
@@ -129,6 +130,8 @@ def propose(
         Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
     heading_deg : float, optional
         Of the body at the start.
+    fixes_as : GnssOptions, optional
+        How the fixes are read; as those of a code receiver, if not given.
 
     Returns
     -------
@@ -143,7 +146,7 @@ def propose(
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
     if gnss is not None:
-        fixes, shifted = on_clock_of(read_gnss(gnss, CODE_RECEIVER), recording.imu)
+        fixes, shifted = on_clock_of(read_gnss(gnss, fixes_as or CODE_RECEIVER), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
     scatter = _scatter(imu)
     # An engine shakes one axis more than another; the quietest one tells of the sensor.

@@ -1,0 +1,1 @@
+"""An attitude algorithm and a measurement for strapdown, added from outside."""

@@ -1,0 +1,481 @@
+"""Attitude from Python: one algorithm over samples, sample by sample, and algorithms compared."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.alignment.levelling import level
+from strapdown.api.reading import (
+    NOWHERE,
+    ImuFile,
+    Memory,
+    imu_input,
+    imu_of,
+    imu_of_arrays,
+    moved_inputs,
+    moved_paths,
+)
+from strapdown.attitude import attitude_history, make_algorithm
+from strapdown.attitude.tracker import AttitudeTracker
+from strapdown.bundle.destination import check_destination
+from strapdown.bundle.seal import Seal
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.recording import Origin
+from strapdown.increments import increments_from_imu
+from strapdown.report.attitude import write_attitude
+from strapdown.results.attitude_bench import AttitudeBench
+from strapdown.sensors.rest import find_rests
+from strapdown.systems.attitude_bench import bench_attitude
+from strapdown.systems.attitude_source import Source
+from strapdown.systems.attitude_start import initial_attitude
+from strapdown.systems.progress import Progress, silent
+from strapdown.tables import GYRO, QUATERNION, attitude_table
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+__all__ = [
+    "Attitude",
+    "AttitudeComparison",
+    "OrientationFilter",
+    "attitude",
+    "compare_attitude",
+]
+
+Array = NDArray[np.float64]
+
+#: The algorithms that are compared where none is named.
+COMPARED = ("naive", "euler", "dcm", "quaternion", "rk4", "rotvec")
+
+
+class Attitude(pd.DataFrame):
+    """Attitude by time: a DataFrame with `rotation` and `findings`.
+
+    Index ``time`` in s; columns ``q_w q_x q_y q_z`` (body to north-east-down, Hamilton, scalar
+    first) and ``roll pitch heading`` in deg.
+    """
+
+    @property
+    def _constructor(self) -> type[Attitude]:
+        return Attitude
+
+    @property
+    def rotation(self) -> Rotation:
+        """The attitudes as a scipy Rotation: ``rotation.apply(v_b)`` is ``v_n``."""
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(self[[*QUATERNION[1:], QUATERNION[0]]].to_numpy())
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What a person should know about it."""
+        return tuple(self.attrs.get("findings", ()))
+
+
+def attitude(
+    t: Any,
+    gyro: ArrayLike | None = None,
+    accel: ArrayLike | None = None,
+    *,
+    algorithm: str = "quaternion",
+    initial: str | ArrayLike = "auto",
+    gyro_bias: str | ArrayLike | None = None,
+    sampling: str = "instantaneous",
+    interpolation: str = "linear",
+) -> Attitude:
+    """Integrate gyro samples to attitude with one algorithm.
+
+    The accelerometer is used for the initial attitude alone. The rotation of the Earth is
+    neglected (15 deg/h).
+
+    Parameters
+    ----------
+    t : array_like, (n,), s; or Imu, DataFrame, str or Path
+        Increasing stamps; or samples of all sensors, and then nothing is given for the next two.
+    gyro : array_like, (n, 3), rad/s
+        Body rates, forward-right-down.
+    accel : array_like, (n, 3), m/s², optional
+        Specific force, forward-right-down.
+    algorithm : str
+        A name with its options, as ``rotvec:samples=3`` (`strapdown modules`), or of an installed
+        plug-in (entry points ``strapdown.attitude``).
+    initial : str or array_like
+        ``auto``: levelled where the samples begin at rest with an accelerometer, else zero;
+        ``level``; ``zero``; roll, pitch, heading in deg; or a quaternion ``q_nb``.
+    gyro_bias : array_like, (3,), rad/s, or str, optional
+        Subtracted from the rates; ``rest``: the mean over the first stationary stretch.
+    sampling : {'instantaneous', 'mean'}
+        Of arrays: the rate at the stamp, or its mean over the interval that ends there.
+    interpolation : {'linear', 'cubic'}
+        How rates at the stamps run between them.
+
+    Returns
+    -------
+    Attitude
+        One row a sample.
+
+    Raises
+    ------
+    DataError
+        The samples cannot be used, or there is no rest to level or take a bias from.
+    ConfigError
+        The algorithm or an option is not known.
+    DivergenceError
+        The algorithm left the range of floating point.
+    """
+    chosen = make_algorithm(algorithm)
+    if gyro is None:
+        if isinstance(t, np.ndarray):
+            raise ConfigError("api.no-samples", quantity="gyro")
+        imu = imu_of(t)
+    else:
+        imu = imu_of_arrays(t, gyro, accel, sampling)
+    rests = find_rests(imu)
+    findings: list[Finding] = []
+    name = str(imu.attrs.get("source") or "imu")
+    source = Source(name, "", Origin(0, "s"), imu, None, None, (), (), (), None)
+    if isinstance(initial, str):
+        q_nb, start, _ = initial_attitude(initial, source, rests, findings)
+        how = str(start["from"])
+    else:
+        q_nb, how = _given(initial), "given"
+    if gyro_bias is not None:
+        bias = _bias(gyro_bias, rests)
+        imu = imu.copy()
+        imu[GYRO] = imu[GYRO].to_numpy() - bias
+    history = attitude_history(chosen, increments_from_imu(imu, interpolation), q_nb)
+    out = Attitude(attitude_table(imu.index.to_numpy(), history, source=name))
+    out.attrs = {
+        "source": name,
+        "algorithm": chosen.label,
+        "initial": how,
+        "findings": (*imu.attrs.get("findings", ()), *findings),
+    }
+    return out
+
+
+def _given(initial: ArrayLike) -> Array:
+    """An initial attitude that is stated: three angles in deg, or a quaternion."""
+    values = np.asarray(initial, dtype=np.float64).ravel()
+    if values.size == 3 and np.isfinite(values).all():
+        return rotation.quaternion_from_euler(values)
+    if values.size == 4:
+        return rotation.normalise(values)
+    raise ConfigError("api.not-an-attitude", quantity="initial", values=values.tolist())
+
+
+def _bias(gyro_bias: str | ArrayLike, rests: Sequence[Any]) -> Array:
+    if isinstance(gyro_bias, str):
+        if gyro_bias.lower() != "rest":
+            raise ConfigError("api.unknown-gyro-bias", quantity="gyro_bias", gyro_bias=gyro_bias)
+        if not rests:
+            raise DataError("api.no-rest-for-gyro-bias", quantity="gyro_bias")
+        return np.asarray(rests[0].gyro_mean, dtype=np.float64)
+    return _three(gyro_bias, "gyro_bias")
+
+
+def _three(values: ArrayLike, quantity: str) -> Array:
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (3,) or not np.isfinite(found).all():
+        raise DataError(
+            "api.not-three-numbers", quantity=quantity, asarray=np.asarray(values).tolist()
+        )
+    return found
+
+
+class OrientationFilter:
+    """Attitude sample by sample, as on a device: gyros integrated from a levelled start.
+
+    Roll and pitch are levelled once, from the mean specific force of the first `level_samples`
+    samples, over which the body must be at rest; heading starts at zero. From then on the chosen
+    algorithm integrates the gyros alone: there is no feedback from the accelerometer, so that
+    errors of the gyros accumulate (a bias of 1 deg/min is 1 deg after a minute), and accelerations
+    of the body disturb nothing. `attitude` over the same samples gives the same bits.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sample rate; sample k is of the instant ``k / rate_hz``.
+    algorithm : str
+        As in `attitude`.
+    initial : array_like, optional
+        Roll, pitch, heading in deg, or a quaternion ``q_nb``: nothing is then levelled.
+    gyro_bias : array_like, (3,), rad/s
+        Subtracted from every sample.
+    level_samples : int
+        Over which the accelerometer is averaged at the start.
+    sampling : {'instantaneous', 'mean'}
+        What a gyro sample is.
+
+    Raises
+    ------
+    ConfigError
+        The rate, the algorithm or an option cannot be.
+    """
+
+    def __init__(
+        self,
+        rate_hz: float,
+        algorithm: str = "quaternion",
+        *,
+        initial: ArrayLike | None = None,
+        gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
+        level_samples: int = 1,
+        sampling: str = "instantaneous",
+    ) -> None:
+        if not (np.isfinite(rate_hz) and rate_hz > 0.0):
+            raise ConfigError("api.rate-out-of-range", quantity="rate_hz", rate_hz=rate_hz)
+        if level_samples < 1:
+            raise ConfigError(
+                "api.too-few-level-samples", quantity="level_samples", level_samples=level_samples
+            )
+        self.rate_hz = float(rate_hz)
+        self._algorithm = make_algorithm(algorithm)
+        self._bias = _three(gyro_bias, "gyro_bias")
+        self._sampling = sampling
+        self._level_samples = 0 if initial is not None else level_samples
+        self._force = np.zeros(3)
+        self._samples = 0
+        self._tracker = AttitudeTracker(
+            self._algorithm, (1.0, 0.0, 0.0, 0.0) if initial is None else _given(initial), sampling
+        )
+
+    def update(self, gyro: ArrayLike, accel: ArrayLike | None = None) -> Array:
+        """Take one sample.
+
+        Parameters
+        ----------
+        gyro : array_like, (3,), rad/s
+            Body rate, forward-right-down.
+        accel : array_like, (3,), m/s², optional
+            Specific force; needed while the start is levelled, and not used afterwards.
+
+        Returns
+        -------
+        ndarray, (4,)
+            ``q_nb`` after the sample, body to north-east-down, scalar first.
+
+        Raises
+        ------
+        DataError
+            The sample is not three finite numbers, or its specific force is not that of a body at
+            rest while the start is levelled. It is then not taken.
+        """
+        rate = _three(gyro, "gyro") - self._bias
+        if self._samples < self._level_samples:
+            if accel is None:
+                raise DataError(
+                    "api.no-specific-force-to-level", row=self._samples + 1, quantity="accel"
+                )
+            force = self._force + _three(accel, "accel")
+            roll, pitch = level(force / (self._samples + 1))
+            tracker = AttitudeTracker(
+                self._algorithm,
+                rotation.quaternion_from_euler([roll, pitch, 0.0]),
+                self._sampling,
+            )
+            tracker.update(self._samples / self.rate_hz, rate)
+            self._force, self._tracker = force, tracker
+        else:
+            self._tracker.update(self._samples / self.rate_hz, rate)
+        self._samples += 1
+        return self.quaternion
+
+    @property
+    def quaternion(self) -> Array:
+        """``q_nb``, (4,), of unit norm."""
+        return self._tracker.quaternion
+
+    @property
+    def roll_pitch_heading(self) -> Array:
+        """3-2-1 Euler angles, (3,), deg."""
+        return self._tracker.roll_pitch_heading
+
+    @property
+    def rotation(self) -> Rotation:
+        """The attitude as a scipy Rotation: ``rotation.apply(v_b)`` is ``v_n``."""
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_quat(np.roll(self.quaternion, -1))
+
+    def __repr__(self) -> str:
+        roll, pitch, heading = self.roll_pitch_heading
+        return (
+            f"<OrientationFilter {self._algorithm.label}, {self.rate_hz:g} Hz: {self._samples} "
+            f"samples; roll {roll:.3f}°, pitch {pitch:.3f}°, heading {heading:.3f}°>"
+        )
+
+
+@dataclass(frozen=True, repr=False)
+class AttitudeComparison(AttitudeBench):
+    """Attitude algorithms compared on one record: everything that was computed, as data.
+
+    `answer` names the simplest algorithm and the lowest rate that are accurate enough; `summary`,
+    `sweep`, `shares` and `costs` are what it rests on. `plot` draws a chart, `to_pandas` gives one
+    row an algorithm. Nothing is written until `save` is called.
+    """
+
+    memory: Memory = field(default=Memory({}))
+
+    def save(
+        self, out: str | Path, *, report: bool = True, force: bool = False, png: bool = False
+    ) -> Seal:
+        """Write the comparison as a sealed bundle, which `verify` runs again.
+
+        Parameters
+        ----------
+        out : str or Path
+            Folder to make. Tables that were given in memory become input files in it.
+        report : bool
+            Whether the page and the figures are written, too.
+        force : bool
+            Overwrite an existing bundle.
+        png : bool
+            Write each figure as PNG, too.
+
+        Returns
+        -------
+        Seal
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be overwritten.
+        DataError
+            An input file has changed since it was read.
+        """
+        check_destination(Path(out), force)
+        with self._on_disk() as result:
+            return write_attitude(result, out, report=report, force=force, png=png)
+
+    @contextmanager
+    def _on_disk(self) -> Iterator[AttitudeComparison]:
+        with self.memory.as_files() if self.memory.tables else nullcontext(NOWHERE) as folder:
+            yield _moved(self, NOWHERE, folder)
+
+
+def _moved(result: AttitudeComparison, old: Path, new: Path) -> AttitudeComparison:
+    """The comparison with its inputs of one folder in another."""
+    if not result.memory.tables or old == new:
+        return result
+    return replace(
+        result,
+        specification=moved_paths(result.specification, old, new),
+        inputs=moved_inputs(result.inputs, old, new, copied=True),
+    )
+
+
+#: Further keywords, as `systems.attitude_bench.bench_attitude` has them.
+_OPTIONS = set(inspect.signature(bench_attitude).parameters) - {
+    *("source", "algorithms", "rates", "tolerance_deg", "reference", "gyro_bias", "progress")
+}
+
+
+def compare_attitude(
+    source: Any,
+    algorithms: Sequence[str] = COMPARED,
+    *,
+    rates_hz: Sequence[float] = (),
+    tolerance_deg: float = 1.0,
+    reference: str | Sequence[str] = (),
+    gyro_bias: str | ArrayLike = "none",
+    options: Mapping[str, Any] | None = None,
+    progress: Progress = silent,
+) -> AttitudeComparison:
+    """Compare attitude algorithms at several rates with what is known of the attitude.
+
+    Parameters
+    ----------
+    source : Imu, DataFrame, (t, gyro, accel), str or Path, or a sequence of paths and names
+        Samples (s, rad/s, m/s², forward-right-down), a log, or the name of a scenario
+        (`strapdown modules`). Several paths or names are trials of one question: the first is
+        shown, and the answer holds for all of them.
+    algorithms : sequence of str
+        Names with their options, as ``quaternion:order=3``, or ``all``.
+    rates_hz : sequence of float
+        Lower rates to try; the full rate and its halves, if none is given.
+    tolerance_deg : float
+        What is accurate enough: the largest known error, in deg.
+    reference : str or sequence of str
+        What is known: ``end same as start``, ``12.5 roll 0 pitch 0 heading 90``, ``rests``, or the
+        path of such lines or of an attitude truth.
+    gyro_bias : str or array_like, (3,), rad/s
+        ``none``, ``rest``, ``rests`` (its course through all of them), the path of a log of the
+        sensor lying still, or the bias.
+    options : mapping, optional
+        ``initial``, ``interpolation``, ``peers``, ``reference_log``; of a scenario ``rate`` (Hz),
+        ``sampling``, ``seed``, ``sensor``, ``trials``; of paths how they are read: ``axes``,
+        ``columns``, ``gyro_unit``, ``accel_unit``, ``time_unit``, ``repair``, ``from_s``,
+        ``to_s``, ``duration_s``.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    AttitudeComparison
+
+    Raises
+    ------
+    DataError
+        The samples or a reference cannot be used; the message names file, row and remedy.
+    ConfigError
+        Something that was asked for is not known, or cannot be had from these samples.
+
+    Notes
+    -----
+    Alexiev (2021). The rotation of the Earth is neglected, as in the paper: 15 deg/h.
+    """
+    asked = dict(options or {})
+    for name in asked:
+        if name not in _OPTIONS:
+            raise ConfigError(
+                "api.unknown-option", quantity="options", name=name, word=name, known=_OPTIONS
+            )
+    memory, sources = Memory({}), source
+    if not _names(source):
+        given = imu_input(source)
+        if isinstance(given, ImuFile):
+            sources, asked = given.log.path, {**_reading(given), **asked}
+        else:
+            memory = Memory({"imu.npz": given})
+    with memory.as_files() if memory.tables else nullcontext(NOWHERE) as folder:
+        bench = bench_attitude(
+            str(folder / "imu.npz") if memory.tables else sources,
+            algorithms=algorithms,
+            rates=rates_hz,
+            tolerance_deg=tolerance_deg,
+            reference=reference,
+            gyro_bias=gyro_bias,  # type: ignore[arg-type]  # it reads numbers, too
+            progress=progress,
+            **asked,
+        )
+        values = {f.name: getattr(bench, f.name) for f in fields(bench)}
+        return _moved(AttitudeComparison(**values, memory=memory), folder, NOWHERE)
+
+
+def _names(source: Any) -> bool:
+    """Whether a source is one path or name, or several."""
+    if isinstance(source, str | Path):
+        return True
+    several = isinstance(source, list | tuple)
+    return several and all(isinstance(one, str | Path) for one in source)
+
+
+def _reading(file: ImuFile) -> dict[str, Any]:
+    """How a file was read, as the comparison reads it again."""
+    told = file.log.model_dump(exclude_none=True, exclude={"path"})
+    told["rate"] = told.pop("rate_hz", None)
+    return {**told, "axes": file.axes}

@@ -1,0 +1,166 @@
+"""Crash reconstruction from Python: a case file in, the answers of its vehicle as data out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from html import escape
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import pandas as pd
+
+from strapdown.bundle.seal import Seal
+from strapdown.config.crash_case import CaseSpec
+from strapdown.config.crash_case_file import read_case_spec
+from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown.errors import ConfigError
+from strapdown.report.crash_case import write_crash
+from strapdown.systems.crash_case import CaseResult, run_case
+from strapdown.systems.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["CrashRun", "reconstruct"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CrashRun(CaseResult):
+    """A reconstructed crash: everything that was computed, as data.
+
+    Beside the attributes of `CaseResult` it has the properties below. Nothing is written until
+    `save` is called.
+    """
+
+    @property
+    def vehicles(self) -> Mapping[str, UnitReconstruction]:
+        """The answers of each vehicle by its number; a case has one today, ``"1"``.
+
+        Of several recorders these are the answers of their mean, where they agree, else of the
+        first. ``vehicles["1"].delta_v`` is the change of velocity of its severest event.
+        """
+        return MappingProxyType({"1": self.reconstruction.main})
+
+    @property
+    def recorders(self) -> Mapping[str, UnitReconstruction]:
+        """The answers of each recorder by itself, by name."""
+        return MappingProxyType({unit.name: unit for unit in self.reconstruction.units})
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Changes of velocity, directions of force and ends of the path.
+
+        Returns
+        -------
+        DataFrame
+            By recorder, event and quantity (with its unit): ``value``, and ``low`` and ``high``
+            of 95 %.
+        """
+        return self.reconstruction.summary()
+
+    def plot(self, kind: str = "delta-v") -> Figure:
+        """Draw one chart of the report.
+
+        Parameters
+        ----------
+        kind : str
+            A name of a figure in the report's folder ``figures``.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            Its ``axes`` are the panels. It belongs to no window and to no global state.
+
+        Raises
+        ------
+        ConfigError
+            There is no such chart of this case.
+        """
+        from strapdown.report.crash_document import crash_document
+        from strapdown.report.crash_figures import crash_figures
+        from strapdown.report.document import ChartBlock
+        from strapdown.report.svg_chart import notebook_figure
+
+        document = crash_document(self, crash_figures(self), "")
+        blocks = [*document.front, *(b for s in document.sections for b in s.blocks)]
+        charts = {b.chart.slug: b.chart for b in blocks if isinstance(b, ChartBlock)}
+        if kind not in charts:
+            raise ConfigError(
+                "api.unknown-case-chart", quantity="kind", kind=kind, word=kind, known=charts
+            )
+        return notebook_figure(charts[kind])
+
+    def save(
+        self,
+        out: str | Path,
+        *,
+        report: bool = True,
+        force: bool = False,
+        progress: Progress = silent,
+    ) -> Seal:
+        """Write the case as a sealed bundle, which `verify` runs again.
+
+        Parameters
+        ----------
+        out : str or Path
+            Folder to make.
+        report : bool
+            Whether page, PDF and figures are written, too.
+        force : bool
+            Overwrite an existing bundle.
+        progress : callable, optional
+            Called with a stage and the share that is done.
+
+        Returns
+        -------
+        Seal
+
+        Raises
+        ------
+        ConfigError
+            `out` exists and may not be overwritten.
+        DataError
+            An input file has changed since it was read.
+        """
+        return write_crash(self, out, report=report, force=force, progress=progress)
+
+    def __repr__(self) -> str:
+        return f"<CrashRun {self.spec.name}\n{self.reconstruction!r}>"
+
+    def _repr_html_(self) -> str:
+        table = self.to_pandas().to_html(float_format="{:.4g}".format)
+        return f"<div><b>{escape(self.spec.title or self.spec.name)}</b></div>{table}"
+
+
+def reconstruct(
+    case: str | Path | CaseSpec,
+    *,
+    progress: Progress = silent,
+) -> CrashRun:
+    """Reconstruct a crash: delta-V, direction of force, severity and path, with their bounds.
+
+    Parameters
+    ----------
+    case : str, Path or CaseSpec
+        The case file, in TOML (``strapdown init crash`` writes one); or its specification.
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Returns
+    -------
+    CrashRun
+
+    Raises
+    ------
+    ConfigError
+        The case does not hold together; the message names the line.
+    DataError
+        A record cannot be used.
+    DivergenceError
+        A path left what a vehicle can do.
+    """
+    file = None if isinstance(case, CaseSpec) else Path(case)
+    spec = case if isinstance(case, CaseSpec) else read_case_spec(Path(case))
+    result = run_case(spec, file, progress)
+    return CrashRun(**{f.name: getattr(result, f.name) for f in fields(result)})

@@ -1,0 +1,575 @@
+"""Tables from files, arrays and DataFrames, and tables in memory as the input files of a bundle.
+
+A function of the front door takes its samples as a path, as the table that `read_imu` returned,
+as a DataFrame, or as arrays. A table that was read and not changed since stands for its file: the
+file is what a bundle seals. Everything else is in memory, and a bundle keeps it as a file that
+gives back each number to the bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from strapdown.bundle.configuration_paths import with_paths
+from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.config.spec import specify
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.formats import csv
+from strapdown.formats.clocks import GPS, UNIX, clock_of
+from strapdown.formats.gnss_files import GNSS_READERS, GnssOptions
+from strapdown.formats.gnss_files import read_gnss as read_gnss_table
+from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.results.inputs import InputFiles
+from strapdown.systems.alignment_source import body_record
+from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
+
+__all__ = [
+    "GnssFile",
+    "GnssFixes",
+    "Imu",
+    "ImuFile",
+    "Memory",
+    "Streams",
+    "imu_input",
+    "read",
+    "read_gnss",
+    "read_imu",
+    "table_input",
+]
+
+
+@dataclass(frozen=True)
+class ImuFile:
+    """A recorded log that has not been read yet, and how it is read.
+
+    Attributes
+    ----------
+    log : LogTable
+        Path, columns, units, sampling, and the part that is used.
+    axes : str or None
+        Sensor axes that point forward, right, down (``x,-y,-z``), or where the sensor's x, y and
+        z point (``forward-left-up``).
+    """
+
+    log: LogTable
+    axes: str | None = None
+
+    def read(self) -> Imu:
+        """Read the part of the log that is used into body axes and SI."""
+        recording, table, findings = body_record(self.log, AxesTable(axes=self.axes))
+        imu = Imu(table)
+        imu.attrs = {**table.attrs, "findings": findings, "readings": recording.readings}
+        if recording.truth is not None:
+            imu.attrs["reference"] = (
+                recording.truth[QUATERNION].to_numpy(),
+                np.asarray(recording.truth.index, dtype=np.float64),
+            )
+        imu.attrs["file"] = (self, _digest(imu))
+        return imu
+
+
+@dataclass(frozen=True)
+class GnssFile:
+    """A file of fixes, and how it is read.
+
+    Attributes
+    ----------
+    path : str
+    options : GnssOptions
+    """
+
+    path: str
+    options: GnssOptions
+
+    def keys(self) -> dict[str, Any]:
+        """The keys of a measurement's table in a configuration that say the same."""
+        told = {
+            "columns": dict(self.options.columns) or None,
+            "position_sd_m": self.options.position_sd,
+            "velocity_sd_m_per_s": self.options.velocity_sd,
+            "repair": self.options.repair or None,
+        }
+        return {key: value for key, value in told.items() if value is not None}
+
+
+class _Table(pd.DataFrame):
+    """A DataFrame that carries what was found when it was read."""
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What a person should know about it."""
+        return tuple(self.attrs.get("findings", ()))
+
+
+class Imu(_Table):
+    """Samples of an inertial sensor: a DataFrame with `findings`.
+
+    Index ``time`` in s; columns ``gyro_x gyro_y gyro_z`` in rad/s and, where there is an
+    accelerometer, ``accel_x accel_y accel_z`` in m/s² (specific force), in body axes
+    forward-right-down. ``attrs["sampling"]`` says whether a row holds the value at its stamp
+    (``instantaneous``) or the mean over the interval that ends there (``mean``).
+    """
+
+    @property
+    def _constructor(self) -> type[Imu]:
+        return Imu
+
+    @classmethod
+    def from_arrays(
+        cls,
+        t: ArrayLike,
+        gyro: ArrayLike,
+        accel: ArrayLike | None = None,
+        *,
+        sampling: str = "instantaneous",
+    ) -> Imu:
+        """Make a table of arrays.
+
+        Parameters
+        ----------
+        t : array_like, (n,), s
+            Increasing.
+        gyro : array_like, (n, 3), rad/s
+            Body rates relative to inertial space, forward-right-down.
+        accel : array_like, (n, 3), m/s², optional
+            Specific force, forward-right-down: about (0, 0, -9.8) at rest and level.
+        sampling : {'instantaneous', 'mean'}
+
+        Returns
+        -------
+        Imu
+
+        Raises
+        ------
+        DataError
+            Shapes disagree, a value is not finite, or time does not advance.
+        """
+        table = imu_of_arrays(t, gyro, accel, sampling)
+        out = cls(table)
+        out.attrs = dict(table.attrs)
+        return out
+
+
+class GnssFixes(_Table):
+    """Fixes of a satellite receiver: a DataFrame with `findings`.
+
+    Index ``time`` in s; columns ``lat lon`` in deg, ``alt`` in m over the ellipsoid, ``VN VE VD``
+    in m/s, of the antenna; ``north_sd east_sd down_sd`` in m, ``VN_sd VE_sd VD_sd`` in m/s, inf
+    where not measured; ``quality`` as NMEA 0183 GGA has it.
+    """
+
+    @property
+    def _constructor(self) -> type[GnssFixes]:
+        return GnssFixes
+
+
+class Streams(Mapping[str, pd.DataFrame]):
+    """The streams of one recording by name: ``imu``, ``gnss``, ``reference``.
+
+    Parameters
+    ----------
+    tables : mapping of str to DataFrame
+    source : str
+        Name of the recording.
+    """
+
+    def __init__(self, tables: Mapping[str, pd.DataFrame], source: str) -> None:
+        self._tables = dict(tables)
+        self.source = source
+
+    def __getitem__(self, name: str) -> pd.DataFrame:
+        if name not in self._tables:
+            raise DataError("api.unknown-stream", file=self.source, name=name, tables=self._tables)
+        return self._tables[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._tables
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._tables)
+
+    def __len__(self) -> int:
+        return len(self._tables)
+
+    def __repr__(self) -> str:
+        rows = ", ".join(f"{name}: {len(table)} rows" for name, table in self._tables.items())
+        return f"<Streams {self.source}: {rows}>"
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Of all streams."""
+        return tuple(f for t in self._tables.values() for f in t.attrs.get("findings", ()))
+
+
+def read_imu(
+    path: str | Path,
+    *,
+    axes: str | None = None,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    sampling: str | None = None,
+    rate_hz: float | None = None,
+    span_s: tuple[float | None, float | None] = (None, None),
+    repair: bool = False,
+) -> Imu:
+    """Read the log of an inertial sensor into body axes and SI.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file of a known format, or the folder of a known recording.
+    axes : str, optional
+        Where the sensor's x, y and z point (``forward-left-up``), or which sensor axes point
+        forward, right, down (``x,-y,-z``); as the file says, if not given.
+    columns : mapping of str to str, optional
+        Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for three) to the name of its
+        column, or its number counted from 1.
+    units : mapping of str to str, optional
+        Of ``gyro`` (``deg/s``), ``accel`` (``g``) and ``time`` (``ms``), where the file does not
+        state them.
+    sampling : {'instantaneous', 'mean'}, optional
+        Whether a row holds the value at its stamp, or the mean over the interval that ends there.
+    rate_hz : float, optional
+        Sample rate of a log without a time column.
+    span_s : tuple of float or None
+        First and last stamp that are used.
+    repair : bool
+        Leave out rows that cannot be used, and report them, instead of refusing the file.
+
+    Returns
+    -------
+    Imu
+        With `findings`.
+
+    Raises
+    ------
+    DataError
+        The file cannot be used; the message names file, row, quantity and remedy.
+    ConfigError
+        There is no such file, or an option does not fit it.
+    """
+    unknown = set(units or {}) - {"gyro", "accel", "time"}
+    if unknown:
+        raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
+    log = specify(
+        LogTable,
+        path=str(path),
+        columns=dict(columns or {}),
+        sampling=sampling,
+        rate_hz=rate_hz,
+        from_s=span_s[0],
+        to_s=span_s[1],
+        repair=repair,
+        **{f"{quantity}_unit": unit for quantity, unit in (units or {}).items()},
+    )
+    return ImuFile(log, axes).read()
+
+
+def read_gnss(
+    path: str | Path,
+    *,
+    columns: Mapping[str, str] | None = None,
+    position_sd_m: float | tuple[float, float, float] | None = None,
+    velocity_sd_m_per_s: float | tuple[float, float, float] | None = None,
+    repair: bool = False,
+) -> GnssFixes:
+    """Read the fixes of a satellite receiver.
+
+    Parameters
+    ----------
+    path : str or Path
+        RTKLIB .pos, NMEA 0183, a table with named columns, or another format of
+        `strapdown modules`.
+    columns : mapping of str to str, optional
+        Quantity (``time``, ``lat`` …) to the name of its column, or its number counted from 1.
+    position_sd_m, velocity_sd_m_per_s : float or tuple of float, optional
+        Standard deviations north, east, down of each fix, in place of those of the file.
+    repair : bool
+        Leave out rows that cannot be used, and report them, instead of refusing the file.
+
+    Returns
+    -------
+    GnssFixes
+        Time as it stands in the file; with `findings`.
+
+    Raises
+    ------
+    DataError, ConfigError
+        The file cannot be used; the message names file, row, quantity and remedy.
+    """
+    options = GnssOptions(
+        columns=dict(columns or {}),
+        position_sd=position_sd_m,
+        velocity_sd=velocity_sd_m_per_s,
+        repair=repair,
+    )
+    table = read_gnss_table(path, options)
+    fixes = GnssFixes(table)
+    fixes.attrs = dict(table.attrs)
+    fixes.attrs["file"] = (GnssFile(str(path), options), _digest(fixes))
+    return fixes
+
+
+def read(path: str | Path) -> Streams:
+    """Read all streams of a recording that a reader knows.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Streams
+        ``imu``; ``reference``, an Attitude table, where the recording has a truth; ``gnss``,
+        where it has fixes.
+
+    Raises
+    ------
+    DataError, ConfigError
+        There is neither a log of an inertial sensor nor fixes in it.
+    """
+    from strapdown.tables import attitude_table
+
+    tables: dict[str, pd.DataFrame] = {}
+    refused: StrapdownError | None = None
+    try:
+        imu = read_imu(path)
+        tables["imu"] = imu
+        if "reference" in imu.attrs:
+            q_nb, stamps = imu.attrs["reference"]
+            tables["reference"] = attitude_table(stamps, q_nb)
+    except StrapdownError as error:
+        refused = error
+    if Path(path).exists() and any(reader.detect(Path(path)) for reader in GNSS_READERS.values()):
+        try:
+            tables["gnss"] = read_gnss(path)
+        except StrapdownError as error:
+            # A log of inertial sensors need not have fixes; where it is neither, say why it is
+            # no log.
+            refused = refused or error
+    if not tables:
+        assert refused is not None  # one of the two failed
+        raise refused
+    return Streams(tables, Path(path).name)
+
+
+def imu_input(source: Any) -> ImuFile | pd.DataFrame:
+    """Samples in any form: a file that is still to be read, or a checked Imu table.
+
+    Parameters
+    ----------
+    source : str, Path, ImuFile, DataFrame, or (t, gyro, accel)
+        An Imu of `read_imu` that was not changed is its file. A DataFrame has the columns of an
+        Imu table, and its time in s as index or in a column ``time``.
+
+    Returns
+    -------
+    ImuFile or DataFrame
+
+    Raises
+    ------
+    DataError
+        A column is missing, or a value cannot be used.
+    ConfigError
+        It is none of these.
+    """
+    if isinstance(source, ImuFile):
+        return source
+    if isinstance(source, str | Path):
+        return ImuFile(specify(LogTable, path=str(source)))
+    if isinstance(source, pd.DataFrame):
+        file = _unchanged(source)
+        return file if isinstance(file, ImuFile) else _imu_of(source)
+    if isinstance(source, tuple | list) and len(source) in (2, 3):
+        return imu_of_arrays(*source)
+    raise ConfigError("api.not-imu-samples", quantity="imu", name=type(source).__name__)
+
+
+def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
+    """What a measurement was made of: a path, a file with its options, or a table by time.
+
+    Parameters
+    ----------
+    data : str, Path or DataFrame
+    quantity : str
+        For messages.
+
+    Raises
+    ------
+    ConfigError
+        It is none of these.
+    """
+    if isinstance(data, str | Path):
+        return str(data)
+    if isinstance(data, pd.DataFrame):
+        file = _unchanged(data)
+        return file if isinstance(file, GnssFile) else by_time(data)
+    raise ConfigError("api.not-a-table-or-file", quantity=quantity, name=type(data).__name__)
+
+
+def imu_of(source: Any) -> pd.DataFrame:
+    """Samples in any form as a checked Imu table; a file is read.
+
+    Parameters
+    ----------
+    source : object
+        As `imu_input`.
+    """
+    given = imu_input(source)
+    return given.read() if isinstance(given, ImuFile) else given
+
+
+def by_time(table: pd.DataFrame) -> pd.DataFrame:
+    """A table by its time in s, whether that is its index or its column ``time``."""
+    if "time" not in table.columns:
+        return table
+    out = table.set_index("time")
+    out.attrs = dict(table.attrs)
+    return out
+
+
+def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
+    """A checked copy with the columns of an Imu table alone."""
+    given = by_time(source)
+    triads = [*GYRO, *(ACCEL if ACCEL[0] in given.columns else [])]
+    missing = [c for c in triads if c not in given.columns]
+    if missing:
+        raise DataError(
+            "api.missing-columns", quantity="imu", missing=missing, columns=source.columns
+        )
+    try:
+        values = given[triads].to_numpy(dtype=np.float64)
+        stamps = given.index.to_numpy(dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError("api.not-numeric", quantity="imu") from None
+    accel = values[:, 3:] if len(triads) > 3 else None
+    sampling = given.attrs.get("sampling", "instantaneous")
+    return imu_of_arrays(stamps, values[:, :3], accel, sampling, given.attrs.get("source"))
+
+
+def imu_of_arrays(
+    t: Any,
+    gyro: Any,
+    accel: Any = None,
+    sampling: str = "instantaneous",
+    source: str | None = None,
+) -> pd.DataFrame:
+    """An Imu table of arrays, laid out column by column as one that is read.
+
+    The last bit of a sum over a column depends on how the table lies in memory.
+    """
+    made = imu_table(t, gyro, accel, sampling=sampling, source=source)
+    out = pd.DataFrame(
+        np.asfortranarray(made.to_numpy()), index=made.index, columns=made.columns, copy=False
+    )
+    out.attrs = dict(made.attrs)
+    return out
+
+
+def _digest(table: pd.DataFrame) -> str:
+    """Of stamps, names, values and sampling: whether a table is still what was read."""
+    digest = hashlib.sha256(repr([*table.columns, table.attrs.get("sampling")]).encode())
+    for array in (table.index.to_numpy(), table.to_numpy()):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _unchanged(table: pd.DataFrame) -> ImuFile | GnssFile | None:
+    """The file that a table was read from, where the table is still what was read."""
+    file, digest = table.attrs.get("file", (None, ""))
+    return file if file is not None and _digest(table) == digest else None
+
+
+#: Stands for the folder of the files that a bundle will make of tables in memory.
+NOWHERE = Path("memory")
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Tables in memory, by the names that they have as input files.
+
+    Attributes
+    ----------
+    tables : mapping of str to DataFrame
+        ``imu.npz``: an Imu table; ``NAME.csv``: a table by time, its columns in SI and degrees.
+    """
+
+    tables: Mapping[str, pd.DataFrame]
+
+    @contextmanager
+    def as_files(self) -> Iterator[Path]:
+        """Write each table to the bit into a folder of its own, which is removed at the end."""
+        with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
+            folder = Path(name).resolve()
+            for file, table in self.tables.items():
+                if file.endswith(".npz"):
+                    LOG_WRITERS["npz"](folder / file, table, None)
+                else:
+                    _write_csv(folder / file, table)
+            yield folder
+
+
+def _write_csv(path: Path, table: pd.DataFrame) -> None:
+    """Columns as they are named, with the unit that their quantity has in a table."""
+    clock = clock_of(table).name
+    name = {GPS: "gps_sow_s", UNIX: "unix_time_s"}.get(clock, "time_s")
+    columns = {name: table.index.to_numpy(dtype=np.float64)}
+    week = table.attrs.get("gps_week")
+    if clock == GPS and week is not None:
+        columns["week"] = np.full(len(table), float(week))
+    for column in table.columns:
+        unit = _UNITS.get(str(column).removesuffix("_sd"), "")
+        columns[f"{column}{unit}"] = table[column].to_numpy(dtype=np.float64)
+    csv.write(path, columns, {})
+
+
+_UNITS = {
+    **dict.fromkeys(("lat", "lon", "roll", "pitch", "heading"), "_deg"),
+    **dict.fromkeys(("alt", "north", "east", "down", "height"), "_m"),
+    **dict.fromkeys(("VN", "VE", "VD", "speed", "vx", "vy", "vz"), "_m_s"),
+}
+
+
+def moved_inputs(
+    inputs: tuple[InputFiles, ...], old: Path, new: Path, *, copied: bool = False
+) -> tuple[InputFiles, ...]:
+    """The inputs, those of one folder as of another.
+
+    Parameters
+    ----------
+    inputs : tuple of InputFiles
+    old, new : Path
+    copied : bool
+        Whether a bundle copies those of `new`, whatever their size.
+    """
+    return tuple(
+        replace(
+            one,
+            path=new / one.path.relative_to(old),
+            files=tuple(new / f.relative_to(old) for f in one.files),
+            copied=copied,
+        )
+        if one.path.is_relative_to(old)
+        else one
+        for one in inputs
+    )
+
+
+def moved_paths(configuration: Any, old: Path, new: Path) -> Any:
+    """A configuration as plain data, the paths of one folder as of another."""
+
+    def change(path: str) -> str:
+        given = Path(path)
+        return str(new / given.relative_to(old)) if given.is_relative_to(old) else path
+
+    return with_paths(configuration, change)

@@ -1,0 +1,69 @@
+"""The charts of a run of navigation as figures, for a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from strapdown.errors import ConfigError, nearest
+from strapdown.report import navigation_charts as charts
+from strapdown.report.chart import Chart
+from strapdown.report.navigation_agreement import agreements
+from strapdown.report.navigation_innovation_charts import innovation_chart
+from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.navigation_result import told_of
+from strapdown.report.navigation_told import NavigationTold
+from strapdown.report.svg_chart import notebook_figure
+from strapdown.systems.sins.result import NavigationResult
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["plot"]
+
+KINDS: dict[str, Callable[[NavigationTold], Chart | None]] = {
+    "plan": plan_chart,
+    "bound": charts.bound_chart,
+    "height": charts.height_chart,
+    "velocity": charts.velocity_chart,
+    "attitude": charts.attitude_chart,
+}
+
+
+def plot(result: NavigationResult, kind: str) -> Figure:
+    """Draw one chart of a run, as its report shows it.
+
+    Parameters
+    ----------
+    result : NavigationResult
+    kind : str
+        One of `KINDS`, or the name of an observation.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Of no window and no global state.
+
+    Raises
+    ------
+    ConfigError
+        There is no such chart.
+    """
+    observed = result.filtered.innovations
+    if kind in observed:
+        found = {one.name: one for one in agreements(result.filtered)}
+        return notebook_figure(innovation_chart(result.filtered, found[kind]))
+    if kind not in KINDS:
+        raise ConfigError(
+            f"there is no chart '{kind}' of this run",
+            quantity="kind",
+            remedy=nearest(kind, [*KINDS, *observed]),
+        )
+    chart = KINDS[kind](told_of(result))
+    if chart is None:
+        raise ConfigError(
+            "the body does not move, and there is no path to draw",
+            quantity=f"kind '{kind}'",
+            remedy="plot attitude or bound",
+        )
+    return notebook_figure(chart)

@@ -1,0 +1,116 @@
+"""`strapdown.align`, `coast`, `reconstruct` and `read`: data out, and sealed as it was."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import strapdown as sd
+from strapdown.config.crash_case_file import read_case_spec
+from strapdown.errors import ConfigError, DataError
+from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.simulation import Origin, StationaryMotion, simulate_imu
+from strapdown.systems.crash_case import run_case
+
+SITE = (55.75, 37.62, 150.0)
+SENSOR = "fog-1000"
+
+
+@pytest.fixture(scope="module")
+def rest():
+    motion = StationaryMotion(120.0, Origin(*SITE), 1.0, -2.0, 40.0)
+    imu, _ = simulate_imu(motion, load_sensor(SENSOR).draw(1), rate=50.0, sampling="mean", seed=1)
+    return imu
+
+
+def test_an_alignment_of_a_table_is_that_of_its_file_and_is_verified(rest, tmp_path):
+    LOG_WRITERS["npz"](tmp_path / "imu.npz", rest, None)
+    before = rest.copy()
+    ask = {"site": SITE, "sensor": SENSOR, "fine": False}
+    one, two = sd.align(rest, **ask), sd.align(tmp_path / "imu.npz", **ask)
+    assert rest.equals(before)
+    pd.testing.assert_frame_equal(one.attitude, two.attitude, check_exact=True)
+    assert np.array_equal(one.end.covariance, two.end.covariance)
+    # Three standard deviations of what it says itself.
+    error = np.abs(one.end.roll_pitch_heading - [1.0, -2.0, 40.0])
+    assert (error < 3.0 * one.end.sd_deg + 1e-6).all()
+    assert repr(one).startswith("<AlignmentRun imu.npz: at the end roll")
+    assert one._repr_html_() and one.plot().axes and one.plot("heading").axes
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        one.attitude = None
+    one.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+    path = tmp_path / "out" / "attitude.csv"
+    path.write_text(path.read_text().replace("1", "2", 1))
+    assert sd.verify(tmp_path / "out").verdict == "changed"
+
+
+@pytest.mark.parametrize(
+    ("ask", "words"),
+    [
+        ({"site": SITE}, "sensor"),
+        ({"sensor": SENSOR}, "lat"),
+        ({"sensor": SENSOR, "site": (1.0,)}, "site"),
+        ({"sensor": SENSOR, "site": SITE, "method": "inertial_frme"}, "inertial_frame"),
+        ({"sensor": SENSOR, "site": {"lat_deg": 1.0, "lon_deg": 2.0, "height": 3.0}}, "height"),
+    ],
+)
+def test_what_an_alignment_lacks_is_named_by_its_argument(rest, ask, words):
+    with pytest.raises(ConfigError) as caught:
+        sd.align(rest, **ask)
+    assert words in str(caught.value)
+    assert "--" not in str(caught.value)
+
+
+def test_the_drift_of_an_outage_is_data(tmp_path):
+    run = sd.coast("adis16470", 20.0, motion={"speed_m_per_s": 15.0}, start={"aided_s": 0.0})
+    assert run.bound_m.index[-1] == 20.0
+    assert run.bound_m.is_monotonic_increasing
+    assert len(run.to_pandas()) == len(run.bound_m)
+    assert "after 20 s" in repr(run)
+    assert run.plot().axes and run._repr_html_()
+    run.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+    with pytest.raises(ConfigError):
+        sd.coast("adis16470", 20.0, motion={"speed": 15.0})
+
+
+def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
+    assert run_cli("simulate", "pole", "-q", "--out", tmp_path / "pole").code == 0
+    path = tmp_path / "pole" / "case.toml"
+    case = sd.reconstruct(path)
+    engine = run_case(read_case_spec(path), path)
+    change = case.vehicles["1"].delta_v
+    assert change.resultant == engine.reconstruction.main.body[0].event.resultant > 1.0
+    assert change.resultant_bound > 0.0
+    assert set(case.recorders) == {u.name for u in engine.reconstruction.units}
+    assert case.to_pandas().equals(engine.reconstruction.summary())
+    assert "delta-V" in repr(case) and "<table" in case._repr_html_()
+    assert case.plot("delta-v").axes
+    with pytest.raises(ConfigError, match="there is no chart"):
+        case.plot("nothing")
+    with pytest.raises(TypeError):
+        case.vehicles["1"] = None
+    case.save(tmp_path / "out", report=False)
+    assert not list((tmp_path / "out").glob("report.*"))
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+
+
+def test_streams_of_a_file_by_name(tmp_path, rest):
+    LOG_WRITERS["csv"](tmp_path / "log.csv", rest, None)
+    streams = sd.read(tmp_path / "log.csv")
+    assert list(streams) == ["imu"]
+    assert np.array_equal(streams["imu"].to_numpy(), rest.to_numpy())
+    assert "imu: 6001 rows" in repr(streams) or "imu: 6000 rows" in repr(streams)
+    with pytest.raises(DataError, match="it has imu"):
+        streams["gnss"]
+    (tmp_path / "fixes.csv").write_text(
+        "time_s,lat_deg,lon_deg,alt_m,north_sd_m,east_sd_m,down_sd_m\n0,1,2,3,1,1,1\n1,1,2,3,1,1,1\n"
+    )
+    assert list(sd.read(tmp_path / "fixes.csv")) == ["gnss"]
+    with pytest.raises(ConfigError, match="no such file"):
+        sd.read(tmp_path / "none.csv")

@@ -1,0 +1,189 @@
+"""`strapdown.attitude`, `OrientationFilter` and `compare_attitude`: one set of bits."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import strapdown as sd
+from strapdown.alignment.levelling import level
+from strapdown.attitude import make_algorithm, run_attitude
+from strapdown.errors import ConfigError, DataError
+from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.increments import increments_from_imu
+from strapdown.tables import QUATERNION, imu_table
+
+RATE = 50.0
+
+
+def samples(count=400):
+    """A body that rests for 3 s, tilted, and then turns."""
+    t = np.arange(count) / RATE
+    turn = np.where(t > 3.0, 1.0, 0.0)[:, None]
+    gyro = turn * np.column_stack([np.sin(2 * t), 0.4 * np.cos(3 * t), 0.3 + 0.0 * t])
+    accel = np.tile([1.0, -0.5, -9.7], (count, 1)) + turn * np.sin(t)[:, None]
+    return t, gyro, accel
+
+
+def test_arrays_tables_and_files_give_the_same_bits(tmp_path):
+    t, gyro, accel = samples()
+    table = imu_table(t, gyro, accel)
+    plain = pd.DataFrame(table).reset_index()
+    plain.attrs = {}
+    before = plain.copy()
+    for form in ("csv", "npz"):
+        LOG_WRITERS[form](tmp_path / f"log.{form}", table, None)
+    found = [
+        sd.attitude(t, gyro, accel),
+        sd.attitude(plain),
+        sd.attitude(tmp_path / "log.csv"),
+        sd.attitude(sd.read_imu(tmp_path / "log.npz")),
+        sd.attitude((t, gyro, accel)),
+    ]
+    assert plain.equals(before)
+    for one in found[1:]:
+        assert np.array_equal(one.to_numpy(), found[0].to_numpy())
+        assert np.array_equal(one.index, t)
+
+
+def test_it_is_what_the_algorithm_gives():
+    t, gyro, accel = samples()
+    increments = increments_from_imu(imu_table(t, gyro, accel))
+    run = run_attitude(make_algorithm("rotvec:samples=2"), increments)
+    made = sd.attitude(t, gyro, accel, algorithm="rotvec:samples=2", initial="zero")
+    assert np.array_equal(made.to_numpy(), run.attitude.to_numpy())
+    levelled = sd.attitude(t, gyro, accel)
+    # C_nb turns the force at rest to (0, 0, -g).
+    force = levelled.rotation[0].apply(accel[0])
+    assert np.allclose(force[:2], 0.0, atol=1e-12)
+    assert levelled.attrs["initial"].startswith("levelled")
+    quarter = sd.attitude(t, gyro * 0.0, initial=(0.0, 0.0, 90.0))
+    assert np.allclose(quarter.rotation[-1].apply([1.0, 0.0, 0.0]), [0.0, 1.0, 0.0])
+
+
+def test_a_bias_is_subtracted():
+    t, gyro, accel = samples()
+    clean = sd.attitude(t, gyro, accel)
+    bias = np.array([0.01, -0.02, 0.005])
+    stated = sd.attitude(t, gyro + bias, accel, gyro_bias=bias)
+    found = sd.attitude(t, gyro + bias, accel, gyro_bias="rest")
+    for one in (stated, found):
+        assert np.allclose(one[QUATERNION], clean[QUATERNION], atol=1e-12)
+
+
+@pytest.mark.parametrize("algorithm", ["quaternion", "rotvec:samples=2", "dcm:order=3"])
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+def test_streaming_and_batch_agree_to_the_bit(algorithm, sampling):
+    _, gyro, accel = samples()
+    bias = (0.01, -0.02, 0.005)
+    first = 5
+    filt = sd.OrientationFilter(
+        RATE, algorithm, gyro_bias=bias, level_samples=first, sampling=sampling
+    )
+    streamed = np.array([filt.update(g, a) for g, a in zip(gyro, accel, strict=True)])
+    t = np.arange(len(gyro)) / RATE
+    roll, pitch = level(sum(accel[:first]) / first)
+    batch = sd.attitude(
+        t[first - 1 :],
+        gyro[first - 1 :],
+        algorithm=algorithm,
+        initial=(roll, pitch, 0.0),
+        gyro_bias=bias,
+        sampling=sampling,
+    )
+    # An algorithm of two increments a step holds its attitude between them, as the batch does.
+    assert np.array_equal(streamed[first - 1 :], batch[QUATERNION].to_numpy())
+    assert np.allclose(filt.rotation.as_quat()[3], streamed[-1, 0])
+    assert "400 samples" in repr(filt)
+
+
+def test_a_filter_refuses_what_it_cannot_take_and_stays_as_it_was():
+    filt = sd.OrientationFilter(rate_hz=100)
+    with pytest.raises(DataError, match="specific force"):
+        filt.update([0.0, 0.0, 0.0])
+    with pytest.raises(DataError, match="accel"):
+        filt.update([0.0, 0.0, 0.0], [0.0, 0.0, -1.0])
+    filt.update([0.0, 0.0, 0.0], [0.0, 0.0, -9.8])
+    before = filt.update([0.1, 0.0, 0.0])
+    with pytest.raises(DataError, match="three finite"):
+        filt.update([np.nan, 0.0, 0.0])
+    assert np.array_equal(filt.quaternion, before)
+    with pytest.raises(ConfigError):
+        sd.OrientationFilter(rate_hz=0.0)
+
+
+def test_algorithms_are_compared_on_a_table_as_on_its_file(tmp_path):
+    t, gyro, accel = samples(800)
+    table = imu_table(t, gyro, accel)
+    LOG_WRITERS["npz"](tmp_path / "imu.npz", table, None)
+    ask = {"rates_hz": [50, 25], "algorithms": ["naive", "quaternion"]}
+    of_table = sd.compare_attitude(table, **ask)
+    of_file = sd.compare_attitude(tmp_path / "imu.npz", **ask)
+    of_imu = sd.compare_attitude(sd.read_imu(tmp_path / "imu.npz", span_s=(None, 10.0)), **ask)
+    assert of_table.answer == of_file.answer
+    pd.testing.assert_frame_equal(of_table.sweep, of_file.sweep, check_exact=True)
+    assert of_imu.imu.index[-1] <= 10.0
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        of_table.answer = None
+    assert of_table._repr_html_().startswith("<div>")
+    assert of_table.plot("gyro").axes
+
+    of_table.save(tmp_path / "out", report=False)
+    of_file.save(tmp_path / "file", report=False)
+    names = ("attitude.csv", "sweep.csv", "attitude.json")
+    for name in names:
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "file" / name).read_bytes()
+    kept, given = np.load(tmp_path / "out/inputs/log/imu.npz"), np.load(tmp_path / "imu.npz")
+    assert all(np.array_equal(kept[name], given[name]) for name in given)
+    assert sd.verify(tmp_path / "out").verdict == "identical"
+    manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+    assert manifest["configuration"]["source"]["path"] == "inputs/log/imu.npz"
+    path = tmp_path / "out" / "attitude.csv"
+    path.write_text(path.read_text().replace("1", "2", 1))
+    assert sd.verify(tmp_path / "out").verdict == "changed"
+
+
+@pytest.mark.parametrize(
+    ("ask", "error", "words"),
+    [
+        (lambda: sd.attitude(pd.DataFrame({"time": [0.0, 1.0]})), DataError, "gyro_x"),
+        (lambda: sd.compare_attitude(pd.DataFrame({"time": [0.0, 1.0]})), DataError, "gyro_x"),
+        (lambda: sd.attitude(np.arange(3.0)), ConfigError, "gyro"),
+        (lambda: sd.attitude(*samples(), algorithm="quaternoin"), ConfigError, "quaternion"),
+        (lambda: sd.attitude(*samples(), initial=(1.0, 2.0)), ConfigError, "initial"),
+        (lambda: sd.compare_attitude("x", options={"sed": 1}), ConfigError, "seed"),
+        (
+            lambda: sd.attitude(pd.DataFrame({f"gyro_{axis}": ["a", "b"] for axis in "xyz"})),
+            DataError,
+            "numbers",
+        ),
+    ],
+)
+def test_what_cannot_be_is_said_clearly(ask, error, words):
+    with pytest.raises(error) as caught:
+        ask()
+    assert words in str(caught.value)
+
+
+def test_the_name_of_the_room_is_the_function_in_every_order_of_imports():
+    call = "print(sd.attitude([0.0, 1.0], [[0.0] * 3] * 2)['q_w'].iloc[-1])"
+    for first in ("import strapdown as sd", "import strapdown.attitude, strapdown as sd"):
+        done = subprocess.run(
+            [sys.executable, "-c", f"{first}\n{call}"], capture_output=True, text=True, check=True
+        )
+        assert done.stdout.strip() == "1.0"
+
+
+def test_the_import_stays_free():
+    code = (
+        "import sys, strapdown; "
+        "print([m for m in ('numpy', 'pandas', 'numba', 'scipy') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
