@@ -52,7 +52,6 @@ if TYPE_CHECKING:
     from strapdown.report.coast import coast
     from strapdown.report.crash_case import reconstruct_case
     from strapdown.report.navigation import navigate
-    from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
     from strapdown.sensors.assumed import Assumed
@@ -93,7 +92,6 @@ __all__ = [
     "read_trajectory",
     "reconstruct_case",
     "reconstruct_crash",
-    "reproduce",
     "run_mechanization",
     "sample_paths",
     "simulate",
@@ -133,7 +131,6 @@ _HOMES = {
     "read_trajectory": "strapdown.formats.trajectory_readers",
     "reconstruct_case": "strapdown.report.crash_case",
     "reconstruct_crash": "strapdown.systems.crash_reconstruction",
-    "reproduce": "strapdown.report.reproduction",
     "run_mechanization": "strapdown.mechanization",
     "sample_paths": "strapdown.crash.monte_carlo",
     "simulate": "strapdown.report.simulation",

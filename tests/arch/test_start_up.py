@@ -35,7 +35,6 @@ def test_dir_and_an_unknown_name_load_nothing_either():
         ["--help"],
         ["align", "--help"],
         ["attitude", "--help"],
-        ["reproduce", "--help"],
         ["crash", "--help"],
         ["init", "align", "--help"],
         ["init", "navigate", "--help"],
