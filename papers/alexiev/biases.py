@@ -13,7 +13,7 @@ from papers.reproduction import (
     amount,
 )
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors import SENSORS, load_sensor
 
 EARTH_RATE = 15.041 / 3600.0  # deg/s, relative to the stars
 

@@ -13,9 +13,8 @@ from papers.reproduction import (
     Table,
     amount,
 )
-from strapdown.attitude import make_algorithm
-from strapdown.attitude.cost import count_cost
-from strapdown.results.answer import Cost
+from strapdown.attitude import count_cost, make_algorithm
+from strapdown.results import Cost
 
 
 def costs() -> tuple[Cost, ...]:

@@ -30,8 +30,7 @@ from papers.reproduction import (
 from strapdown import rotation
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import simulate_imu
-from strapdown.systems.attitude_sweep import sum_increments
-from strapdown.tables import QUATERNION
+from strapdown.tables import QUATERNION, THETA, increments_table
 
 Array = NDArray[np.float64]
 
@@ -94,6 +93,18 @@ def decimate(record: pd.DataFrame, factor: int) -> AtRate:
         _pose_error("rk4", increments_from_imu(few, "cubic")),
         _pose_error("rotvec", summed),
         _pose_error("naive", dropped),
+    )
+
+
+def sum_increments(increments: pd.DataFrame, kept: NDArray[np.int64]) -> pd.DataFrame:
+    """Add up the angle increments between samples, as a gyro that integrates would deliver them."""
+    if len(kept) == len(increments) + 1:
+        return increments
+    begin = kept[:-1]
+    return increments_table(
+        increments.index.to_numpy(dtype=np.float64)[kept[1:] - 1],
+        np.add.reduceat(increments["dt"].to_numpy(), begin),
+        np.add.reduceat(increments[THETA].to_numpy(), begin, axis=0),
     )
 
 

@@ -20,9 +20,9 @@ from papers.reproduction import (
 from strapdown import rotation
 from strapdown.attitude import make_algorithm, run_attitude
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.evaluation.dead_reckoning import dead_reckon
+from strapdown.evaluation import dead_reckon
 from strapdown.increments import increments_from_imu
-from strapdown.results.rests import RestStretch
+from strapdown.results import RestStretch
 from strapdown.simulation import ImuErrors, Motion, Pulse, PulseMotion, TriadErrors, simulate_imu
 from strapdown.tables import QUATERNION
 

@@ -18,7 +18,7 @@ from papers.reproduction import (
 )
 from strapdown import rotation
 from strapdown.increments import increments_from_imu
-from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors import SENSORS, load_sensor
 from strapdown.simulation import ImuErrors, Motion, TriadErrors, simulate_imu
 from strapdown.tables import GYRO
 

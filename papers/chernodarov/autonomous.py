@@ -10,10 +10,8 @@ from numpy.typing import NDArray
 
 from papers.chernodarov.setting import ELLIPSOID, SITE
 from strapdown.earth import radii_of_curvature
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.filter_state import FilterState
-from strapdown.tables import MOTION
-from strapdown.tables.checks import values_of
+from strapdown.estimation import ErrorFilter, FilterState
+from strapdown.tables import MOTION, values_of
 
 Array = NDArray[np.float64]
 

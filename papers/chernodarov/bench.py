@@ -20,14 +20,10 @@ from papers.chernodarov.setting import (
     align,
     autonomous_filter,
 )
-from strapdown.alignment.fine_result import FineResult
-from strapdown.prefilter.prefilter import CHANNELS
-from strapdown.prefilter.robust_fir import RobustFir
-from strapdown.sensors.error_chain import apply, intervals
-from strapdown.sensors.error_draws import child, white_noise
-from strapdown.sensors.triad_errors import TriadErrors
-from strapdown.simulation import Origin, StationaryMotion
-from strapdown.simulation.imu import ACCEL_SEED, GYRO_SEED
+from strapdown.alignment import FineResult
+from strapdown.prefilter import CHANNELS, RobustFir
+from strapdown.sensors import TriadErrors, apply, child, intervals, white_noise
+from strapdown.simulation import ACCEL_SEED, GYRO_SEED, Origin, StationaryMotion
 from strapdown.tables import imu_table
 
 Array = NDArray[np.float64]

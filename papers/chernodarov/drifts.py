@@ -23,9 +23,9 @@ from papers.reproduction import (
     amount,
 )
 from strapdown import rotation
-from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment import FineResult
 from strapdown.constants import DEG_PER_HOUR
-from strapdown.estimation.error_model import PHYSICAL
+from strapdown.estimation import PHYSICAL
 
 Array = NDArray[np.float64]
 

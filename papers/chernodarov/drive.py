@@ -11,28 +11,35 @@ from numpy.typing import NDArray
 
 from papers.chernodarov.autonomous import after
 from papers.chernodarov.setting import ELLIPSOID, HEADING_DEG, SENSOR, SITE, align
-from strapdown.aiding.gnss import Gnss
-from strapdown.alignment.fine_result import FineResult
+from strapdown.aiding import Gnss
+from strapdown.alignment import FineResult
 from strapdown.earth import radii_of_curvature
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_model import ErrorModel
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.influence_tukey import Tukey
-from strapdown.estimation.paper_update import PaperUpdate
-from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.estimation.update_rule import UpdateRule
+from strapdown.estimation import (
+    ErrorFilter,
+    ErrorModel,
+    Huber,
+    PaperUpdate,
+    QuaternionModel,
+    RobustUpdate,
+    Tukey,
+    UpdateRule,
+)
 from strapdown.exceptions import DataError, DivergenceError
 from strapdown.increments import motion_increments
-from strapdown.navigation.damping import Damping, Feedback
-from strapdown.navigation.lost_covariance import LostCovarianceError
-from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.piece import NavigationPiece
-from strapdown.simulation import Origin, simulate_imu
-from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.manoeuvres import Accelerate, LaneChange, Stop, Straight, Turn
-from strapdown.simulation.path_motion import PathMotion
-from strapdown.simulation.vehicles import car
+from strapdown.navigation import Damping, Feedback, LostCovarianceError, NavigationPiece, Navigator
+from strapdown.simulation import (
+    Accelerate,
+    GnssReceiver,
+    LaneChange,
+    Origin,
+    PathMotion,
+    Stop,
+    Straight,
+    Turn,
+    car,
+    simulate_gnss,
+    simulate_imu,
+)
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 Array = NDArray[np.float64]

@@ -18,8 +18,8 @@ from papers.reproduction import (
     Statement,
     amount,
 )
-from strapdown._kernels.level import OMEGA_EL
 from strapdown.earth import centrifugal, earth_rate, gravitation, gravity, radii_of_curvature
+from strapdown.mechanization import OMEGA_EL
 
 Array = NDArray[np.float64]
 
@@ -180,7 +180,7 @@ def north_velocity(driven: Driven, levels: Array, wander_angle: Array, north: Ar
     north : ndarray, (n,), m/s
         True.
     """
-    from strapdown._kernels.level import V_L
+    from strapdown.mechanization import V_L
 
     xi, eta = levels[:, V_L], levels[:, V_L + 1]
     s, c = np.sin(wander_angle), np.cos(wander_angle)

@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from papers.chernodarov.autonomous import after
 from papers.chernodarov.setting import UNCERTAINTY, wander
-from strapdown.alignment.fine_result import FineResult
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_model import PHYSICAL
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
-from strapdown.estimation.sensor_blocks import gyro_misalignment, gyro_scale
+from strapdown.alignment import FineResult
+from strapdown.estimation import (
+    COVARIANCES,
+    PHYSICAL,
+    ErrorFilter,
+    RotationVectorModel,
+    gyro_misalignment,
+    gyro_scale,
+)
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from papers.chernodarov.drive import RECEIVER
 from papers.chernodarov.prediction import Predicted
 from papers.reproduction import DOES_NOT_HOLD, HOLDS, Evidence, Statement
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.paper_update import PaperUpdate
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.estimation.update_rule import UpdateRule
-from strapdown.estimation.wd import Chernodarov
+from strapdown.estimation import (
+    COVARIANCES,
+    Chernodarov,
+    Huber,
+    PaperUpdate,
+    RobustUpdate,
+    UpdateRule,
+)
 
 Array = NDArray[np.float64]
 

@@ -30,8 +30,8 @@ from papers.reproduction import (
     Trace,
     amount,
 )
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
-from strapdown.navigation.damping import Feedforward
+from strapdown.estimation import RotationVectorModel
+from strapdown.navigation import Feedforward
 
 #: Runs: receiver, what it tells, and how it is taken.
 COARSE = "3 m"

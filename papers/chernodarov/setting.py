@@ -8,20 +8,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.alignment.fine import FineAlignment
-from strapdown.alignment.fine_result import FineResult
-from strapdown.alignment.site import Site
-from strapdown.alignment.two_vector import TwoVector
+from strapdown.alignment import FineAlignment, FineResult, Site, TwoVector
 from strapdown.ellipsoids import find_ellipsoid
-from strapdown.estimation.covariances import COVARIANCES
-from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.estimation.error_model import ErrorModel
-from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.estimation.robust_update import RobustUpdate
-from strapdown.mechanization import MECHANIZATIONS
-from strapdown.mechanization.mechanization import Mechanization
-from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.imu_uncertainty import ImuUncertainty
+from strapdown.estimation import COVARIANCES, ErrorFilter, ErrorModel, QuaternionModel, RobustUpdate
+from strapdown.mechanization import MECHANIZATIONS, Mechanization
+from strapdown.sensors import ImuUncertainty, load_sensor
 
 Array = NDArray[np.float64]
 

@@ -26,8 +26,7 @@ from papers.reproduction import (
     Trace,
 )
 from strapdown.constants import DEG_PER_HOUR
-from strapdown.prefilter.prefilter import Grid
-from strapdown.prefilter.robust_fir import RobustFir
+from strapdown.prefilter import Grid, RobustFir
 from strapdown.tables import ACCEL, GYRO
 
 Array = NDArray[np.float64]

@@ -19,10 +19,9 @@ from papers.reproduction import (
     Statement,
     amount,
 )
-from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment import FineResult
 from strapdown.constants import DEG_PER_HOUR
-from strapdown.estimation.quaternion_model import QuaternionModel
-from strapdown.estimation.rotation_vector_model import RotationVectorModel
+from strapdown.estimation import QuaternionModel, RotationVectorModel
 from strapdown.mechanization import MECHANIZATIONS
 
 Array = NDArray[np.float64]

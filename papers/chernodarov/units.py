@@ -20,13 +20,10 @@ from papers.chernodarov.setting import (
     align,
     autonomous_filter,
 )
-from strapdown.alignment.fine_result import FineResult
+from strapdown.alignment import FineResult
 from strapdown.increments import motion_increments
-from strapdown.navigation.damping import Feedforward
-from strapdown.navigation.navigator import Navigator
-from strapdown.simulation import Origin, simulate_imu
-from strapdown.simulation.minimum_jerk import Track
-from strapdown.simulation.path_motion import PathMotion
+from strapdown.navigation import Feedforward, Navigator
+from strapdown.simulation import Origin, PathMotion, Track, simulate_imu
 
 Array = NDArray[np.float64]
 

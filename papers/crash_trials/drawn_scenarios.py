@@ -6,9 +6,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from strapdown.simulation import CrashScenario, Setting
-from strapdown.simulation.front_impacts import frontal_impact, oblique_impact, pole_impact
-from strapdown.simulation.other_impacts import rear_impact, side_impact
+from strapdown.simulation import (
+    CrashScenario,
+    Setting,
+    frontal_impact,
+    oblique_impact,
+    pole_impact,
+    rear_impact,
+    side_impact,
+)
 
 Draw = Callable[[np.random.Generator], CrashScenario]
 

@@ -19,12 +19,10 @@ from papers.crash_trials.trial_outcome import (
     reconstruct_case,
 )
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.entry import Entry
+from strapdown.crash import Entry
 from strapdown.exceptions import DataError
-from strapdown.sensors.error_draws import child
-from strapdown.simulation import CRASHES, CrashScenario, Ringing
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.simulation.recorder_design import RecorderDesign
+from strapdown.sensors import child
+from strapdown.simulation import CRASHES, CrashScenario, ExactAnswers, RecorderDesign, Ringing
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]

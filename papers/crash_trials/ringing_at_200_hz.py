@@ -13,10 +13,14 @@ from papers.crash_trials.paper_experiment import INTERVAL, RINGINGS, pole_entry
 from papers.crash_trials.short_error_model import ideal_design
 from papers.crash_trials.trial_case import TrialCase
 from papers.crash_trials.trial_outcome import END, reconstruct_case
-from strapdown.simulation import CrashScenario, Ringing, Setting
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.simulation.front_impacts import pole_impact
+from strapdown.simulation import (
+    CrashScenario,
+    ExactAnswers,
+    Ringing,
+    Setting,
+    pole_impact,
+    record_crash,
+)
 from strapdown.tables import NED
 
 #: How samples are taken: name, kind, bandwidth of the single-pole low-pass before the sampler, Hz.

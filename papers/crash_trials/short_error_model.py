@@ -14,13 +14,16 @@ from strapdown import frames
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
-from strapdown.sensors.crash_priors import crash_priors
-from strapdown.sensors.error_draws import child
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.sensors.uncertainty_draws import draw_errors
-from strapdown.simulation import CRASHES, CrashScenario, point_kinematics
-from strapdown.simulation.imu import sample_accelerometer, sample_gyro
-from strapdown.simulation.recorder_design import RecorderDesign, TriadDesign
+from strapdown.sensors import TriadUncertainty, child, crash_priors, draw_errors
+from strapdown.simulation import (
+    CRASHES,
+    CrashScenario,
+    RecorderDesign,
+    TriadDesign,
+    point_kinematics,
+    sample_accelerometer,
+    sample_gyro,
+)
 from strapdown.tables import NED, imu_table
 
 Array = NDArray[np.float64]

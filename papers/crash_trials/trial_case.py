@@ -7,15 +7,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from papers.crash_trials.drawn_scenarios import DRAWN
-from strapdown.crash.entry import Entry
+from strapdown.crash import Entry
 from strapdown.exceptions import ConfigError, nearest
-from strapdown.sensors.crash_unit import CrashUnit
-from strapdown.sensors.error_draws import child
-from strapdown.sensors.triad_uncertainty import TriadUncertainty
-from strapdown.simulation import CrashScenario, Ringing
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.paper_recorders import paper_units
-from strapdown.simulation.recorder_design import RecorderDesign, RecorderTruth
+from strapdown.sensors import CrashUnit, TriadUncertainty, child
+from strapdown.simulation import (
+    CrashScenario,
+    RecorderDesign,
+    RecorderTruth,
+    Ringing,
+    paper_units,
+    record_crash,
+)
 
 # Places below the seed of a case.
 CASE, RECORDER = range(2)

@@ -9,16 +9,21 @@ from numpy.typing import NDArray
 
 from papers.crash_trials.trial_case import TrialCase
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.at_point import at_point
-from strapdown.crash.pdof import ned_pdof, pdof
-from strapdown.crash.prepare import prepare_unit
-from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit
-from strapdown.crash.velocity_change import EventChanges, VelocityChange
+from strapdown.crash import (
+    EventChanges,
+    UnitReconstruction,
+    VelocityChange,
+    at_point,
+    ned_pdof,
+    pdof,
+    prepare_unit,
+    reconstruct_unit,
+)
 from strapdown.earth import gravity
 from strapdown.exceptions import DataError
 from strapdown.rotation import within_half_turn
-from strapdown.sensors.synchronise import synchronise
-from strapdown.simulation.exact_answers import ExactAnswers
+from strapdown.sensors import synchronise
+from strapdown.simulation import ExactAnswers
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]

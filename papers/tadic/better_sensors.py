@@ -19,20 +19,21 @@ from papers.reproduction import (
 )
 from papers.tadic.experiment import END, SPEED_SD, gravity_at
 from papers.tadic.simplifications import TRIPS, error_course, sensor_increments
+from strapdown import reconstruct_crash
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.entry import Entry
-from strapdown.crash.entry_priors import FixCorrelation
-from strapdown.crash.gnss_start import GnssEntry
+from strapdown.crash import Entry, FixCorrelation, GnssEntry
 from strapdown.mechanization import NorthEastDown
-from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.crash_unit import CrashUnit
-from strapdown.simulation import CrashScenario, Setting
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.simulation.front_impacts import pole_impact
-from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.simulation.paper_recorders import paper_units
-from strapdown.systems.crash_reconstruction import reconstruct_crash
+from strapdown.sensors import CrashUnit, load_sensor
+from strapdown.simulation import (
+    CrashScenario,
+    ExactAnswers,
+    GnssReceiver,
+    Setting,
+    paper_units,
+    pole_impact,
+    record_crash,
+    simulate_gnss,
+)
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]

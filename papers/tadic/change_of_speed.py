@@ -17,7 +17,7 @@ from papers.reproduction import (
     amount,
 )
 from papers.tadic.experiment import AXES, CHOSEN, PLATFORMS, Experiment, Experiments
-from strapdown.crash.delta_v import trailing_delta_v
+from strapdown.crash import trailing_delta_v
 
 Array = NDArray[np.float64]
 

@@ -20,10 +20,17 @@ from papers.reproduction import (
     amount,
 )
 from papers.tadic.experiment import CHOSEN, PLATFORMS, Experiment, Experiments
-from strapdown.crash.delta_v import delta_v
-from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
-from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
-from strapdown.crash.velocity_change import VelocityChange, velocity_change
+from strapdown.crash import (
+    NedPdof,
+    Pdof,
+    VelocityChange,
+    body_delta_v_bound,
+    delta_v,
+    ned_pdof,
+    pdof,
+    resolved_delta_v_bound,
+    velocity_change,
+)
 
 Array = NDArray[np.float64]
 

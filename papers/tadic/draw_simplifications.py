@@ -1,6 +1,6 @@
 """Draw `images/simplifications.svg`: what simplifications cost with time, beside sensors.
 
-``python docs/draw_simplifications.py``
+``python -m papers.tadic.draw_simplifications``
 """
 
 from __future__ import annotations
@@ -9,7 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from papers.page import svg
+from papers.reproduction import Figure, FigurePanel, Trace
 from papers.tadic.simplifications import (
     SIMPLIFICATIONS,
     TRIPS,
@@ -19,77 +22,59 @@ from papers.tadic.simplifications import (
     straight,
 )
 from strapdown.mechanization import NorthEastDown
-from strapdown.report.chart import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    PURPLE,
-    VERMILLION,
-    Chart,
-    Line,
-    Panel,
-)
-from strapdown.report.svg_chart import draw
 
-LOOKS = {
-    "no Coriolis term": (BLUE, "solid"),
-    "no Earth rate": (VERMILLION, "solid"),
-    "no transport rate": (GREEN, "solid"),
-    "gravity 9.80665": (PURPLE, "solid"),
-    "all: flat Earth": (BLACK, "longdash"),
-}
-SENSORS = {"mpu-6050": ORANGE, "hg1700": "#7f6000", "hg9900": GREY}
+Array = NDArray[np.float64]
+
+LEFT_OUT = (
+    "no Coriolis term",
+    "no Earth rate",
+    "no transport rate",
+    "gravity 9.80665",
+    "all: flat Earth",
+)
+SENSORS = ("mpu-6050", "hg1700", "hg9900")
 UNITS = range(9)
 POINTS = 200
 
 
-def at(course: pd.Series, times: np.ndarray) -> np.ndarray:
-    """Position error at instants."""
-    return np.interp(times, course.index.to_numpy(), course.to_numpy())
+def _at(course: pd.DataFrame, times: Array) -> Array:
+    """Position error at instants, m."""
+    return np.interp(times, course.index.to_numpy(dtype=np.float64), course["position_m"])
 
 
-def panel(trip: Trip, title: str, times: np.ndarray, least: float) -> Panel:
-    """Lines of one trip; what is below `least` m is left out."""
-    courses = {}
-    for name in LOOKS:
-        course = error_course(trip, SIMPLIFICATIONS[name])
-        courses[name] = at(course["position_m"], times), *LOOKS[name], 1.6
-    for sensor, colour in SENSORS.items():
+def panel(trip: Trip, label: str, times: Array, least: float) -> FigurePanel:
+    """Curves of one trip; errors below `least` m are left out, as rounding."""
+    courses = {n: _at(error_course(trip, SIMPLIFICATIONS[n]), times) for n in LEFT_OUT}
+    for sensor in SENSORS:
         units = [
-            at(
-                error_course(trip, NorthEastDown(), sensor_increments(trip, sensor, unit))[
-                    "position_m"
-                ],
+            _at(
+                error_course(trip, NorthEastDown(), sensor_increments(trip, sensor, unit)),
                 times,
             )
             for unit in UNITS
         ]
-        courses[sensor] = np.median(units, axis=0), colour, "dot", 2.2
-    lines = tuple(
-        Line(name, times, np.where(y >= least, y, np.nan), colour, dash, width)
-        for name, (y, colour, dash, width) in courses.items()
-    )
-    return Panel("position error, m", lines, log=True, title=title)
+        courses[sensor] = np.median(units, axis=0)
+    traces = tuple(Trace(n, times, np.where(y >= least, y, np.nan)) for n, y in courses.items())
+    return FigurePanel(f"{label}, m", traces, log=True)
 
 
-def chart() -> Chart:
-    """The chart of the page."""
-    crash, minute = TRIPS["crash"], Trip("", straight(120.0, 20.0), 100.0, "free")
-    return Chart(
+def figure() -> Figure:
+    """Position errors in a crash and on a straight road."""
+    road = Trip("", straight(120.0, 20.0), 100.0, "free")
+    return Figure(
         "simplifications",
-        "What is left out, and what sensors do",
+        "Position error of what is left out, and of sensors",
         "",
+        "medians of 9 units of each sensor",
         "time, s",
         (
-            panel(crash, "a crash", np.geomspace(0.02, 0.75, POINTS), 3e-6),
-            panel(minute, "20 m/s, straight", np.geomspace(0.05, 120.0, POINTS), 1e-7),
+            panel(TRIPS["crash"], "a crash", np.geomspace(0.02, 0.75, POINTS), 3e-6),
+            panel(road, "20 m/s, straight", np.geomspace(0.05, 120.0, POINTS), 1e-7),
         ),
-        log_x=True,
-        beside=True,
+        x_log=True,
     )
 
 
 if __name__ == "__main__":
-    draw(chart(), Path(__file__).parent / "images" / "simplifications.svg")
+    target = Path(__file__).parent / "images" / "simplifications.svg"
+    target.write_text(svg(figure()), encoding="utf-8")

@@ -19,11 +19,9 @@ from papers.reproduction import (
 from papers.tadic.experiment import END
 from papers.tadic.simplifications import SIMPLIFICATIONS, Trip, error_course
 from strapdown import rotation
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp import running_integral
 from strapdown.earth import radii_of_curvature
-from strapdown.simulation import CRASHES, CrashScenario
-from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
-from strapdown.simulation.earth_motion import Origin
+from strapdown.simulation import CRASHES, CrashMotion, CrashScenario, HaversinePulse, Origin
 
 Array = NDArray[np.float64]
 

@@ -10,18 +10,21 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from papers.crash_trials.paper_experiment import pole_entry
-from strapdown.crash.entry import Entry
-from strapdown.crash.reference_path import PathComparison, compare_with_reference
-from strapdown.crash.unit_reconstruction import UnitReconstruction
+from strapdown import CrashReconstruction, reconstruct_crash
+from strapdown.crash import Entry, PathComparison, UnitReconstruction, compare_with_reference
 from strapdown.earth import gravity
-from strapdown.sensors.error_draws import child
-from strapdown.simulation import CRASHES, CrashScenario
-from strapdown.simulation.cameras import film, paper_cameras, path_from_cameras
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.simulation.paper_recorders import paper_units
-from strapdown.simulation.recorder_design import RecorderTruth
-from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
+from strapdown.sensors import child
+from strapdown.simulation import (
+    CRASHES,
+    CrashScenario,
+    ExactAnswers,
+    RecorderTruth,
+    film,
+    paper_cameras,
+    paper_units,
+    path_from_cameras,
+    record_crash,
+)
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]

@@ -20,11 +20,8 @@ from papers.reproduction import (
     amount,
 )
 from papers.tadic.directions import LENGTH, PAPER, WINDOWS
-from strapdown.crash.acceleration import Acceleration
-from strapdown.crash.delta_v import delta_v, trailing_delta_v
-from strapdown.crash.events import detect_events
-from strapdown.crash.pdof import pdof
-from strapdown.sensors.crash_unit import Mounting
+from strapdown.crash import Acceleration, delta_v, detect_events, pdof, trailing_delta_v
+from strapdown.sensors import Mounting
 from strapdown.simulation import CRASHES, CrashScenario, MountedMotion, Ringing
 
 Array = NDArray[np.float64]

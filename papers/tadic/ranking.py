@@ -18,10 +18,8 @@ from papers.reproduction import (
 from papers.tadic.simplifications import TRIPS, Trip, error_course
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
-from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
-from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
-from strapdown.simulation.earth_motion import Origin
-from strapdown.simulation.imu import simulate_imu
+from strapdown.sensors import ImuErrors, TriadErrors
+from strapdown.simulation import CrashMotion, HaversinePulse, Origin, simulate_imu
 
 TIMES = (5.0, 10.0)  # s, "periods of up to 5-10 s"
 # Biases as the paper's sensors have them after a calibration at rest; speeds are the question.

@@ -20,8 +20,8 @@ from papers.reproduction import (
     amount,
 )
 from papers.tadic.experiment import CHOSEN, END, Experiment, Experiments, gravity_at
-from strapdown.sensors.crash_unit import CrashUnit
-from strapdown.systems.crash_reconstruction import reconstruct_crash
+from strapdown import reconstruct_crash
+from strapdown.sensors import CrashUnit
 from strapdown.tables import NED
 
 Array = NDArray[np.float64]

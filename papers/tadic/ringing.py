@@ -9,8 +9,7 @@ import numpy as np
 from papers.crash_trials.paper_experiment import INTERVAL, RINGINGS
 from papers.crash_trials.ringing_at_200_hz import perfect_sensors
 from papers.reproduction import DOES_NOT_HOLD, HOLDS, Evidence, Statement
-from strapdown.simulation import Ringing, Setting
-from strapdown.simulation.front_impacts import pole_impact
+from strapdown.simulation import Ringing, Setting, pole_impact
 
 PHASES = 3
 

@@ -18,9 +18,8 @@ from papers.reproduction import (
     amount,
 )
 from papers.tadic.mounting import felt
-from strapdown.crash.delta_v import delta_v, trailing_delta_v
-from strapdown.crash.events import detect_events
-from strapdown.sensors.crash_unit import Mounting
+from strapdown.crash import delta_v, detect_events, trailing_delta_v
+from strapdown.sensors import Mounting
 from strapdown.simulation import CRASHES
 
 Array = NDArray[np.float64]

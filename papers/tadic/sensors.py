@@ -19,7 +19,7 @@ from papers.tadic.displacement import DECIMETRES
 from papers.tadic.error_budget import budget
 from papers.tadic.experiment import END, IMUS, Experiments
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.sensors.catalogue import SENSORS, Sensor, load_sensor
+from strapdown.sensors import SENSORS, Sensor, load_sensor
 
 Array = NDArray[np.float64]
 

@@ -13,21 +13,27 @@ from numpy.typing import NDArray
 
 from strapdown import earth, rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.running_integral import running_integral
-from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
+from strapdown.dsp import running_integral
+from strapdown.evaluation import ROTATION_ERROR, trajectory_differences
 from strapdown.exceptions import DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import Mechanization, NorthEastDown, Tadic, run_mechanization
 from strapdown.nav_state import NavState
-from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.triad_errors import ImuErrors
-from strapdown.simulation.course import Manoeuvre
-from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
-from strapdown.simulation.earth_motion import EarthMotion, Origin
-from strapdown.simulation.imu import simulate_imu
-from strapdown.simulation.manoeuvres import Accelerate, Stop, Straight, Turn
-from strapdown.simulation.sine_velocity import SineVelocityMotion
-from strapdown.simulation.vehicles import car
+from strapdown.sensors import ImuErrors, load_sensor
+from strapdown.simulation import (
+    Accelerate,
+    CrashMotion,
+    EarthMotion,
+    HaversinePulse,
+    Manoeuvre,
+    Origin,
+    SineVelocityMotion,
+    Stop,
+    Straight,
+    Turn,
+    car,
+    simulate_imu,
+)
 from strapdown.tables import NED, VELOCITY
 
 __all__ = [

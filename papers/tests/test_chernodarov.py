@@ -33,8 +33,7 @@ from papers.reproduction import (
     VERDICTS,
 )
 from papers.tests.statements_of_a_paper import check_manual, check_statements
-from strapdown.estimation.influence_huber import Huber
-from strapdown.estimation.paper_update import PaperUpdate
+from strapdown.estimation import Huber, PaperUpdate
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY
 
 PAGE = Path(__file__).parents[1] / "chernodarov" / "README.md"

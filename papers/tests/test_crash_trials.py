@@ -20,13 +20,17 @@ from papers.crash_trials.short_error_model import (
 )
 from papers.crash_trials.trial_case import TrialPriors, Untold, draw_case
 from papers.crash_trials.trial_outcome import judge_case, reconstruct_case
-from strapdown.crash.entry import Entry
-from strapdown.crash.monte_carlo import sample_paths
+from strapdown import reconstruct_crash
+from strapdown.crash import Entry, sample_paths
 from strapdown.exceptions import ConfigError
-from strapdown.simulation import CRASHES, Ringing, find_crash, point_kinematics
-from strapdown.simulation.crash_recording import record_crash
-from strapdown.simulation.exact_answers import ExactAnswers
-from strapdown.systems.crash_reconstruction import reconstruct_crash
+from strapdown.simulation import (
+    CRASHES,
+    ExactAnswers,
+    Ringing,
+    find_crash,
+    point_kinematics,
+    record_crash,
+)
 from strapdown.tables import NED
 
 POLE = CRASHES["pole"]

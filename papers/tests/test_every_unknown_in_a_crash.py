@@ -14,7 +14,7 @@ import pytest
 from papers.crash_trials.trial_case import TrialPriors, draw_case
 from papers.crash_trials.trial_outcome import END, reconstruct_case
 from strapdown import rotation
-from strapdown.simulation.exact_answers import ExactAnswers
+from strapdown.simulation import ExactAnswers
 from strapdown.tables import NED
 
 AXES = "xyz"

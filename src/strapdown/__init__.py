@@ -61,12 +61,13 @@ if TYPE_CHECKING:
     from strapdown.sensors.redundant_units import vote_units
     from strapdown.sensors.triad_uncertainty import TriadUncertainty
     from strapdown.systems.attitude_bench import bench_attitude
-    from strapdown.systems.crash_reconstruction import reconstruct_crash
+    from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 
 __version__ = "0.1.0"
 
 __all__ = [
     "Assumed",
+    "CrashReconstruction",
     "CrashUnit",
     "Entry",
     "FineAlignment",
@@ -113,6 +114,7 @@ _HOMES = {
     "Site": "strapdown.alignment.site",
     "FineAlignment": "strapdown.alignment.fine",
     "Assumed": "strapdown.sensors.assumed",
+    "CrashReconstruction": "strapdown.systems.crash_reconstruction",
     "CrashUnit": "strapdown.sensors.crash_unit",
     "Entry": "strapdown.crash.entry",
     "Mounting": "strapdown.sensors.crash_unit",
