@@ -1,1 +1,1 @@
-"""Alexiev (2021), statement by statement: one file a figure or a group of statements."""
+"""Alexiev (2021), statement by statement."""

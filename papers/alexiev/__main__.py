@@ -1,5 +1,7 @@
 """``python -m papers.alexiev --out DIR``."""
 
+from __future__ import annotations
+
 from papers.alexiev.paper import reproduce_alexiev
 from papers.page import run
 

@@ -5,12 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from papers.alexiev.sampling import (
-    NONE,
-    algorithm_history,
-    final_error,
-    scenario_motion,
-)
+from papers.alexiev.motions import NONE, algorithm_history, final_error, scenario_motion
 from papers.reproduction import (
     DOES_NOT_HOLD,
     HOLDS,

@@ -7,21 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from papers.alexiev import (
-    biases,
-    commutation,
-    effort,
-    fig4,
-    fig4_approach,
-    fig5,
-    fig6,
-    formulas,
-    growth,
-    phone_sensors,
-    reference_points,
-    signals,
-)
-from papers.alexiev.sampling import (
+from papers.alexiev import fig4, fig5, fig6, formulas, growth, motions
+from papers.alexiev.motions import (
     NONE,
     algorithm_history,
     errors_over_time,
@@ -44,8 +31,6 @@ from strapdown import rotation
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import simulate_imu
 from strapdown.tables import QUATERNION
-
-__all__ = ["PAPER", "reproduce_alexiev"]
 
 PAPER = (
     "K. Alexiev, Algorithms for IMU Navigation – A Review, Information Technologies and Control, "
@@ -160,15 +145,15 @@ def _fig4() -> Part:
     table = fig4.table()
     columns = dict(zip(table.columns[1:], np.array([row for _, row in table.rows]).T, strict=True))
     at_100 = fig4.RATES.index(100.0)
-    approaches = tuple(fig4_approach.approach(rate) for rate in fig4_approach.APPROACH_RATES)
-    smooth = fig4_approach.approach(100.0, "rk4")
+    approaches = tuple(fig4.approach(rate) for rate in fig4.APPROACH_RATES)
+    smooth = fig4.approach(100.0, "rk4")
     pulses = scenario_motion("alexiev-fig4").rate([2.5])[0]
     return (
         [
             fig4.unstable(fig4.RATES, columns["euler, °"], columns["dcm, °"]),
             fig4.crosses(fig4.greatest_pitch(), float(np.degrees(pulses[1]))),
             fig4.incorrect(columns["euler, °"][at_100], columns["dcm, °"][at_100]),
-            fig4_approach.before_ninety(approaches, smooth),
+            fig4.before_ninety(approaches, smooth),
             fig4.reference(
                 columns["dcm, °"],
                 columns["dcm, pulse closed, °"][at_100],
@@ -176,7 +161,7 @@ def _fig4() -> Part:
             ),
         ],
         [table],
-        [fig4.time_figure(), fig4_approach.approach_figure(approaches, smooth)],
+        [fig4.time_figure(), fig4.approach_figure(approaches, smooth)],
     )
 
 
@@ -186,19 +171,19 @@ def _naive() -> Part:
     low, low_large = (fig5.compare(m, fig5.LOW) for m in (small, large))
     return (
         [
-            commutation.good_at_high_rate(
+            fig5.good_at_high_rate(
                 high.naive,
                 final_error(small, "naive", 10_000.0),
                 high_large.naive,
                 final_error(large, "naive", 10_000.0),
-                commutation.angle_for(commutation.GOOD, "together"),
-                commutation.angle_for(commutation.GOOD, "x then y"),
+                fig5.angle_for(fig5.GOOD, "together"),
+                fig5.angle_for(fig5.GOOD, "x then y"),
             ),
             fig5.very_good_at_high_rate(high, high_large),
             fig5.differs_at_low_rate(low, high, low_large),
         ],
         [fig5.table()],
-        [fig5.figure(), commutation.angle_figure(), commutation.rate_figure()],
+        [fig5.figure(), fig5.angle_figure(), fig5.rate_figure()],
     )
 
 
@@ -206,22 +191,22 @@ def _fig6() -> Part:
     record = fig6.record()
     found = tuple(fig6.decimate(record, factor) for factor in fig6.FACTORS)
     fast, slow = found[0], found[fig6.FACTORS.index(fig6.PAPER_FACTOR)]
-    sensors = tuple(phone_sensors.sensor_cost(name) for name in phone_sensors.phone_gyros())
+    sensors = tuple(fig6.sensor_cost(name) for name in fig6.phone_gyros())
     motion = scenario_motion("alexiev-fig6")
     _, error = errors_over_time(motion, "dcm", slow.rate)
-    at_nine = round(phone_sensors.UNTIL * slow.rate)
+    at_nine = round(fig6.UNTIL * slow.rate)
     return (
         [
-            phone_sensors.stable_at_rest(sensors),
+            fig6.stable_at_rest(sensors),
             fig6.neither_sensor_nor_algorithm(slow, _apart(slow.rate), sensors),
             fig6.rate_is_the_reason(slow, fast, sensors),
-            reference_points.reference_points(
-                *reference_points.scale_seen(),
+            fig6.reference_points(
+                *fig6.scale_seen(),
                 float(error[at_nine]),
                 float(error[: at_nine + 1].max()),
             ),
         ],
-        [fig6.rate_table(found), phone_sensors.sensor_table(sensors)],
+        [fig6.rate_table(found), fig6.sensor_table(sensors)],
         [
             fig6.time_figure(),
             fig6.rate_figure(found, float(np.median([c.moving for c in sensors]))),
@@ -233,11 +218,11 @@ def _growth() -> Part:
     laws = growth.laws()
     return (
         [
-            biases.gyros_lead(biases.crossovers()),
+            growth.gyros_lead(growth.crossovers()),
             growth.accel_growth(laws.accel, laws.accel_turning),
             growth.attitude_growth(laws.tilt, laws.tilt_turning),
             growth.gyro_growth(laws.gyro, laws.gyro_vertical),
-            biases.earth_rate_small(biases.gyro_biases()),
+            growth.earth_rate_small(growth.gyro_biases()),
         ],
         [],
         [growth.figure(laws)],
@@ -245,7 +230,7 @@ def _growth() -> Part:
 
 
 def _motions() -> Part:
-    table = signals.table()
+    table = motions.scenario_table()
     motion = scenario_motion("alexiev-fig6")
     exact = max(
         final_error(scenario_motion(name), algorithm, 100.0, sampling="mean")
@@ -254,7 +239,7 @@ def _motions() -> Part:
     )
     return (
         [
-            signals.excellent(
+            motions.excellent(
                 exact,
                 _apart(20.0),
                 final_error(motion, "dcm", 20.0),
@@ -262,16 +247,16 @@ def _motions() -> Part:
                 20.0,
                 1000.0,
             ),
-            signals.practical(table),
+            motions.practical(table),
         ],
         [table],
-        [signals.figure()],
+        [motions.figure()],
     )
 
 
 def _effort() -> Part:
-    costs = effort.costs()
-    return [effort.compromise(costs), *effort.unpublished()], [effort.table(costs)], []
+    costs = motions.costs()
+    return [motions.compromise(costs), *motions.unpublished()], [motions.cost_table(costs)], []
 
 
 def _apart(rate: float) -> float:

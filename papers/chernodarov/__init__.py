@@ -1,1 +1,1 @@
-"""The statements and figures of Chernodarov (2009), one claim or figure a file."""
+"""The statements and figures of Chernodarov (2009)."""

@@ -1,5 +1,7 @@
 """``python -m papers.chernodarov --out DIR``."""
 
+from __future__ import annotations
+
 from papers.chernodarov.paper import reproduce_chernodarov
 from papers.page import run
 

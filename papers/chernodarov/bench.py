@@ -1,4 +1,4 @@
-"""The bench run: 1 kHz sensors, robust digital filter, alignment, an hour without aids."""
+"""Where and with what Chernodarov (2009) is re-made: place, sensors, stages, modules."""
 
 from __future__ import annotations
 
@@ -8,25 +8,190 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from papers.chernodarov.autonomous import Course, go
-from papers.chernodarov.setting import (
-    ELLIPSOID,
-    END,
-    HEADING_DEG,
-    PITCH_DEG,
-    ROLL_DEG,
-    SENSOR,
-    SITE,
-    align,
-    autonomous_filter,
+from strapdown.alignment import FineAlignment, FineResult, Site, TwoVector
+from strapdown.earth import radii_of_curvature
+from strapdown.ellipsoids import find_ellipsoid
+from strapdown.estimation import (
+    COVARIANCES,
+    ErrorFilter,
+    ErrorModel,
+    FilterState,
+    QuaternionModel,
+    RobustUpdate,
 )
-from strapdown.alignment import FineResult
+from strapdown.mechanization import MECHANIZATIONS, Mechanization
 from strapdown.prefilter import CHANNELS, RobustFir
-from strapdown.sensors import TriadErrors, apply, child, intervals, white_noise
+from strapdown.sensors import (
+    ImuUncertainty,
+    TriadErrors,
+    apply,
+    child,
+    intervals,
+    load_sensor,
+    white_noise,
+)
 from strapdown.simulation import ACCEL_SEED, GYRO_SEED, Origin, StationaryMotion
-from strapdown.tables import imu_table
+from strapdown.tables import MOTION, imu_table, values_of
 
 Array = NDArray[np.float64]
+
+#: Of the a and e² of the paper.
+ELLIPSOID = find_ellipsoid("krassovsky1940")
+#: Zelenograd, of the address of the author: the paper prints no coordinates of its test bed.
+SITE = Site(55.98, 37.2, 200.0, ELLIPSOID)
+ROLL_DEG, PITCH_DEG, HEADING_DEG = 0.5, -0.8, 40.0
+SENSOR = load_sensor("fog-1000")
+UNCERTAINTY = ImuUncertainty.of_sensor(SENSOR)
+#: Ends of coarse and of fine alignment, s: "(100-600 sec)", "Beginning with the moment t=600 sec".
+COARSE_END, FINE_END = 100.0, 600.0
+#: Navigated without any aid after that, s; the paper does not say how long.
+AUTONOMOUS = 3600.0
+END = FINE_END + AUTONOMOUS
+
+
+def wander(height: str = "free") -> Mechanization:
+    """Return the mechanization of the paper."""
+    return MECHANIZATIONS["wander_azimuth"](ellipsoid=ELLIPSOID.name, height=height)
+
+
+def stretch(imu: pd.DataFrame, since: float, until: float) -> pd.DataFrame:
+    """Return a part of a record, both ends included."""
+    part: pd.DataFrame = imu.loc[since - 1e-6 : until + 1e-6]
+    part.attrs = dict(imu.attrs)
+    return part
+
+
+def align(
+    imu: pd.DataFrame,
+    increments: pd.DataFrame | None = None,
+    model: type[ErrorModel] = QuaternionModel,
+    form: str = "wd",
+    mechanization: Mechanization | None = None,
+    ends: tuple[float, float] = (COARSE_END, FINE_END),
+) -> FineResult:
+    """Align as the paper does: coarsely, then by (16)-(18) at 1 Hz.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table from time zero on.
+    increments : DataFrame, optional
+        Of the same record, where a pre-filter has made them.
+    model, form, mechanization
+        Those of the paper, if not given.
+    ends : tuple of float, s
+        Of the coarse and of the fine alignment.
+
+    Returns
+    -------
+    FineResult
+    """
+    coarse = TwoVector().align(stretch(imu, 0.0, ends[0]), SITE, UNCERTAINTY)
+    way = FineAlignment(
+        mechanization=wander() if mechanization is None else mechanization,
+        model=model,
+        form=COVARIANCES[form](),
+        rule=RobustUpdate(),
+    )
+    since = coarse.time
+    return way.align(stretch(imu, since, ends[1]), SITE, UNCERTAINTY, coarse, increments=increments)
+
+
+def autonomous_filter(fine: FineResult) -> ErrorFilter:
+    """Return the filter that goes on after an alignment: it does not know that the body rests."""
+    return replace(fine.filter, rests=False, mechanization=wander("held"))
+
+
+# ==================================================================================================
+# Navigation of a body at rest without any aid: what comes of it, and what should
+# ==================================================================================================
+
+EVERY = 1.0  # s
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Errors of a body that stands where it stood.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+    velocity : ndarray, (n, 2), m/s
+        North, east.
+    angles : ndarray, (n, 2), rad
+        Latitude and longitude less those of the place.
+    alt : ndarray, (n,), m
+        Height less that of the place.
+    """
+
+    time: Array
+    velocity: Array
+    angles: Array
+    alt: Array
+
+    @property
+    def speed(self) -> Array:
+        """Delta V of Figs. 8 and 9, (n,), m/s."""
+        return np.asarray(np.hypot(*self.velocity.T))
+
+    @property
+    def place(self) -> Array:
+        """North and east, (n, 2), m."""
+        meridian, transverse = radii_of_curvature(SITE.lat_deg, ellipsoid=ELLIPSOID)
+        parallel = (transverse + SITE.alt) * np.cos(np.radians(SITE.lat_deg))
+        return np.asarray(self.angles * np.array([meridian + SITE.alt, parallel]))
+
+    @property
+    def circular(self) -> Array:
+        """Delta S of Figs. 10 and 11 as a distance, (n,), m."""
+        return np.asarray(np.hypot(*self.place.T))
+
+    def at(self, time: float) -> int:
+        """Row of an instant."""
+        return int(np.searchsorted(self.time, time - 1e-6).clip(max=len(self.time) - 1))
+
+
+def after(increments: pd.DataFrame, time: float) -> tuple[Array, Array]:
+    """Ends and rows of the increments after an instant."""
+    ends = increments.index.to_numpy(dtype=np.float64)
+    since = int(np.searchsorted(ends, time + 1e-6))
+    return ends[since:], np.ascontiguousarray(values_of(increments, MOTION)[since:])
+
+
+def go(filter_: ErrorFilter, state: FilterState, increments: pd.DataFrame) -> Course:
+    """Navigate on from a state to the end of a record, without observations.
+
+    Parameters
+    ----------
+    filter_ : ErrorFilter
+    state : FilterState
+        The estimates of the sensors' errors that it holds are taken off, as (6) predicts them.
+    increments : DataFrame
+
+    Returns
+    -------
+    Course
+    """
+    ends, rows = after(increments, state.time)
+    history = np.empty((len(ends), filter_.mechanization.row))
+    filter_.advance_compensated(
+        state.mechanization.copy(), ends, filter_.compensated(state, rows), history
+    )
+    every = max(1, round(EVERY / float(np.median(np.diff(ends)))))
+    kept = slice(every - 1, None, every)
+    path = filter_.mechanization.trajectory(ends[kept], history[kept])
+    home = np.radians([SITE.lat_deg, SITE.lon_deg])
+    return Course(
+        ends[kept],
+        path[["VN", "VE"]].to_numpy(),
+        np.radians(path[["lat", "lon"]].to_numpy()) - home,
+        path["alt"].to_numpy() - SITE.alt,
+    )
+
+
+# ==================================================================================================
+# The bench run: 1 kHz sensors, robust digital filter, alignment, an hour without aids
+# ==================================================================================================
 
 RATE, OUTPUT_RATE = 1000.0, 100.0  # Hz
 UNIT = 1

@@ -1,15 +1,31 @@
-"""Figs. 8 to 11: an hour without aids, sensor drifts damped and not."""
+"""What the covariance of an alignment says of the errors of the hour after it."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
-from papers.chernodarov.bench import Bench
-from papers.chernodarov.setting import ELLIPSOID, FINE_END, SITE
-from papers.chernodarov.units import COUNT, TURN_DEG, Kept, Units
+from papers.chernodarov.bench import (
+    ELLIPSOID,
+    END,
+    EVERY,
+    FINE_END,
+    HEADING_DEG,
+    SENSOR,
+    SITE,
+    UNCERTAINTY,
+    Bench,
+    Course,
+    after,
+    align,
+    autonomous_filter,
+    go,
+    wander,
+)
 from papers.reproduction import (
     DOES_NOT_HOLD,
     HOLDS,
@@ -22,9 +38,246 @@ from papers.reproduction import (
     Trace,
     amount,
 )
+from strapdown.alignment import FineResult
 from strapdown.earth import radii_of_curvature
+from strapdown.estimation import (
+    COVARIANCES,
+    PHYSICAL,
+    ErrorFilter,
+    RotationVectorModel,
+    gyro_misalignment,
+    gyro_scale,
+)
+from strapdown.increments import motion_increments
+from strapdown.navigation import Feedforward, Navigator
+from strapdown.simulation import Origin, PathMotion, Track, simulate_imu
 
 Array = NDArray[np.float64]
+
+#: Estimates taken off; left on; taken off, and errors taken as independent of each other.
+KINDS = ("damped", "undamped", "independent")
+PREDICTED_EVERY = 10.0  # s
+# Attitude and force by their means, s: the table turns by a few degrees in it at most.
+STEP = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Standard deviations, north and east together: the root of the sum of the variances.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+    speed : ndarray, (n,), m/s
+    place : ndarray, (n,), m
+    last : ndarray, (p, p)
+        Covariance of the physical errors at the end, level axes.
+    """
+
+    time: Array
+    speed: Array
+    place: Array
+    last: Array
+
+
+def covariance_after(fine: FineResult, kind: str = "damped") -> Array:
+    """Return the covariance of the physical errors at the end of an alignment.
+
+    What is estimated and what its estimate is off by are independent of each other. So errors of
+    sensors that are left as they are have the covariance of what is off, and that of the estimate
+    besides: what was known before less what is not known after.
+
+    Parameters
+    ----------
+    fine : FineResult
+    kind : str
+        Of `KINDS`.
+
+    Returns
+    -------
+    ndarray, (15, 15)
+        North-east-down; the biases in body axes.
+    """
+    filter_, state = fine.filter, fine.state
+    level = filter_.mechanization.level_from_ned(state.row)
+    turn = np.eye(filter_.model.physical_size)
+    for at in (0, 3, 6):
+        turn[at : at + 3, at : at + 3] = level.T
+    P = np.asarray(turn @ filter_.physical_covariance(state) @ turn.T)
+    if kind == "independent":
+        return np.diag(np.diagonal(P))
+    if kind == "undamped":
+        stacked = filter_.model.stacked
+        since = state.time - float(fine.history.index[0])
+        before = np.diag(np.square(stacked.sd) + np.square(stacked.drive) * since)
+        P[PHYSICAL:, PHYSICAL:] = before
+    return P
+
+
+def predict(fine: FineResult, increments: pd.DataFrame, kind: str) -> Predicted:
+    """Take the covariance at the end of an alignment over the record after it.
+
+    Parameters
+    ----------
+    fine : FineResult
+    increments : DataFrame
+    kind : str
+        Of `KINDS`.
+
+    Returns
+    -------
+    Predicted
+        Scale factors and misalignments of the gyros are in it, which a rest does not show and a
+        turn does.
+    """
+    P = covariance_after(fine, kind)
+    gyro = UNCERTAINTY.gyro
+    model = RotationVectorModel(
+        fine.filter.model.gyro_noise,
+        fine.filter.model.accel_noise,
+        (
+            *fine.filter.model.sensors,
+            gyro_scale(gyro.axis("scale")),
+            gyro_misalignment(max(gyro.axis("misalignment"))),
+        ),
+    )
+    whole = np.zeros((model.physical_size,) * 2)
+    whole[: len(P), : len(P)] = P
+    more = slice(len(P), None)
+    whole[more, more] = np.diag(np.square(model.stacked.sd[len(P) - PHYSICAL :]))
+    used = ErrorFilter(wander("held"), model, COVARIANCES["joseph"](), step=STEP)
+    start = fine.filter.mechanization.nav_state(fine.state.mechanization, fine.state.time)
+    state = used.begin(start, whole)
+    ends, rows = after(increments, state.time)
+    rows = fine.filter.compensated(fine.state, rows)
+    every = max(1, round(PREDICTED_EVERY / float(np.median(np.diff(ends)))))
+    found = []
+    for k in range(0, len(ends) - every + 1, every):
+        state, _ = used.predict(state, ends[k : k + every], rows[k : k + every])
+        variance = np.diagonal(used.physical_covariance(state))
+        found.append((state.time, variance[3] + variance[4], variance[0] + variance[1]))
+    time, speed, place = np.array(found).T
+    return Predicted(time, np.sqrt(speed), np.sqrt(place), used.physical_covariance(state))
+
+
+# ==================================================================================================
+# Many units on the bench, half of their runs with the table turned after the alignment
+# ==================================================================================================
+
+COUNT = 24
+FIRST = 100  # seed of the first
+# Of a body that rests, or turns about one axis, means hold everything.
+RATE = 10.0  # Hz
+TURN_DEG, RAMP, STEADY = 180.0, 5.0, 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """Runs of one kind: the table still, or turned.
+
+    Attributes
+    ----------
+    damped, undamped : tuple of Course
+        One a unit.
+    predicted : dict of Predicted
+        By kind, from the alignment of the first unit.
+    """
+
+    damped: tuple[Course, ...]
+    undamped: tuple[Course, ...]
+    predicted: dict[str, Predicted]
+
+    def rms(self, which: str, quantity: str) -> Array:
+        """Root of the mean over units of the square of Delta V or Delta S, by time, (n,)."""
+        courses = self.damped if which == "damped" else self.undamped
+        values = np.array([getattr(c, quantity) for c in courses])
+        return np.asarray(np.sqrt(np.square(values).mean(axis=0)))
+
+    @property
+    def time(self) -> Array:
+        """Times of the courses, s."""
+        return self.damped[0].time
+
+
+@dataclass(frozen=True, eq=False)
+class Units:
+    """Both kinds.
+
+    Attributes
+    ----------
+    still, turned : Kept
+    forward_apart : float, m/s
+        Largest difference of the velocities of the first unit at rest, with its estimates fed
+        back, and with the mechanization free and the errors that (6) predicts taken off.
+    """
+
+    still: Kept
+    turned: Kept
+    forward_apart: float
+
+
+def table_motion(turned: bool) -> PathMotion:
+    """Return the table: at rest, and after the alignment turned by half a turn or not."""
+    rate = TURN_DEG / (RAMP + STEADY)
+    times = (0.0, FINE_END, FINE_END + RAMP, FINE_END + RAMP + STEADY)
+    track = Track((*times, times[-1] + RAMP), (0.0, 0.0, rate, rate, 0.0))
+    return PathMotion(
+        END,
+        Origin(SITE.lat_deg, SITE.lon_deg, SITE.alt),
+        heading_deg=HEADING_DEG,
+        turn_rate=track if turned else Track((0.0,), (0.0,)),
+        ellipsoid=ELLIPSOID,
+    )
+
+
+def units(count: int = COUNT) -> Units:
+    """Align each unit, and let it navigate for an hour in four ways.
+
+    Parameters
+    ----------
+    count : int
+
+    Returns
+    -------
+    Units
+    """
+    motions = [table_motion(turned) for turned in (False, True)]
+    courses: list[tuple[list[Course], list[Course]]] = [([], []), ([], [])]
+    predicted: list[dict[str, Predicted]] = [{}, {}]
+    for seed in range(FIRST, FIRST + count):
+        errors = SENSOR.draw(seed)
+        for k, motion in enumerate(motions):
+            imu, _ = simulate_imu(motion, errors, rate=RATE, sampling="mean", seed=seed)
+            increments = motion_increments(imu, interpolation="cubic")
+            if k == 0:
+                fine = align(imu)
+                off = replace(fine.state, sensors=np.zeros_like(fine.state.sensors))
+                used = autonomous_filter(fine)
+            for state, into in zip((fine.state, off), courses[k], strict=True):
+                into.append(go(used, state, increments))
+            if not predicted[k]:
+                if k == 0:
+                    forward = fed_forward(fine, increments)
+                    apart = forward - courses[0][0][0].velocity
+                predicted[k] = {kind: predict(fine, increments, kind) for kind in KINDS}
+    kept = [Kept(tuple(c[0]), tuple(c[1]), p) for c, p in zip(courses, predicted, strict=True)]
+    return Units(kept[0], kept[1], float(np.linalg.norm(apart, axis=1).max()))
+
+
+def fed_forward(fine: FineResult, increments: pd.DataFrame) -> Array:
+    """Return the velocity north and east with estimates taken off what is shown, (n, 2), m/s."""
+    used = autonomous_filter(fine)
+    navigator = Navigator(used, damping=Feedforward())
+    ends, rows = after(increments, fine.state.time)
+    _, piece = navigator.advance(navigator.begin_from(fine.state), ends, rows)
+    path = used.mechanization.trajectory(piece.time, piece.history)
+    every = round(RATE * EVERY)
+    return path[["VN", "VE"]].to_numpy()[every - 1 :: every]
+
+
+# ==================================================================================================
+# Figs. 8 to 11: an hour without aids, sensor drifts damped and not
+# ==================================================================================================
 
 #: After the alignment, s.
 TIMES = (60.0, 300.0, 1200.0, 3590.0)

@@ -9,8 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from papers.chernodarov.autonomous import after
-from papers.chernodarov.setting import ELLIPSOID, HEADING_DEG, SENSOR, SITE, align
+from papers.chernodarov.bench import ELLIPSOID, HEADING_DEG, SENSOR, SITE, after, align
 from strapdown.aiding import Gnss
 from strapdown.alignment import FineResult
 from strapdown.earth import radii_of_curvature

@@ -9,19 +9,10 @@ from functools import cached_property
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from papers.chernodarov import (
-    damping,
-    drifts,
-    equations,
-    printed_update,
-    robustness,
-    signals,
-    states,
-    unpublished,
-)
+from papers.chernodarov import damping, equations, robustness, signals, states
 from papers.chernodarov.bench import Bench, bench
+from papers.chernodarov.damping import Units, units
 from papers.chernodarov.drive import Drive
-from papers.chernodarov.units import Units, units
 from papers.reproduction import (
     CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
@@ -35,8 +26,6 @@ from papers.reproduction import (
 )
 from strapdown.estimation import QuaternionModel
 from strapdown.mechanization import WanderAzimuth
-
-__all__ = ["PAPER", "reproduce_chernodarov"]
 
 PAPER = (
     "A. Chernodarov, Bench Development of Navigation Algorithms by Application of Object-Oriented "
@@ -144,22 +133,22 @@ def headline(made: Reproduction) -> str:
 
 def _signals(made: Bench) -> Part:
     return (
-        [signals.smoothed(made), signals.phase(), *unpublished.unpublished()],
+        [signals.smoothed(made), signals.phase(), *robustness.unpublished()],
         [],
-        signals.figures(made),
+        signals.signal_figures(made),
     )
 
 
 def _drifts(made: Bench) -> Part:
     return (
         [
-            drifts.follows(made),
-            drifts.predicted(made),
-            drifts.accelerometers(made),
-            drifts.attitude_and_drifts(made),
+            signals.follows(made),
+            signals.predicted(made),
+            signals.accelerometers(made),
+            signals.attitude_and_drifts(made),
         ],
         [],
-        drifts.figures(made),
+        signals.drift_figures(made),
     )
 
 
@@ -199,8 +188,8 @@ def _equations(made: _Made) -> Part:
             equations.gravitational(),
             equations.longitude(made.bench.undamped),
             equations.radius(),
-            printed_update.undeflated(printed_update.fix_after_the_hour(hour)),
-            printed_update.once(hour),
+            equations.undeflated(equations.fix_after_the_hour(hour)),
+            equations.once(hour),
         ],
         [],
         [],

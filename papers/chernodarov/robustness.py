@@ -17,8 +17,9 @@ from papers.chernodarov.drive import (
     Drive,
     Driven,
 )
-from papers.chernodarov.printed_update import one_step
+from papers.chernodarov.equations import one_step
 from papers.reproduction import (
+    CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
     HOLDS,
     HOLDS_WHEN,
@@ -362,3 +363,37 @@ def turned_drive_from(damped: float, undamped: float, sd: float) -> Statement:
             Evidence("as the filter states", sd, "m"),
         ),
     )
+
+
+# ==================================================================================================
+# What rests on recordings and curves that are not there
+# ==================================================================================================
+
+FIGURES = (4, 11)
+
+
+def unpublished() -> list[Statement]:
+    """Return them."""
+    return [
+        Statement(
+            "curves",
+            "Section 4, Figs. 4-11",
+            "Certain of the results of a testbed experiment on the estimation of accuracy "
+            "characteristics of the SINS 1000 system are shown in Figs.4-7.",
+            CANNOT_BE_JUDGED,
+            "",
+            "The curves did not survive scanning and the text gives none of their numbers: no "
+            "error, no drift, no duration. The recordings were not published.",
+            (Evidence("figures without a number", float(FIGURES[1] - FIGURES[0] + 1)),),
+        ),
+        Statement(
+            "made-to-order",
+            "Section 4",
+            "The studies conducted have corroborated the fact that it is effective to apply the "
+            "object-oriented technology to the creation of SINSs which can be made to order.",
+            CANNOT_BE_JUDGED,
+            "",
+            "No other way of creating one was tried, and no effort is stated.",
+            (Evidence("systems compared", 1.0),),
+        ),
+    ]

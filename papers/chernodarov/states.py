@@ -8,9 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from papers.chernodarov.autonomous import go
-from papers.chernodarov.bench import Bench
-from papers.chernodarov.setting import ELLIPSOID, END, FINE_END, SITE, align
+from papers.chernodarov.bench import ELLIPSOID, END, FINE_END, SITE, Bench, align, go
 from papers.reproduction import (
     DOES_NOT_HOLD,
     HOLDS,

@@ -16,25 +16,8 @@ from papers.reproduction import (
     put_together,
     silent,
 )
-from papers.tadic import (
-    better_sensors,
-    change_of_speed,
-    directions,
-    displacement,
-    earth_terms,
-    equations,
-    error_budget,
-    ground_truth,
-    mounting,
-    ranking,
-    raw_data,
-    ringing,
-    sampling_rate,
-    sensors,
-)
+from papers.tadic import directions, displacement, equations, experiment, mounting, sensors
 from papers.tadic.experiment import RUNS, Experiments, run_experiment
-
-__all__ = ["PAPER", "reproduce_tadic"]
 
 PAPER = (
     "S. Tadic, M. B. Vukajlovic, Experimental Verification of Inertial Navigation with MEMS for "
@@ -155,28 +138,28 @@ def _equations() -> Part:
 
 
 def _longer(made: Experiments) -> Part:
-    costs, own = earth_terms.costs(), earth_terms.sensor(made)
+    costs, own = equations.costs(), equations.sensor(made)
     return (
         [
-            earth_terms.coriolis(costs["no Coriolis term"], own),
-            earth_terms.earth_rate(costs["no Earth rate"], own),
-            ranking.ranking(ranking.ranked()),
-            ranking.time_and_distance(ranking.growth()),
+            equations.coriolis(costs["no Coriolis term"], own),
+            equations.earth_rate(costs["no Earth rate"], own),
+            equations.ranking(equations.ranked()),
+            equations.time_and_distance(equations.growth()),
         ],
-        [earth_terms.table(costs, own)],
+        [equations.table(costs, own)],
         [],
     )
 
 
 def _sampling() -> Part:
-    still, ring = sampling_rate.rates()
+    still, ring = mounting.rates()
     return (
         [
-            sampling_rate.above_100(still, ring),
-            sampling_rate.pulses(),
-            sampling_rate.receiver(),
+            mounting.above_100(still, ring),
+            mounting.pulses(),
+            mounting.receiver(),
         ],
-        [sampling_rate.table(still, ring)],
+        [mounting.rate_table(still, ring)],
         [],
     )
 
@@ -197,34 +180,34 @@ def _sensors(made: Experiments) -> Part:
 
 
 def _better() -> Part:
-    found = tuple(better_sensors.short(name) for name in better_sensors.SENSORS)
+    found = tuple(sensors.short(name) for name in sensors.COMPARED)
     return (
         [
-            better_sensors.reference_10(found),
-            better_sensors.satellites(better_sensors.tied()),
+            sensors.reference_10(found),
+            sensors.satellites(sensors.tied()),
         ],
-        [better_sensors.short_table(found)],
+        [sensors.short_table(found)],
         [],
     )
 
 
 def _raw(made: Experiments) -> Part:
     return (
-        [raw_data.saturated(made), raw_data.low_g_calibrates(made)],
+        [experiment.saturated(made), experiment.low_g_calibrates(made)],
         [],
-        [raw_data.figure(made.first)],
+        [experiment.figure(made.first)],
     )
 
 
 def _directions(made: Experiments) -> Part:
     return (
         [
-            change_of_speed.severity(made),
+            directions.severity(made),
             directions.vertical_consistent(made),
             directions.frames_agree(made),
         ],
         [directions.table(made.first)],
-        [directions.figure(made.first), change_of_speed.figure(made.first)],
+        [directions.figure(made.first), directions.speed_figure(made.first)],
     )
 
 
@@ -238,17 +221,17 @@ def _mounting() -> Part:
 
 
 def _displacement(made: Experiments) -> Part:
-    rings = ringing.rung()
+    rings = displacement.rung()
     return (
         [
             displacement.decimetre(made, rings),
-            error_budget.extra_sources(made),
-            ringing.vibrations(rings, ringing.silent()),
-            ground_truth.same_entry(made),
-            ground_truth.ground_truth(made),
+            displacement.extra_sources(made),
+            displacement.vibrations(rings, displacement.silent()),
+            experiment.same_entry(made),
+            experiment.ground_truth(made),
             displacement.all_four(made),
-            error_budget.error_causes(made),
+            displacement.error_causes(made),
         ],
-        [displacement.errors_table(made), error_budget.budget_table(made)],
+        [displacement.errors_table(made), displacement.budget_table(made)],
         [displacement.figure(made.first)],
     )

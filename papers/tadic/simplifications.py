@@ -36,19 +36,6 @@ from strapdown.simulation import (
 )
 from strapdown.tables import NED, VELOCITY
 
-__all__ = [
-    "ERRORS",
-    "SIMPLIFICATIONS",
-    "TRIPS",
-    "Trip",
-    "error_course",
-    "mechanization_errors",
-    "predicted_errors",
-    "sensor_errors",
-    "sensor_increments",
-    "straight",
-]
-
 Array = NDArray[np.float64]
 
 #: Columns of the tables made here: largest of each over the trip.

@@ -9,20 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from papers.alexiev import (
-    biases,
-    commutation,
-    effort,
-    fig4,
-    fig4_approach,
-    fig5,
-    fig6,
-    formulas,
-    growth,
-    phone_sensors,
-    reference_points,
-    signals,
-)
+from papers.alexiev import fig4, fig5, fig6, formulas, growth, motions
 from papers.alexiev import paper as system
 from papers.page import curves_json, reproduction_json
 from papers.reproduction import (
@@ -132,21 +119,18 @@ def test_the_greatest_pitch_of_fig4_is_the_angle_between_its_axis_and_x(made):
 
 
 def test_the_error_before_90_is_of_first_order_and_the_steps_own():
-    slow, fast = fig4_approach.approach(1000.0), fig4_approach.approach(2000.0)
+    slow, fast = fig4.approach(1000.0), fig4.approach(2000.0)
     # Half the step, half the error; the next term is of the order of the step.
     assert slow.at(45.0) / fast.at(45.0) == pytest.approx(2.0, rel=0.01)
-    assert (
-        fig4_approach.approach(100.0, "rk4").at(45.0)
-        < 1e-6 * fig4_approach.approach(100.0).at(45.0) + 1e-7
-    )
+    assert fig4.approach(100.0, "rk4").at(45.0) < 1e-6 * fig4.approach(100.0).at(45.0) + 1e-7
 
 
 def test_before_90_turns_with_its_numbers():
-    found = tuple(fig4_approach.approach(r) for r in (20.0, 100.0))
-    smooth = fig4_approach.approach(100.0, "rk4")
-    assert fig4_approach.before_ninety(found, smooth).verdict == HOLDS
+    found = tuple(fig4.approach(r) for r in (20.0, 100.0))
+    smooth = fig4.approach(100.0, "rk4")
+    assert fig4.before_ninety(found, smooth).verdict == HOLDS
     none = tuple(replace(a, roll=0.0 * a.roll, heading=1e-12 + 0.0 * a.heading) for a in found)
-    assert fig4_approach.before_ninety(none, smooth).verdict == DOES_NOT_HOLD
+    assert fig4.before_ninety(none, smooth).verdict == DOES_NOT_HOLD
 
 
 def test_instability_turns_where_the_error_falls_with_the_rate():
@@ -189,17 +173,15 @@ def test_the_closed_form_of_small_turns(order):
     theta = np.radians(angles)
     # The next terms of the series are products of three angles, each of a factor of one at most.
     bound = np.degrees(theta**3)
-    assert np.all(
-        np.abs(commutation.measured(angles, order) - commutation.closed_form(angles, order)) < bound
-    )
+    assert np.all(np.abs(fig5.measured(angles, order) - fig5.closed_form(angles, order)) < bound)
 
 
 def test_the_turn_that_costs_a_degree():
     for order in ("together", "x then y"):
-        angle = commutation.angle_for(1.0, order)
-        assert commutation.naive_reading_error(angle, order) == pytest.approx(1.0, abs=1e-9)
+        angle = fig5.angle_for(1.0, order)
+        assert fig5.naive_reading_error(angle, order) == pytest.approx(1.0, abs=1e-9)
     # Closed form: θ² = 1°, with a correction of the order of θ.
-    assert commutation.angle_for(1.0, "x then y") == pytest.approx(7.57, rel=0.02)
+    assert fig5.angle_for(1.0, "x then y") == pytest.approx(7.57, rel=0.02)
 
 
 def test_no_rate_removes_it(made):
@@ -207,9 +189,9 @@ def test_no_rate_removes_it(made):
     at_100 = evidence(made, key, "turns of 5° to 8°, 100 Hz")
     # What the trapezoid adds at 100 Hz where edges share a step.
     assert evidence(made, key, "the same, 10 kHz") == pytest.approx(at_100, abs=1e-3)
-    turned = commutation.good_at_high_rate(1.0, 1e-3, 10.0, 1e-2, 10.7, 7.6)
+    turned = fig5.good_at_high_rate(1.0, 1e-3, 10.0, 1e-2, 10.7, 7.6)
     assert turned.verdict == HOLDS
-    assert commutation.good_at_high_rate(5.0, 5.0, 90.0, 90.0, 1, 1).verdict == DOES_NOT_HOLD
+    assert fig5.good_at_high_rate(5.0, 5.0, 90.0, 90.0, 1, 1).verdict == DOES_NOT_HOLD
 
 
 def test_fig5_turns_with_its_numbers():
@@ -238,8 +220,8 @@ def test_fig6_costs_what_the_rate_costs(made):
 def test_the_reason_turns_with_its_numbers():
     slow = fig6.AtRate(20.0, 17.6, 8.9, 0.8, 1.0, 170.0)
     fast = replace(slow, rate=1000.0, dropped=0.007)
-    poor = phone_sensors.SensorCost("poor", 8.0, 0.001, 20.0, 0.05)
-    fine = phone_sensors.SensorCost("fine", 0.001, 0.001, 0.01, 0.01)
+    poor = fig6.SensorCost("poor", 8.0, 0.001, 20.0, 0.05)
+    fine = fig6.SensorCost("fine", 0.001, 0.001, 0.01, 0.01)
     assert fig6.rate_is_the_reason(slow, fast, (fine,)).verdict == HOLDS
     assert fig6.rate_is_the_reason(slow, fast, (poor,)).verdict == HOLDS_WHEN
     assert fig6.rate_is_the_reason(slow, slow, (fine,)).verdict == DOES_NOT_HOLD
@@ -248,19 +230,19 @@ def test_the_reason_turns_with_its_numbers():
     assert other(slow, 1e-12, (fine,)).verdict == HOLDS_WHEN
     assert other(replace(slow, cubic=17.0, rotation_vector=17.0), 0.0, (fine,)).verdict == HOLDS
     assert other(slow, 1.0, (fine,)).verdict == DOES_NOT_HOLD
-    assert phone_sensors.stable_at_rest((fine,)).verdict == HOLDS
-    assert phone_sensors.stable_at_rest((poor,)).verdict == HOLDS_WHEN
-    assert phone_sensors.stable_at_rest((replace(poor, resting_free=3.0),)).verdict == DOES_NOT_HOLD
+    assert fig6.stable_at_rest((fine,)).verdict == HOLDS
+    assert fig6.stable_at_rest((poor,)).verdict == HOLDS_WHEN
+    assert fig6.stable_at_rest((replace(poor, resting_free=3.0),)).verdict == DOES_NOT_HOLD
 
 
 def test_a_return_hides_a_scale_factor():
-    at_return, largest = reference_points.scale_seen(0.03)
+    at_return, largest = fig6.scale_seen(0.03)
     # Three per cent of 90° and half a step of the trapezoid at either edge: 0.45° at 100 Hz.
     assert largest == pytest.approx(2.7, abs=0.46)
     assert at_return < 1e-9
-    assert reference_points.reference_points(at_return, largest, 17.0, 18.0).verdict == HOLDS_WHEN
-    assert reference_points.reference_points(largest, largest, 17.0, 18.0).verdict == HOLDS
-    assert reference_points.reference_points(0.0, largest, 0.1, 18.0).verdict == DOES_NOT_HOLD
+    assert fig6.reference_points(at_return, largest, 17.0, 18.0).verdict == HOLDS_WHEN
+    assert fig6.reference_points(largest, largest, 17.0, 18.0).verdict == HOLDS
+    assert fig6.reference_points(0.0, largest, 0.1, 18.0).verdict == DOES_NOT_HOLD
 
 
 # --- growth ---------------------------------------------------------------------------------
@@ -289,11 +271,11 @@ def test_the_laws_are_measured_and_not_assumed():
 
 
 def test_who_leads_when():
-    assert biases.gyros_lead({"a": 3.0}).verdict == HOLDS_WHEN
-    assert biases.gyros_lead({"a": 0.0}).verdict == HOLDS
-    assert biases.gyros_lead({"a": np.inf}).verdict == DOES_NOT_HOLD
-    assert biases.earth_rate_small({"a": 1.0}).verdict == HOLDS_WHEN
-    assert biases.earth_rate_small({"a": 0.001}).verdict == DOES_NOT_HOLD
+    assert growth.gyros_lead({"a": 3.0}).verdict == HOLDS_WHEN
+    assert growth.gyros_lead({"a": 0.0}).verdict == HOLDS
+    assert growth.gyros_lead({"a": np.inf}).verdict == DOES_NOT_HOLD
+    assert growth.earth_rate_small({"a": 1.0}).verdict == HOLDS_WHEN
+    assert growth.earth_rate_small({"a": 0.001}).verdict == DOES_NOT_HOLD
 
 
 # --- formulas, effort, motions --------------------------------------------------------------
@@ -321,27 +303,27 @@ def test_a_sign_that_is_wrong_in_8_to_10_is_found(monkeypatch):
 
 
 def test_effort_turns_with_its_numbers():
-    costs = {c.algorithm: c for c in effort.costs()}
-    assert effort.compromise(tuple(costs.values())).verdict == HOLDS_WHEN
+    costs = {c.algorithm: c for c in motions.costs()}
+    assert motions.compromise(tuple(costs.values())).verdict == HOLDS_WHEN
     costs["euler"] = replace(costs["euler"], cycles=50.0)
-    assert effort.compromise(tuple(costs.values())).verdict == HOLDS
+    assert motions.compromise(tuple(costs.values())).verdict == HOLDS
     costs["naive"] = replace(costs["naive"], cycles=500.0)
-    assert effort.compromise(tuple(costs.values())).verdict == DOES_NOT_HOLD
+    assert motions.compromise(tuple(costs.values())).verdict == DOES_NOT_HOLD
 
 
 def test_the_closing_sentence_turns_with_the_table(made):
     table = next(t for t in made.tables if t.slug == "scenarios")
-    assert signals.practical(table).verdict == HOLDS_WHEN
+    assert motions.practical(table).verdict == HOLDS_WHEN
     for error, verdict in ((0.1, HOLDS), (90.0, DOES_NOT_HOLD)):
         rows = tuple((name, (error, *row[1:])) for name, row in table.rows)
-        assert signals.practical(replace(table, rows=rows)).verdict == verdict
+        assert motions.practical(replace(table, rows=rows)).verdict == verdict
 
 
 def test_excellence_turns_with_its_numbers():
-    assert signals.excellent(0.0, 0.0, 17.6, 0.007, 20.0, 1000.0).verdict == HOLDS_WHEN
-    assert signals.excellent(0.0, 0.0, 0.1, 0.007, 20.0, 1000.0).verdict == HOLDS
-    assert signals.excellent(1.0, 0.0, 17.6, 0.007, 20.0, 1000.0).verdict == DOES_NOT_HOLD
-    assert signals.excellent(0.0, 0.0, 17.6, 17.6, 20.0, 1000.0).verdict == DOES_NOT_HOLD
+    assert motions.excellent(0.0, 0.0, 17.6, 0.007, 20.0, 1000.0).verdict == HOLDS_WHEN
+    assert motions.excellent(0.0, 0.0, 0.1, 0.007, 20.0, 1000.0).verdict == HOLDS
+    assert motions.excellent(1.0, 0.0, 17.6, 0.007, 20.0, 1000.0).verdict == DOES_NOT_HOLD
+    assert motions.excellent(0.0, 0.0, 17.6, 17.6, 20.0, 1000.0).verdict == DOES_NOT_HOLD
 
 
 # --- the form -------------------------------------------------------------------------------

@@ -11,18 +11,7 @@ import numpy as np
 import pytest
 from tests.same_picture import PINNED, same_picture
 
-from papers.chernodarov import (
-    damping,
-    drifts,
-    drive,
-    equations,
-    printed_update,
-    robustness,
-    signals,
-    states,
-    units,
-    unpublished,
-)
+from papers.chernodarov import damping, drive, equations, robustness, signals, states
 from papers.chernodarov import paper as system
 from papers.page import looks, reproduction_page, svg
 from papers.reproduction import (
@@ -186,12 +175,12 @@ def test_undeflated_columns_add_and_deflated_ones_take():
     P = np.diag([100.0, 4.0])
     H, R = np.eye(2)[:1], np.array([1.0])
     # K = 100/101: K r K' comes on top of 100.
-    printed = printed_update.printed_columns(P, H, R)
+    printed = equations.printed_columns(P, H, R)
     np.testing.assert_allclose(printed, np.diag([100.0 + (100 / 101) ** 2, 4.0]), atol=1e-12)
 
 
 def test_one_newton_step_goes_where_the_theory_notes_say():
-    printed, minimiser, kalman = printed_update.one_step()
+    printed, minimiser, kalman = equations.one_step()
     assert printed == pytest.approx(134.5, abs=0.05)
     assert minimiser == pytest.approx(9.90, abs=0.005)
     assert kalman == pytest.approx(1000.0 / 101.0)
@@ -219,14 +208,14 @@ def test_outliers_are_as_many_and_as_far_as_is_said():
 
 
 def test_the_table_turns_by_half_a_turn_and_stands_otherwise():
-    still, turned = (units.table_motion(k) for k in (False, True))
+    still, turned = (damping.table_motion(k) for k in (False, True))
     at = np.array([0.0, 600.0, 620.0, 4000.0])
     np.testing.assert_allclose(still.trajectory(at)["heading"], 40.0, atol=1e-9)
     np.testing.assert_allclose(turned.trajectory(at)["heading"], [40, 40, 220, 220], atol=1e-9)
 
 
 def test_a_unit_is_the_same_every_time_and_gains_at_rest_alone():
-    one, again = units.units(1), units.units(1)
+    one, again = damping.units(1), damping.units(1)
     assert one.forward_apart == again.forward_apart
     # Errors of 1e-4 rad and 0.5 m/s to first order: their products with the turn of the place,
     # and the covariance's steps of 0.1 s, are parts of 1e-3.
@@ -257,19 +246,19 @@ def test_signals_turn():
 
 
 def test_drifts_turn():
-    blind = drifts.Learnt((1.0,) * 3, (0.3, 1.0, 0.3), (1.0,) * 3, (1.0, 1.0, 0.03), -0.96, 0.99)
-    seen = drifts.Learnt((1.0,) * 3, (0.3,) * 3, (1.0,) * 3, (0.1,) * 3, -0.1, 0.1)
+    blind = signals.Learnt((1.0,) * 3, (0.3, 1.0, 0.3), (1.0,) * 3, (1.0, 1.0, 0.03), -0.96, 0.99)
+    seen = signals.Learnt((1.0,) * 3, (0.3,) * 3, (1.0,) * 3, (0.1,) * 3, -0.1, 0.1)
     near, far = (0.013, 0.0134, 0.014, -0.004, 0.003, 50), (0.05, 0.0134, 0.014, 0.04, 0.003, 50)
-    assert drifts.follows_from(*near, blind).verdict == HOLDS_WHEN
-    assert drifts.follows_from(*near, seen).verdict == HOLDS
-    assert drifts.follows_from(*far, seen).verdict == DOES_NOT_HOLD
-    assert drifts.predicted_from(0.01, 0.02, 0.01, 0.007).verdict == HOLDS_WHEN
-    assert drifts.predicted_from(0.02, 0.02, 0.01, 0.007).verdict == DOES_NOT_HOLD
+    assert signals.follows_from(*near, blind).verdict == HOLDS_WHEN
+    assert signals.follows_from(*near, seen).verdict == HOLDS
+    assert signals.follows_from(*far, seen).verdict == DOES_NOT_HOLD
+    assert signals.predicted_from(0.01, 0.02, 0.01, 0.007).verdict == HOLDS_WHEN
+    assert signals.predicted_from(0.02, 0.02, 0.01, 0.007).verdict == DOES_NOT_HOLD
     biases = ([1e-3] * 3, [1e-3] * 3)
-    assert drifts.accelerometers_from(*biases, blind).verdict == HOLDS_WHEN
-    assert drifts.accelerometers_from(*biases, seen).verdict == HOLDS
-    assert drifts.attitude_and_drifts_from(blind).verdict == HOLDS_WHEN
-    assert drifts.attitude_and_drifts_from(seen).verdict == HOLDS
+    assert signals.accelerometers_from(*biases, blind).verdict == HOLDS_WHEN
+    assert signals.accelerometers_from(*biases, seen).verdict == HOLDS
+    assert signals.attitude_and_drifts_from(blind).verdict == HOLDS_WHEN
+    assert signals.attitude_and_drifts_from(seen).verdict == HOLDS
 
 
 def test_damping_turns():
@@ -315,13 +304,11 @@ def test_states_turn():
 
 
 def test_updates_turn():
-    fixed = printed_update.Fixed(960.0, 960.0, 4.2, 4.2, 0.0)
-    assert printed_update.undeflated(fixed).verdict == DOES_NOT_HOLD
-    assert (
-        printed_update.undeflated(printed_update.Fixed(960.0, 4.2, 4.2, 4.2, 0.0)).verdict == HOLDS
-    )
-    assert printed_update.once_from(1e-14).verdict == HOLDS
-    assert printed_update.once_from(1e-3).verdict == DOES_NOT_HOLD
+    fixed = equations.Fixed(960.0, 960.0, 4.2, 4.2, 0.0)
+    assert equations.undeflated(fixed).verdict == DOES_NOT_HOLD
+    assert equations.undeflated(equations.Fixed(960.0, 4.2, 4.2, 4.2, 0.0)).verdict == HOLDS
+    assert equations.once_from(1e-14).verdict == HOLDS
+    assert equations.once_from(1e-3).verdict == DOES_NOT_HOLD
 
 
 def test_the_drive_turns():
@@ -336,7 +323,7 @@ def test_the_drive_turns():
     assert judge(2.9, 0.84, 0.81, 0.86).verdict == HOLDS
     assert judge(2.9, 9.0, 0.81, 0.86).verdict == DOES_NOT_HOLD
     judge = robustness.newton_from
-    step = printed_update.one_step()
+    step = equations.one_step()
     assert judge(step, 880.0, 0.03, 0.03, -1e-3).verdict == HOLDS_WHEN
     assert judge((9.9, 9.9, 9.9), 880.0, 0.03, 0.03, -1e-3).verdict == DOES_NOT_HOLD
     assert judge(step, 0.03, 0.03, 0.03, 1e-3).verdict == HOLDS
@@ -346,4 +333,4 @@ def test_the_drive_turns():
 
 
 def test_what_was_not_published_is_not_judged():
-    assert {s.verdict for s in unpublished.unpublished()} == {CANNOT_BE_JUDGED}
+    assert {s.verdict for s in robustness.unpublished()} == {CANNOT_BE_JUDGED}

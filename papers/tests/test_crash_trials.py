@@ -8,18 +8,24 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from papers.crash_trials.coverage import coverage
-from papers.crash_trials.degradation import degradation, degradation_table
-from papers.crash_trials.many_cases import each_case
-from papers.crash_trials.paper_experiment import RINGINGS, paper_experiment
-from papers.crash_trials.ringing_at_200_hz import perfect_sensors, ringing_at_200_hz
-from papers.crash_trials.short_error_model import (
+from papers.crash_trials.cases import TrialPriors, Untold, draw_case
+from papers.crash_trials.outcomes import (
+    coverage,
+    degradation,
+    degradation_table,
+    each_case,
+    judge_case,
+    reconstruct_case,
+)
+from papers.crash_trials.pole_runs import (
+    RINGINGS,
     ideal_design,
+    paper_experiment,
+    perfect_sensors,
+    ringing_at_200_hz,
     short_design,
     without_a_rest,
 )
-from papers.crash_trials.trial_case import TrialPriors, Untold, draw_case
-from papers.crash_trials.trial_outcome import judge_case, reconstruct_case
 from strapdown import reconstruct_crash
 from strapdown.crash import Entry, sample_paths
 from strapdown.exceptions import ConfigError

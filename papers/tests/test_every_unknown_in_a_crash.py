@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from papers.crash_trials.trial_case import TrialPriors, draw_case
-from papers.crash_trials.trial_outcome import END, reconstruct_case
+from papers.crash_trials.cases import TrialPriors, draw_case
+from papers.crash_trials.outcomes import END, reconstruct_case
 from strapdown import rotation
 from strapdown.simulation import ExactAnswers
 from strapdown.tables import NED
