@@ -185,7 +185,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A paper, re-made.
+    """A reproduced paper.
 
     Attributes
     ----------

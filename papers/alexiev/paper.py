@@ -1,4 +1,4 @@
-"""Alexiev (2021), re-made: every testable statement with a verdict from numbers of this run."""
+"""Alexiev (2021), reproduced: every testable statement with a verdict from numbers of this run."""
 
 from __future__ import annotations
 

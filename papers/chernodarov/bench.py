@@ -1,4 +1,4 @@
-"""Where and with what Chernodarov (2009) is re-made: place, sensors, stages, modules."""
+"""Where and with what Chernodarov (2009) is reproduced: place, sensors, stages, modules."""
 
 from __future__ import annotations
 

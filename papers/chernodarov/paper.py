@@ -1,4 +1,4 @@
-"""Chernodarov (2009), re-made: bench run and drive, every testable statement with a verdict."""
+"""Chernodarov (2009), reproduced: bench run and drive, every testable statement with a verdict."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds for the statements of each re-made paper, and for their page in the manual."""
+"""What holds for the statements of each reproduced paper, and for their page in the manual."""
 
 from __future__ import annotations
 

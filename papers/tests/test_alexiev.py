@@ -1,4 +1,4 @@
-"""Alexiev (2021) re-made: every verdict follows from numbers, and other numbers turn it."""
+"""Alexiev (2021) reproduced: every verdict follows from numbers, and other numbers turn it."""
 
 from __future__ import annotations
 

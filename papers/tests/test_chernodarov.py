@@ -1,4 +1,4 @@
-"""Chernodarov (2009) re-made: every verdict follows from numbers, and other numbers turn it."""
+"""Chernodarov (2009) reproduced: every verdict follows from numbers, and other numbers turn it."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def test_the_page_has_the_statements_of_this_code(made):
 @pytest.mark.parametrize("slug", ["fig6", "turned", "printed-step"])
 def test_a_picture_of_the_manual_is_what_is_drawn_now(made, slug, tmp_path):
     picture = svg(next(f for f in made.figures if f.slug == slug))
-    shown = PAGE.parent / "images" / f"chernodarov_{slug}.svg"
+    shown = PAGE.parent / "images" / f"{slug}.svg"
     if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
         shown.write_text(picture, encoding="utf-8")
     (tmp_path / "now.svg").write_text(picture, encoding="utf-8")

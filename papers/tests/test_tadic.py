@@ -1,4 +1,4 @@
-"""Tadic (2016) re-made: every verdict follows from numbers, and other numbers turn it."""
+"""Tadic (2016) reproduced: every verdict follows from numbers, and other numbers turn it."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ def test_the_page_has_the_statements_of_this_code(made):
 @pytest.mark.parametrize("slug", ["fig9", "pdof-ringing"])
 def test_a_picture_of_the_manual_is_what_is_drawn_now(made, slug, tmp_path):
     picture = svg(next(f for f in made.figures if f.slug == slug))
-    shown = PAGE.parent / "images" / f"tadic_{slug}.svg"
+    shown = PAGE.parent / "images" / f"{slug}.svg"
     if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
         shown.write_text(picture, encoding="utf-8")
     (tmp_path / "now.svg").write_text(picture, encoding="utf-8")

@@ -138,6 +138,12 @@ def verify(bundle: str | Path) -> Verification:
         changes += changed_case(root, manifest)
     if changes:
         return Verification("changed", math.inf, digest, tuple(changes))
+    if manifest["command"] == "reproduce":
+        raise DataError(
+            "it is a reproduced paper, and such bundles are not verified any more",
+            file=MANIFEST,
+            remedy="run python -m papers.NAME in the source of strapdown, which writes it again",
+        )
     if manifest["command"] not in RERUNS:
         raise DataError(
             f"its command '{manifest['command']}' is not known",
