@@ -1,4 +1,4 @@
-"""Tadic and Vukajlovic (2016), reproduced: every testable statement with a verdict from this run."""
+"""Tadic and Vukajlovic (2016), reproduced: every testable statement with a verdict from numbers."""
 
 from __future__ import annotations
 
