@@ -180,7 +180,7 @@ def _naive() -> Part:
                 fig5.angle_for(fig5.GOOD, "x then y"),
             ),
             fig5.very_good_at_high_rate(high, high_large),
-            fig5.differs_at_low_rate(low, high, low_large),
+            fig5.differs_at_low_rate(low, high, low_large, fig5.over_many_motions()),
         ],
         [fig5.table()],
         [fig5.figure(), fig5.angle_figure(), fig5.rate_figure()],

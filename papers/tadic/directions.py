@@ -36,6 +36,7 @@ from strapdown.crash import (
 
 Array = NDArray[np.float64]
 
+KNOWN = 0.95  # of the delta-V: then it is as good as known
 WINDOW = 0.030  # s: "the short time-window (herein 30 ms)"
 SPEED_SHOWN = (-0.02, 0.20)  # s
 
@@ -115,6 +116,46 @@ def severity_from(peak: float, whole: float) -> Statement:
             Evidence("largest in 30 ms", peak, "m/s"),
             Evidence("whole event", whole, "m/s"),
             Evidence("share", 100.0 * share, "%"),
+        ),
+        "fig8",
+    )
+
+
+def urgency(made: Experiments) -> Statement:
+    """Judge that URGENCY detects a crash: what is known at the detection, and what it needs."""
+    shares, times = [], []
+    for e in made.all:
+        for name in PLATFORMS:
+            unit = e.platform(name)
+            event, whole = unit.events.events[0], unit.body[0].event
+            known = delta_v(unit.acceleration, event.time_zero, event.trigger).vector
+            shares.append(float(np.linalg.norm(known)) / whole.resultant)
+            times.append((event.trigger - event.time_zero, whole.delta_v.end - event.time_zero))
+    at, end = np.mean(times, axis=0)
+    return urgency_from(float(np.mean(shares)), float(at), float(end))
+
+
+def urgency_from(share: float, detected: float, ended: float) -> Statement:
+    """Judge from the share of the delta-V that is known at the detection, and both instants, s.
+
+    URGENCY (Malliaris, Digges and DeBlois 1997) is a logistic model of the probability of a
+    serious injury. Its first input is the delta-V of the crash, so that it can answer at the
+    detection only if the whole of it is known by then.
+    """
+    return Statement(
+        "urgency",
+        "Section 4",
+        "Crash is usually detected by URGENCY [18], [19] algorithm.",
+        HOLDS if share > KNOWN else DOES_NOT_HOLD,
+        "",
+        "URGENCY gives the probability of an injury from the delta-V of a crash, its direction, "
+        "belts, age and rollover; it presumes a crash that has been detected and has ended. A "
+        "detection compares the change of the speed within a short window with a threshold (49 "
+        "CFR 563: 8 km/h in 150 ms), and happens while most of the delta-V is still to come.",
+        (
+            Evidence("detection, after time zero", 1e3 * detected, "ms"),
+            Evidence("end of the event, after time zero", 1e3 * ended, "ms"),
+            Evidence("share of the delta-V that is known at the detection", 100.0 * share, "%"),
         ),
         "fig8",
     )

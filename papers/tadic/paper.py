@@ -51,7 +51,7 @@ ORDER = (
     *("above-100-hz", "earth-rate", "eq8", "eq16-17", "eq19", "eq20", "coriolis"),
     *("time-and-distance", "ranking", "extra-sources", "vibrations", "piezoelectric"),
     *("same-entry", "own-biases", "worst-bias", "high-g-range", "ground-truth"),
-    *("low-g-saturated", "low-g-calibrates", "bias-proportional", "severity-30-ms"),
+    *("low-g-saturated", "low-g-calibrates", "bias-proportional", "severity-30-ms", "urgency"),
     *("vertical-consistent", "lateral-peak", "causes", "body-and-ned", "all-four-cases"),
     *("error-causes", "satellites"),
 )
@@ -203,6 +203,7 @@ def _directions(made: Experiments) -> Part:
     return (
         [
             directions.severity(made),
+            directions.urgency(made),
             directions.vertical_consistent(made),
             directions.frames_agree(made),
         ],

@@ -9,16 +9,11 @@ import pandas as pd
 import pytest
 
 from papers.crash_trials.cases import TrialPriors, Untold, draw_case
-from papers.crash_trials.outcomes import (
-    coverage,
-    degradation,
-    degradation_table,
-    each_case,
-    judge_case,
-    reconstruct_case,
-)
+from papers.crash_trials.outcomes import coverage, each_case, judge_case, reconstruct_case
 from papers.crash_trials.pole_runs import (
     RINGINGS,
+    degradation,
+    degradation_table,
     ideal_design,
     paper_experiment,
     perfect_sensors,

@@ -300,6 +300,18 @@ def test_small_statements_of_the_displacement_turn():
     ]
 
 
+def test_urgency_turns():
+    assert directions.urgency_from(0.3, 0.02, 0.11).verdict == DOES_NOT_HOLD
+    assert directions.urgency_from(1.0, 0.11, 0.11).verdict == HOLDS
+
+
+def test_a_detection_knows_the_change_that_its_threshold_asks_for(made):
+    # 8 km/h of the pulse of 7.2 m/s: what is known at the detection is the threshold itself, or
+    # a little more where the samples are far apart.
+    share = evidence(made, "urgency", "share of the delta-V that is known at the detection")
+    assert 100.0 * (8.0 / 3.6) / 7.5 < share < 50.0
+
+
 def test_directions_turn():
     frames = directions.frames_from
     early = dict(zip(directions.WINDOWS, (0.1, 0.2, 0.7, 3.0), strict=True))
