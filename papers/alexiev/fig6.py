@@ -412,9 +412,10 @@ def neither_sensor_nor_algorithm(
         verdict,
         "",
         "The record was not published. Both can make such an error. Scale factor and misalignment "
-        f"of phones' gyros, bias taken off, cost {amount(least, '°')} to {amount(most, '°')} on this "
-        f"motion at {SENSOR_RATE:g} Hz. And though DCM and quaternion agree to rounding, an algorithm of higher order leaves "
-        f"{amount(100.0 * best / slow.dropped, '%')} of the error of 20 Hz on samples of 20 Hz.",
+        f"of phones' gyros, bias taken off, cost {amount(least, '°')} to {amount(most, '°')} on "
+        f"this motion at {SENSOR_RATE:g} Hz. And though DCM and quaternion agree to rounding, an "
+        f"algorithm of higher order leaves {amount(100.0 * best / slow.dropped, '%')} of the error "
+        "of 20 Hz on samples of 20 Hz.",
         (
             Evidence("DCM at 20 Hz", slow.dropped, "°"),
             Evidence("DCM and quaternion apart", apart, "°"),
