@@ -334,6 +334,31 @@ def figure(made: Experiment) -> Figure:
     )
 
 
+def points_figure(made: Experiment) -> Figure:
+    """Fig. 7 as points of azimuth and elevation, beside those of Table 2."""
+    panels = []
+    for window in ("detection", "largest 30 ms"):
+        traces = []
+        for name in PLATFORMS:
+            found = _pdof(direction(made, name, window).body)
+            for label, (azimuth, elevation) in (
+                (name, (found.horizontal_deg, found.vertical_deg)),
+                (f"{name}, Table 2", PAPER[name]),
+            ):
+                traces.append(Trace(label, np.array([azimuth]), np.array([elevation]), points=True))
+        panels.append(FigurePanel(f"vertical, °, {window}", tuple(traces)))
+    return Figure(
+        "fig7-points",
+        "Fig. 7: directions of force as points, with those of Table 2",
+        "Azimuth and elevation of the change of the speed over 30 ms, along the vehicle's axes: up "
+        "to the detection, and where it is largest. Platforms that do not ring agree to a degree "
+        "or two with each other and with the front; the paper's recorders on the floor do not.",
+        CHOSEN,
+        "horizontal, °",
+        tuple(panels),
+    )
+
+
 def _pdof_of(vector: Array) -> tuple[float, float]:
     found = pdof(vector)
     return found.horizontal_deg, found.vertical_deg

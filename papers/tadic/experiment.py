@@ -215,6 +215,34 @@ class Experiments:
 # ==================================================================================================
 
 
+def camera_figure(made: Experiment) -> Figure:
+    """Fig. 5: the path of the vehicle as the cameras see it, in plan and in height."""
+    time = made.cameras.index.to_numpy(dtype=np.float64)
+    inside = (time >= 0.0) & (time <= END)
+    seen = made.cameras[NED].to_numpy(dtype=np.float64)[inside]
+    true, _ = made.exact.course(time[inside])
+    seen, true = seen - seen[0], true - true[0]
+    panels = tuple(
+        FigurePanel(
+            label,
+            (
+                Trace("cameras", seen[:, 0], sign * seen[:, axis]),
+                Trace("truth", true[:, 0], sign * true[:, axis], reference=True),
+            ),
+        )
+        for label, axis, sign in (("east, m", 1, 1.0), ("up, m", 2, -1.0))
+    )
+    return Figure(
+        "fig5",
+        "Fig. 5: path of the vehicle as recorded by the cameras",
+        "Path of the marking over 750 ms from the impact on, from the views from above and from "
+        "the side; the vertical scale is not the horizontal one.",
+        CHOSEN,
+        "north, m",
+        panels,
+    )
+
+
 def ground_truth(made: Experiments) -> Statement:
     """Judge the cameras as ground truth."""
     cameras = np.concatenate([e.camera_errors for e in made.all])

@@ -208,7 +208,11 @@ def _directions(made: Experiments) -> Part:
             directions.frames_agree(made),
         ],
         [directions.table(made.first)],
-        [directions.figure(made.first), directions.speed_figure(made.first)],
+        [
+            directions.figure(made.first),
+            directions.points_figure(made.first),
+            directions.speed_figure(made.first),
+        ],
     )
 
 
@@ -217,7 +221,7 @@ def _mounting() -> Part:
     return (
         [mounting.lateral_peak(found), mounting.causes(found)],
         [mounting.table(found)],
-        [mounting.figure()],
+        [mounting.figure(), mounting.ringing_speed_figure()],
     )
 
 
@@ -234,5 +238,5 @@ def _displacement(made: Experiments) -> Part:
             displacement.error_causes(made),
         ],
         [displacement.errors_table(made), displacement.budget_table(made)],
-        [displacement.figure(made.first)],
+        [experiment.camera_figure(made.first), displacement.figure(made.first)],
     )

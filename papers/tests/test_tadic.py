@@ -68,7 +68,9 @@ def test_every_statement_is_there_once_in_the_order_of_the_paper(made):
 
 def test_each_has_a_quote_of_one_sentence_numbers_and_a_figure_that_exists(made):
     check_statements(made)
-    assert {"fig6", "fig7", "fig8", "fig9"} <= {f.slug for f in made.figures}
+    assert {"fig5", "fig6", "fig7", "fig7-points", "fig8", "fig8-ringing", "fig9"} <= {
+        f.slug for f in made.figures
+    }
     assert {"table1", "table2"} <= {t.slug for t in made.tables}
 
 
@@ -298,6 +300,28 @@ def test_small_statements_of_the_displacement_turn():
         HOLDS_WHEN,
         DOES_NOT_HOLD,
     ]
+
+
+def test_a_floor_that_rings_makes_the_lateral_peak_of_fig_8(made):
+    lateral = next(f for f in made.figures if f.slug == "fig8-ringing").panels[1]
+    peak = {t.name: float(np.abs(t.y).max()) for t in lateral.traces}
+    rung = max(peak["IMU, floor rings"], peak["IMU, floor rings, half a sample later"])
+    assert rung > 5.0 * peak["LAB, the same ringing"]
+
+
+def test_the_points_of_fig_7_are_those_of_table_2(made):
+    for panel in next(f for f in made.figures if f.slug == "fig7-points").panels:
+        points = {t.name: (t.x[0], t.y[0]) for t in panel.traces}
+        for name, angles in directions.PAPER.items():
+            assert points[f"{name}, Table 2"] == angles
+
+
+def test_the_cameras_of_fig_5_follow_the_truth(made):
+    for panel in next(f for f in made.figures if f.slug == "fig5").panels:
+        seen, true = panel.traces
+        assert seen.x.shape == true.x.shape
+        assert np.abs(seen.y - true.y).max() < 0.05
+        assert np.abs(seen.y - true.y).max() > 0.0
 
 
 def test_urgency_turns():
