@@ -52,7 +52,7 @@ CONVENTIONS = (
 # As they stand in the paper.
 ORDER = (
     *("continuity", "outliers", "phase", "eq1", "eq2", "eq4", "vertical", "separate"),
-    *("seventeen", "tightly-coupled", "eq5", "eq12-13", "eq14", "eq15"),
+    *("seventeen", "tightly-coupled", "eq5", "eq12-13", "eq14", "eq15", "primary-level"),
     *("attitude-and-drifts", "eq19-20", "comparison", "smoothed", "fig6-estimate"),
     *("fig6-predicted", "fig7", "fig8-9", "fig10-11", "delta-lambda", "radius", "v-north"),
     *("curves", "made-to-order", "organisation"),
@@ -133,7 +133,12 @@ def headline(made: Reproduction) -> str:
 
 def _signals(made: Bench) -> Part:
     return (
-        [signals.smoothed(made), signals.phase(), *robustness.unpublished()],
+        [
+            signals.smoothed(made),
+            signals.primary_level(*signals.primary()),
+            signals.phase(),
+            *robustness.unpublished(),
+        ],
         [],
         signals.signal_figures(made),
     )

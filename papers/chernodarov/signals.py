@@ -36,11 +36,13 @@ from strapdown import rotation
 from strapdown.alignment import FineResult
 from strapdown.constants import DEG_PER_HOUR
 from strapdown.estimation import PHYSICAL
-from strapdown.prefilter import Grid, RobustFir
-from strapdown.tables import ACCEL, GYRO
+from strapdown.prefilter import Grid, RobustFir, RobustWd
+from strapdown.tables import ACCEL, GYRO, imu_table
 
 Array = NDArray[np.float64]
 
+PRIMARY, PRIMARY_SEED = 4.0, 1  # s
+TURN_DEG_S = 10.0
 ARC_SECONDS = DEG_PER_HOUR  # deg/h are arc seconds a second
 CHOSEN = (
     "Sensors of the catalogue's fog-1000, unit 1, at rest at 55.98° north with roll 0.5°, pitch "
@@ -53,6 +55,9 @@ def signal_figures(made: Bench) -> list[Figure]:
     """Return Figs. 4 and 5."""
     time = made.imu.index.to_numpy(dtype=np.float64)
     shown = (time >= SHOWN[0]) & (time <= SHOWN[1])
+    wd = RobustWd(rate=OUTPUT_RATE).apply(
+        imu_table(made.raw_time, made.raw[:, :3], made.raw[:, 3:], sampling="mean")
+    )
     out = []
     for slug, title, channel, column, factor, label in (
         (
@@ -73,21 +78,127 @@ def signal_figures(made: Bench) -> list[Figure]:
         ),
     ):
         smooth = made.imu[channel].to_numpy(dtype=np.float64)[shown]
+        kalman = wd.imu[channel]
         traces = (
             Trace("1 kHz", made.raw_time, factor * made.raw[:, column]),
             Trace("smoothed, 100 Hz", time[shown], factor * smooth),
+            Trace(
+                "W-D filter, 100 Hz",
+                kalman.index.to_numpy(dtype=np.float64),
+                factor * kalman.to_numpy(dtype=np.float64),
+            ),
         )
         out.append(
             Figure(
                 slug,
                 title,
-                "The robust digital filter takes the outliers and most of the noise.",
+                "The robust digital filter takes the outliers and most of the noise; so does the "
+                "W-D filter of (6)-(15) on the same samples, as primary processing.",
                 CHOSEN,
                 "time, s",
                 (FigurePanel(label, traces),),
             )
         )
     return out
+
+
+@dataclass(frozen=True)
+class Primary:
+    """A prefilter on 1 kHz samples of a gyro at rest and in a turn.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation that is left at rest, relative to that of a sample.
+    doubted, turning : int
+        Samples that it takes for outliers, at rest and in the turn.
+    angle : float, deg
+        Error of the turn's angle.
+    """
+
+    noise: float
+    doubted: int
+    turning: int
+    angle: float
+
+
+def primary() -> tuple[Primary, Primary, int]:
+    """Filter four seconds by the digital filter and by (6)-(15).
+
+    Returns
+    -------
+    digital, wd : Primary
+    outliers : int
+        How many there are, in each of the two.
+    """
+    rng = np.random.default_rng(PRIMARY_SEED)
+    time = np.arange(round(PRIMARY * RATE) + 1) / RATE
+    sd = np.repeat([1e-5, 1e-3], 3)  # rad/s, m/s²: the ratios below do not depend on them
+    still = sd * rng.standard_normal((len(time), 6))
+    outliers = still[250::500]  # away from both ends, which the filters do not see alike
+    outliers += OUTLIER_SDS * sd
+    middle = time - 0.5 * PRIMARY
+    rate = np.radians(TURN_DEG_S) * np.where(
+        np.abs(middle) < 1.0, 0.5 * (1.0 + np.cos(np.pi * middle)), 0.0
+    )
+    turned = still.copy()
+    turned[:, 2] += rate
+    found = []
+    for prefilter in (RobustFir(rate=OUTPUT_RATE), RobustWd(rate=OUTPUT_RATE)):
+        rest, turn = (
+            prefilter.apply(imu_table(time, v[:, :3], v[:, 3:], sampling="mean"))
+            for v in (still, turned)
+        )
+        quiet = rest.imu[GYRO[2]].to_numpy(dtype=np.float64)
+        change = turn.imu[GYRO[2]].to_numpy(dtype=np.float64) - quiet
+        found.append(
+            Primary(
+                float(quiet.std()) / sd[2],
+                len(rest.report.replaced),
+                len(turn.report.replaced),
+                float(np.degrees(abs(change.sum() / OUTPUT_RATE - rate.sum() / RATE))),
+            )
+        )
+    return found[0], found[1], outliers.size
+
+
+def primary_level(digital: Primary, wd: Primary, outliers: int) -> Statement:
+    """Judge (6)-(15) as primary processing, from the digital filter's run and its own."""
+    quiet = wd.noise < 1.05 * digital.noise and wd.doubted >= outliers
+    # Of all samples a robust filter may doubt a few that are sound.
+    calm = wd.turning < 2 * outliers
+    if quiet and calm:
+        verdict, condition = HOLDS, ""
+    elif quiet:
+        verdict = HOLDS_WHEN
+        condition = (
+            f"the unit does not turn: in a turn of {TURN_DEG_S:g}°/s the filter takes "
+            f"{wd.turning} samples for outliers where there are {outliers}"
+        )
+    else:
+        verdict, condition = DOES_NOT_HOLD, ""
+    return Statement(
+        "primary-level",
+        "Section 3",
+        "Algorithm (6) – (15) has been implemented at the level of primary and second processing "
+        "of signals.",
+        verdict,
+        condition,
+        "Level and slope of each channel, estimated by (6)-(15) from the samples at 1 kHz, beside "
+        "the robust digital filter on the same samples. At rest it leaves less noise. Its model "
+        "of the motion is a slope that changes slowly: samples of a faster motion look like "
+        "outliers to it, though the angle of this turn is kept.",
+        (
+            Evidence("noise left, digital filter", digital.noise),
+            Evidence("noise left, W-D filter", wd.noise),
+            Evidence("outliers put in", float(outliers)),
+            Evidence("taken for outliers at rest, W-D filter", float(wd.doubted)),
+            Evidence("taken for outliers in the turn, digital filter", float(digital.turning)),
+            Evidence("taken for outliers in the turn, W-D filter", float(wd.turning)),
+            Evidence("error of the turn's angle, W-D filter", wd.angle, "°"),
+        ),
+        "fig4",
+    )
 
 
 def smoothed(made: Bench) -> Statement:

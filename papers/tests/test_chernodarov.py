@@ -334,3 +334,23 @@ def test_the_drive_turns():
 
 def test_what_was_not_published_is_not_judged():
     assert {s.verdict for s in robustness.unpublished()} == {CANNOT_BE_JUDGED}
+
+
+def test_the_filter_at_the_primary_level_turns_with_its_numbers():
+    digital = signals.Primary(0.26, 54, 54, 1e-15)
+    wd = signals.Primary(0.19, 54, 54, 1e-4)
+    assert signals.primary_level(digital, wd, 54).verdict == HOLDS
+    turning = signals.Primary(0.19, 54, 1400, 1e-4)
+    assert signals.primary_level(digital, turning, 54).verdict == HOLDS_WHEN
+    loud, blind = signals.Primary(0.5, 54, 54, 1e-4), signals.Primary(0.19, 10, 10, 1e-4)
+    for other in (loud, blind):
+        assert signals.primary_level(digital, other, 54).verdict == DOES_NOT_HOLD
+
+
+def test_both_prefilters_find_the_outliers_of_a_unit_at_rest():
+    digital, wd, outliers = signals.primary()
+    # One row in 500 of 4001, in six channels.
+    assert outliers == 8 * 6
+    assert digital.doubted == digital.turning == outliers
+    assert outliers <= wd.doubted < 1.2 * outliers
+    assert signals.primary_level(digital, wd, outliers).verdict == HOLDS_WHEN
