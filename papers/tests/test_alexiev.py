@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from papers.alexiev import fig4, fig5, fig6, formulas, growth, motions
+from papers.alexiev import fig4, fig5, fig6, formulas, growth, motions, real_log
 from papers.alexiev import paper as system
 from papers.page import curves_json, reproduction_json
 from papers.reproduction import (
@@ -258,6 +258,25 @@ def test_a_return_hides_a_scale_factor():
     assert fig6.reference_points(at_return, largest, 17.0, 18.0).verdict == HOLDS_WHEN
     assert fig6.reference_points(largest, largest, 17.0, 18.0).verdict == HOLDS
     assert fig6.reference_points(0.0, largest, 0.1, 18.0).verdict == DOES_NOT_HOLD
+
+
+def test_a_real_log_returns_to_its_pose(recordings, monkeypatch):
+    monkeypatch.setenv("STRAPDOWN_DATA", str(recordings("mpu6050_turns").parent))
+    statements, (table,), figures = real_log.real_log()
+    assert not statements
+    assert len(figures) == 6
+    for axis, (dcm, slow, naive, fastest) in table.rows:
+        # A turn by hand wobbles about the other axes: the order of rotations counts, and most of
+        # the naive sum's error is its own.
+        assert naive > 2.0 * dcm, axis
+        assert naive > 2.0 * slow, axis
+        assert fastest > 30.0, axis
+
+
+def test_without_the_recording_one_line_says_so(monkeypatch, capsys):
+    monkeypatch.delenv("STRAPDOWN_DATA", raising=False)
+    assert real_log.real_log() == ([], [], [])
+    assert capsys.readouterr().err.count("\n") == 1
 
 
 # --- growth ---------------------------------------------------------------------------------
