@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.same_picture import PINNED, same_picture
 
 from papers.chernodarov import damping, drive, equations, robustness, signals, states
 from papers.chernodarov import paper as system
-from papers.page import looks, reproduction_page, svg
+from papers.page import looks, reproduction_page
 from papers.reproduction import (
     CANNOT_BE_JUDGED,
     DOES_NOT_HOLD,
@@ -113,17 +111,6 @@ def test_curves_of_one_legend_are_told_apart_with_and_without_color(made):
 
 def test_the_page_has_the_statements_of_this_code(made):
     check_manual(made, PAGE)
-
-
-@pytest.mark.skipif(not PINNED, reason="another matplotlib than that of constraints.txt")
-@pytest.mark.parametrize("slug", ["fig6", "turned", "printed-step"])
-def test_a_picture_of_the_manual_is_what_is_drawn_now(made, slug, tmp_path):
-    picture = svg(next(f for f in made.figures if f.slug == slug))
-    shown = PAGE.parent / "images" / f"{slug}.svg"
-    if os.environ.get("STRAPDOWN_WRITE_PICTURES"):
-        shown.write_text(picture, encoding="utf-8")
-    (tmp_path / "now.svg").write_text(picture, encoding="utf-8")
-    assert same_picture(shown, tmp_path / "now.svg"), "make pictures, and look at them"
 
 
 def test_the_covariance_tells_what_the_units_have(made):
