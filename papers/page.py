@@ -15,6 +15,7 @@ import jinja2
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import FuncFormatter, NullFormatter
 from numpy.typing import NDArray
 
 from papers.reproduction import (
@@ -242,6 +243,7 @@ def svg(figure: Figure) -> str:
             _panel(ax, panel, style)
             if figure.x_log:
                 ax.set_xscale("log")
+                _plain_ticks(ax.xaxis)
         for k, (x, label) in enumerate(figure.marks):
             for ax in axes:
                 ax.axvline(x, color="#b42318", lw=0.8, ls=(0, (2, 2)))
@@ -273,8 +275,15 @@ def _panel(ax: Any, panel: FigurePanel, style: dict[str, tuple[str, Any, str]]) 
             ax.plot(x, y, ls=dash, lw=width, color=color, label=trace.name)
     if panel.log:
         ax.set_yscale("log")
+        _plain_ticks(ax.yaxis)
     ax.set_ylabel(panel.y_label)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=8)
+
+
+def _plain_ticks(axis: Any) -> None:
+    """Numbers in place of powers in mathematical script, which is not parsed here."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 # --- Page and folder ------------------------------------------------------------------------

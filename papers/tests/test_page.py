@@ -65,6 +65,7 @@ def test_the_page_shows_statements_tables_and_figures_and_fetches_nothing():
     for part in ('id="key"', 'id="figure-f"', 'id="table-t"', "&lt;Title&gt;", "computed - true"):
         assert part in text
     assert not re.search(r'(src|href)="(?!#)', text)
+    assert "mathdefault" not in text
     ids = re.findall(r'\bid="([^"]+)"', text)
     assert len(set(ids)) == len(ids)
     assert set(re.findall(r"url\(#([^)]+)\)", text)) <= set(ids)
