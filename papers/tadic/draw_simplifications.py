@@ -54,7 +54,10 @@ def panel(trip: Trip, label: str, times: Array, least: float) -> FigurePanel:
             for unit in UNITS
         ]
         courses[sensor] = np.median(units, axis=0)
-    traces = tuple(Trace(n, times, np.where(y >= least, y, np.nan)) for n, y in courses.items())
+    traces = tuple(
+        Trace(n, times, np.where(y >= least, y, np.nan), reference=n in SENSORS)
+        for n, y in courses.items()
+    )
     return FigurePanel(f"{label}, m", traces, log=True)
 
 
