@@ -62,7 +62,7 @@ _PREFERRED = {
 _DASHES = ("-", "--", "-.", (0, (8, 2)), (0, (3, 1, 1, 1, 1, 1)))
 _MARKERS = "osD^vPX*p<>"
 _BUCKETS = 1500
-_STYLE = {
+_STYLE: Any = {
     "svg.hashsalt": "strapdown",
     "svg.fonttype": "none",
     "font.size": 9,

@@ -39,7 +39,8 @@ POINTS = 200
 
 def _at(course: pd.DataFrame, times: Array) -> Array:
     """Position error at instants, m."""
-    return np.interp(times, course.index.to_numpy(dtype=np.float64), course["position_m"])
+    position = course["position_m"].to_numpy(dtype=np.float64)
+    return np.asarray(np.interp(times, course.index.to_numpy(dtype=np.float64), position))
 
 
 def panel(trip: Trip, label: str, times: Array, least: float) -> FigurePanel:
