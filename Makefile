@@ -7,7 +7,7 @@ PYTEST = NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m pytest
 # Numba's cache does not see every change of a source; each run of the tests has its own.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT;
 
-.PHONY: demo test test-slow test-bounds examples record mutation check format bench docs messages statements pictures clean
+.PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs codes pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -16,6 +16,7 @@ help:
 	@echo "make test-slow  the tests that take more than 20 s each"
 	@echo "make examples   the longer examples of the manual: each prints what its page shows"
 	@echo "make record     version 0.1 and this tree on the same runs, compared to the last bit"
+	@echo "make papers     the tests of the reproduced papers, and the three of them into papers-reproduced"
 	@echo "make check      ruff, format, mypy, import-linter"
 	@echo "make bench      speed and memory as ratios against named alternatives"
 	@echo "make docs       the manual, into docs/_build"
@@ -69,21 +70,23 @@ format: $(VENV)/.dev
 bench: $(VENV)/.dev
 	@$(FRESH) NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m benchmarks
 
-messages: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_MESSAGES=1 $(PYTEST) -m '' tests/cli/test_messages.py
+codes: $(VENV)/.test
+	@$(FRESH) STRAPDOWN_WRITE_CODES=1 $(PYTEST) -m '' tests/cli/test_bad_input.py
+
+papers: $(VENV)/.test
+	@$(FRESH) $(PYTEST) -n 2 -m '' papers
+	@$(FRESH) for paper in alexiev tadic chernodarov; do \
+		NUMBA_CACHE_DIR="$$cache" $(BIN)/python -m papers.$$paper --out papers-reproduced/$$paper --quiet \
+		|| exit 1; done
 
 statements: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' tests/cli/test_reproduce.py \
-		tests/unit/systems/test_reproduce_tadic.py \
-		tests/unit/systems/test_reproduce_chernodarov.py
+	@$(FRESH) STRAPDOWN_WRITE_STATEMENTS=1 $(PYTEST) -m '' papers -k statements_of_this_code
 
 pictures: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py \
-		tests/unit/systems/test_reproduce_tadic.py \
-		tests/unit/systems/test_reproduce_chernodarov.py
+	@$(FRESH) STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py papers -k picture
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
 
 clean:
-	rm -rf $(VENV) demo docs/_build
+	rm -rf $(VENV) demo papers-reproduced docs/_build

@@ -49,7 +49,7 @@ def _sketching():
         )
 
     with pytest.MonkeyPatch.context() as patch:
-        for name in ("svg_chart", "attitude", "reproduction", "trajectory_simulation"):
+        for name in ("svg_chart", "attitude", "trajectory_simulation"):
             patch.setattr(import_module(f"strapdown.report.{name}"), "draw", sketch)
         yield
 

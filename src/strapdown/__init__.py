@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
-    from strapdown.report.reproduction import reproduce
     from strapdown.report.simulation import simulate
     from strapdown.report.verify import verify
     from strapdown.sensors.assumed import Assumed
@@ -73,7 +72,7 @@ if TYPE_CHECKING:
     from strapdown.sensors.imu_uncertainty import ImuUncertainty
     from strapdown.sensors.redundant_units import vote_units
     from strapdown.sensors.triad_uncertainty import TriadUncertainty
-    from strapdown.systems.crash_reconstruction import reconstruct_crash
+    from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 
 __version__ = "0.1.0"
 
@@ -84,6 +83,7 @@ __all__ = [
     "AttitudeComparison",
     "Barometer",
     "BodyVelocity",
+    "CrashReconstruction",
     "CrashRun",
     "CrashUnit",
     "Entry",
@@ -127,7 +127,6 @@ __all__ = [
     "read_trajectory",
     "reconstruct",
     "reconstruct_crash",
-    "reproduce",
     "run_mechanization",
     "sample_paths",
     "simulate",
@@ -169,6 +168,7 @@ _HOMES = {
     "read": "strapdown.api.reading",
     "read_gnss": "strapdown.api.reading",
     "read_imu": "strapdown.api.reading",
+    "CrashReconstruction": "strapdown.systems.crash_reconstruction",
     "Entry": "strapdown.crash.entry",
     "sample_paths": "strapdown.crash.monte_carlo",
     "trajectory_differences": "strapdown.evaluation.trajectory_differences",
@@ -184,7 +184,6 @@ _HOMES = {
     "WanderAzimuth": "strapdown.mechanization",
     "run_mechanization": "strapdown.mechanization",
     "NavState": "strapdown.nav_state",
-    "reproduce": "strapdown.report.reproduction",
     "simulate": "strapdown.report.simulation",
     "verify": "strapdown.report.verify",
     "Assumed": "strapdown.sensors.assumed",

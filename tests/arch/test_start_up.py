@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from importlib import import_module
+from types import ModuleType
 
 import pytest
 
@@ -35,7 +37,6 @@ def test_dir_and_an_unknown_name_load_nothing_either():
         ["--help"],
         ["align", "--help"],
         ["attitude", "--help"],
-        ["reproduce", "--help"],
         ["crash", "--help"],
         ["init", "align", "--help"],
         ["init", "navigate", "--help"],
@@ -59,3 +60,24 @@ def test_the_public_names_are_there():
 
     for name in strapdown.__all__:
         assert getattr(strapdown, name) is not None
+
+
+ROOMS = ("aiding", "alignment", "crash", "dsp", "estimation", "evaluation", "navigation", "sensors")
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_exports_what_it_says_and_no_module_in_its_place(room):
+    package = import_module(f"strapdown.{room}")
+    for name in package.__all__:
+        home = package.__dict__["_homes"][name]
+        # The module first, as an import from inside does: its name must not hide the function's.
+        module = import_module(f"strapdown.{room}.{home}")
+        assert getattr(package, name) is getattr(module, name)
+        assert not isinstance(getattr(package, name), ModuleType)
+    with pytest.raises(AttributeError, match="nothing"):
+        _ = package.nothing
+
+
+def test_an_empty_room_loads_nothing():
+    code = "; ".join(f"import strapdown.{room}" for room in ROOMS)
+    assert loaded_after(code) == set()

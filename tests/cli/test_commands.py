@@ -16,7 +16,7 @@ from strapdown.cli.main import EXIT_CODES
 
 pytestmark = pytest.mark.usefixtures("sketched")
 
-COMMANDS = ["attitude", "simulate", "reproduce", "verify", "modules", "demo"]
+COMMANDS = ["attitude", "simulate", "verify", "modules", "demo"]
 
 
 @pytest.fixture

@@ -26,12 +26,10 @@ RUNNER = runner()
 PAGES = [page for page in RUNNER.pages() if any(map(RUNNER.is_run, RUNNER.examples(page)))]
 #: Pages whose examples take more than 8 s; `make examples` runs them.
 SLOW = {
-    "alexiev",
     "align",
     "alignment",
     "answer",
     "attitude",
-    "chernodarov",
     "coast",
     "consistency",
     "crash",
@@ -42,10 +40,8 @@ SLOW = {
     "navigate",
     "references",
     "results",
-    "simplifications",
     "smoothing",
     "start",
-    "tadic",
     "trust",
     "walking",
 }

@@ -262,6 +262,15 @@ def test_a_file_taken_out_of_folder_and_manifest_is_missed(copy):
     assert "report.html: written now, and not sealed" in found.details
 
 
+def test_a_bundle_of_a_reproduced_paper_is_refused(copy):
+    manifest = json.loads((copy / MANIFEST).read_text())
+    manifest["command"] = "reproduce"
+    (copy / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(DataError, match="reproduced paper") as refused:
+        verify(copy)
+    assert "papers." in str(refused.value)
+
+
 def test_a_configuration_that_reads_what_is_not_sealed_is_refused(copy):
     manifest = json.loads((copy / MANIFEST).read_text())
     manifest["configuration"]["source"]["path"] = "../log.csv"

@@ -1,1 +1,30 @@
 """Initial attitude."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from strapdown.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from strapdown.alignment.fine import FineAlignment
+    from strapdown.alignment.fine_result import FineResult
+    from strapdown.alignment.site import Site
+    from strapdown.alignment.two_vector import TwoVector
+
+__all__ = [
+    "FineAlignment",
+    "FineResult",
+    "Site",
+    "TwoVector",
+]
+
+load_on_first_use(
+    __name__,
+    {
+        "fine": "FineAlignment",
+        "fine_result": "FineResult",
+        "site": "Site",
+        "two_vector": "TwoVector",
+    },
+)

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels.increments import LARGEST
 from strapdown.attitude.algorithm import AttitudeAlgorithm, Steps, steps_of
+from strapdown.attitude.cost import count_cost
 from strapdown.attitude.direction_cosine import DirectionCosine
 from strapdown.attitude.euler_krylov import EulerKrylov
 from strapdown.attitude.naive import Naive
@@ -38,6 +39,7 @@ __all__ = [
     "RotationVector",
     "RungeKutta",
     "attitude_history",
+    "count_cost",
     "make_algorithm",
     "run_attitude",
 ]

@@ -23,7 +23,6 @@ from strapdown.cli import (
     init,
     modules,
     navigate,
-    reproduce,
     simulate,
     verify,
 )
@@ -71,7 +70,6 @@ app.command("coast", epilog=coast.EPILOG)(coast.coast)
 app.add_typer(init.app, name="init")
 app.command("crash", epilog=crash.EPILOG)(crash.crash)
 app.command("simulate", epilog=simulate.EPILOG)(simulate.simulate)
-app.command("reproduce", epilog=reproduce.EPILOG)(reproduce.reproduce)
 app.command("verify", epilog=verify.EPILOG)(verify.verify)
 app.command("modules", epilog=modules.EPILOG)(modules.modules)
 app.command("demo", epilog=demo.EPILOG)(demo.demo)

@@ -17,7 +17,6 @@ __all__ = [
     "CaseSpec",
     "CrashSimulationSpec",
     "LogSpec",
-    "ReproduceSpec",
     "ScenarioSpec",
     "SimulateSpec",
     "TrajectorySpec",
@@ -79,9 +78,3 @@ class SimulateSpec(Spec):
 
     scenario: ScenarioSpec
     formats: tuple[str, ...] = ("csv",)
-
-
-class ReproduceSpec(Spec):
-    """One paper re-made; everything else is fixed in the code."""
-
-    paper: str

@@ -1,1 +1,69 @@
 """Crash reconstruction: events, delta-V, direction of force, severity, path, and their bounds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from strapdown.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from strapdown.crash.acceleration import Acceleration
+    from strapdown.crash.at_point import at_point
+    from strapdown.crash.delta_v import delta_v, trailing_delta_v
+    from strapdown.crash.delta_v_bound import body_delta_v_bound, resolved_delta_v_bound
+    from strapdown.crash.entry import Entry
+    from strapdown.crash.entry_priors import FixCorrelation
+    from strapdown.crash.events import detect_events
+    from strapdown.crash.gnss_start import GnssEntry
+    from strapdown.crash.monte_carlo import sample_paths
+    from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
+    from strapdown.crash.prepare import prepare_unit
+    from strapdown.crash.reference_path import PathComparison, compare_with_reference
+    from strapdown.crash.unit_reconstruction import UnitReconstruction, reconstruct_unit
+    from strapdown.crash.velocity_change import EventChanges, VelocityChange, velocity_change
+
+__all__ = [
+    "Acceleration",
+    "Entry",
+    "EventChanges",
+    "FixCorrelation",
+    "GnssEntry",
+    "NedPdof",
+    "PathComparison",
+    "Pdof",
+    "UnitReconstruction",
+    "VelocityChange",
+    "at_point",
+    "body_delta_v_bound",
+    "compare_with_reference",
+    "delta_v",
+    "detect_events",
+    "ned_pdof",
+    "pdof",
+    "prepare_unit",
+    "reconstruct_unit",
+    "resolved_delta_v_bound",
+    "sample_paths",
+    "trailing_delta_v",
+    "velocity_change",
+]
+
+load_on_first_use(
+    __name__,
+    {
+        "acceleration": "Acceleration",
+        "at_point": "at_point",
+        "delta_v": "delta_v trailing_delta_v",
+        "delta_v_bound": "body_delta_v_bound resolved_delta_v_bound",
+        "entry": "Entry",
+        "entry_priors": "FixCorrelation",
+        "events": "detect_events",
+        "gnss_start": "GnssEntry",
+        "monte_carlo": "sample_paths",
+        "pdof": "NedPdof Pdof ned_pdof pdof",
+        "prepare": "prepare_unit",
+        "reference_path": "PathComparison compare_with_reference",
+        "unit_reconstruction": "UnitReconstruction reconstruct_unit",
+        "velocity_change": "EventChanges VelocityChange velocity_change",
+    },
+)

@@ -2,3 +2,23 @@
 
 Arrays in, arrays out; each tells what it does to noise and to time.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from strapdown.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from strapdown.dsp.running_integral import running_integral
+
+__all__ = [
+    "running_integral",
+]
+
+load_on_first_use(
+    __name__,
+    {
+        "running_integral": "running_integral",
+    },
+)

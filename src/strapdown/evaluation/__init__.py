@@ -1,1 +1,25 @@
 """How good a result is: against truth, against reference points, against each other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from strapdown.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.dead_reckoning import dead_reckon
+    from strapdown.evaluation.trajectory_differences import ROTATION_ERROR, trajectory_differences
+
+__all__ = [
+    "ROTATION_ERROR",
+    "dead_reckon",
+    "trajectory_differences",
+]
+
+load_on_first_use(
+    __name__,
+    {
+        "dead_reckoning": "dead_reckon",
+        "trajectory_differences": "ROTATION_ERROR trajectory_differences",
+    },
+)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from strapdown._kernels.level import OMEGA_EL, V_L
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.reference_heights import HEIGHTS
@@ -13,6 +14,8 @@ from strapdown.mechanization.wander_azimuth import WanderAzimuth
 __all__ = [
     "HEIGHTS",
     "MECHANIZATIONS",
+    "OMEGA_EL",
+    "V_L",
     "Mechanization",
     "NavTracker",
     "NavigationRun",

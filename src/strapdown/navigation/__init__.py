@@ -1,1 +1,32 @@
 """The aided navigator: segments between epochs, what it records, how it is watched."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from strapdown.lazy_names import load_on_first_use
+
+if TYPE_CHECKING:
+    from strapdown.navigation.damping import Damping, Feedback, Feedforward
+    from strapdown.navigation.lost_covariance import LostCovarianceError
+    from strapdown.navigation.navigator import Navigator
+    from strapdown.navigation.piece import NavigationPiece
+
+__all__ = [
+    "Damping",
+    "Feedback",
+    "Feedforward",
+    "LostCovarianceError",
+    "NavigationPiece",
+    "Navigator",
+]
+
+load_on_first_use(
+    __name__,
+    {
+        "damping": "Damping Feedback Feedforward",
+        "lost_covariance": "LostCovarianceError",
+        "navigator": "Navigator",
+        "piece": "NavigationPiece",
+    },
+)

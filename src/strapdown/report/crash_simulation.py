@@ -35,7 +35,7 @@ from strapdown.simulation.case_recording import (
     record_case,
 )
 from strapdown.simulation.crash_cases import find_case
-from strapdown.systems.crash_trials.exact_answers import ExactAnswers
+from strapdown.simulation.exact_answers import ExactAnswers
 from strapdown.tables import ACCEL, GYRO
 
 __all__ = ["write_crash_simulation"]

@@ -22,7 +22,6 @@ from strapdown.bundle.seal import MANIFEST, Seal, sha256
 from strapdown.config import (
     AttitudeSpec,
     CrashSimulationSpec,
-    ReproduceSpec,
     SimulateSpec,
     TrajectorySpec,
 )
@@ -35,7 +34,6 @@ from strapdown.report.coast import rerun_coast
 from strapdown.report.crash_case import rerun_crash
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.navigation import rerun_navigation
-from strapdown.report.reproduction import make_reproduction, write_reproduction
 from strapdown.report.simulation import write_simulation
 from strapdown.report.trajectory_simulation import write_trajectory_simulation
 from strapdown.systems.attitude_bench import run_bench
@@ -93,10 +91,6 @@ def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]
     return write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
-def _rerun_reproduction(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    return write_reproduction(make_reproduction(ReproduceSpec.model_validate(configuration)), out)
-
-
 def _rerun_crash(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
     return rerun_crash(configuration, out, report=_with_page(configuration))
 
@@ -119,7 +113,6 @@ RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "coast": _rerun_coast,
     "crash": _rerun_crash,
     "navigate": _rerun_navigation,
-    "reproduce": _rerun_reproduction,
     "simulate": _rerun_simulation,
 }
 
@@ -152,6 +145,12 @@ def verify(bundle: str | Path) -> Verification:
         changes += changed_case(root, manifest)
     if changes:
         return Verification("changed", math.inf, digest, tuple(changes))
+    if manifest["command"] == "reproduce":
+        raise DataError(
+            "it is a reproduced paper, and such bundles are not verified any more",
+            file=MANIFEST,
+            remedy="run python -m papers.NAME in the source of strapdown, which writes it again",
+        )
     if manifest["command"] not in RERUNS:
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:

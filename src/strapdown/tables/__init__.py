@@ -54,6 +54,7 @@ from strapdown.tables.body_velocity import (
     body_velocity_table,
     check_body_velocity,
 )
+from strapdown.tables.checks import values_of
 from strapdown.tables.columns import (
     ACCEL,
     DR,
@@ -154,4 +155,5 @@ __all__ = [
     "references_table",
     "trajectory_error_table",
     "trajectory_table",
+    "values_of",
 ]

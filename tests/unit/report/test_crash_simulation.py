@@ -21,7 +21,7 @@ from strapdown.report import crash_simulation
 from strapdown.simulation.case_recording import record_case
 from strapdown.simulation.crash_cases import CASES
 from strapdown.simulation.crash_scenarios import CRASHES
-from strapdown.systems.crash_trials.exact_answers import ExactAnswers
+from strapdown.simulation.exact_answers import ExactAnswers
 from strapdown.tables import ACCEL, GYRO, NED
 
 CRASHED = [name for name, c in CRASHES.items() if c.is_crash]

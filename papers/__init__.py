@@ -1,0 +1,1 @@
+"""Three papers reproduced through the public API of strapdown: statements, figures, verdicts."""

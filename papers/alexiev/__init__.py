@@ -1,0 +1,1 @@
+"""Alexiev (2021), statement by statement."""

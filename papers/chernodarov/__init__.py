@@ -1,0 +1,1 @@
+"""The statements and figures of Chernodarov (2009)."""

@@ -1,0 +1,1 @@
+"""The crash test of Tadic and Vukajlovic (2016)."""
