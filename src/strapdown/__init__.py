@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from strapdown.sensors.triad_uncertainty import TriadUncertainty
     from strapdown.systems.crash_reconstruction import CrashReconstruction, reconstruct_crash
 
-__version__ = "0.1.0"
+__version__ = "0.2.0.dev0"
 
 __all__ = [
     "AlignmentRun",

@@ -367,3 +367,13 @@ def test_one_folder_in_two_roles_is_kept_whole_in_one_place(tmp_path):
         "inputs/log/drive/fixes.npy": "aid-gnss",
     }
     assert all((seals[0].path / name).is_file() for name in kept)
+
+
+def test_a_bundle_of_version_0_1_is_refused_by_a_finding_that_names_the_version(tmp_path):
+    manifest = {"schema": "strapdown bundle 1", "command": "attitude", "configuration": {}}
+    manifest |= {"inputs": [], "outputs": [], "platform": {}, "versions": {"strapdown": "0.1.0"}}
+    (tmp_path / MANIFEST).write_text(json.dumps(manifest))
+    with pytest.raises(DataError) as refused:
+        verify(tmp_path)
+    assert refused.value.finding.code == "bundle.other-schema"
+    assert refused.value.finding.data["version"] == "0.1.0"

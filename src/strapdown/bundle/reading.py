@@ -41,8 +41,13 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise DataError("bundle.not-json", file=MANIFEST, reason=error) from None
     wanted = {"schema", "command", "configuration", "inputs", "outputs", "versions", "platform"}
-    if not isinstance(manifest, dict) or wanted - set(manifest) or manifest["schema"] != SCHEMA:
+    if not isinstance(manifest, dict) or wanted - set(manifest):
         raise DataError("bundle.unknown-form", file=MANIFEST)
+    if manifest["schema"] != SCHEMA:
+        version = manifest["versions"].get("strapdown", "unknown")
+        raise DataError(
+            "bundle.other-schema", file=MANIFEST, schema=manifest["schema"], version=version
+        )
     _refuse_escape(manifest)
     return manifest
 

@@ -13,7 +13,7 @@ TIMING = "timing.json"
 LATENCY = "latency.json"
 #: Outside the seal: clocks differ.
 UNSEALED = (TIMING, LATENCY)
-SCHEMA = "strapdown bundle 1"
+SCHEMA = "strapdown bundle 2"
 
 
 @dataclass(frozen=True)
