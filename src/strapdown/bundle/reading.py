@@ -44,7 +44,8 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict) or wanted - set(manifest):
         raise DataError("bundle.unknown-form", file=MANIFEST)
     if manifest["schema"] != SCHEMA:
-        version = manifest["versions"].get("strapdown", "unknown")
+        known = manifest["versions"]
+        version = known.get("strapdown", "unknown") if isinstance(known, dict) else "unknown"
         raise DataError(
             "bundle.other-schema", file=MANIFEST, schema=manifest["schema"], version=version
         )
